@@ -1,0 +1,1 @@
+"""Hardware-in-the-loop controller stack for active U-tube anti-roll tanks."""

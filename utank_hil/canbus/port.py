@@ -1,0 +1,35 @@
+"""The way from a runner to a bus."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from utank_hil.canbus.frame import Frame
+
+
+class PortError(OSError):
+    """The bus can't be reached: no such interface, interface down, transmit queue full."""
+
+
+class Port(Protocol):
+    """A bus as a runner sees it; never blocks."""
+
+    def send(self, frame: Frame) -> None:
+        """Queue one frame for transmission.
+
+        Raises
+        ------
+        PortError
+            If the frame was not taken.
+        """
+
+    def receive(self) -> Sequence[Frame]:
+        """Return what has arrived since the last call, oldest first.
+
+        Raises
+        ------
+        PortError
+            If the bus can no longer be read.
+        """
+
+    def close(self) -> None:
+        """Release the bus; idempotent."""

@@ -1,0 +1,86 @@
+"""The U-tube tank: two reservoirs at the ship's sides, joined by a duct with an axial pump.
+
+Frame and signs, used everywhere in this project: body axes at the ship's centre of gravity, x
+forward, y to starboard, z down; roll positive when starboard goes down. The duct's centre lies at
+(lx, 0, lz), so a positive lz is below the centre of gravity. The level `h` is positive when the
+starboard reservoir stands above its still level and the port one below by the same amount. The tank
+angle is tau = h / (L / 2); in a slow static heel it equals the roll angle. A positive pump pressure
+raises the starboard level.
+"""
+
+import math
+from dataclasses import dataclass
+
+GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Tank:
+    """Geometry and losses of a U-tube tank.
+
+    Parameters
+    ----------
+    width_m : float
+        Duct length L, the distance between the reservoirs' centre lines.
+    height_m : float
+        Still-water height H of the reservoirs above the duct.
+    reservoir_area_m2 : float
+        Horizontal area At of one reservoir.
+    duct_area_m2 : float
+        Cross-section Ap of the duct.
+    lx_m, lz_m : float
+        Duct centre forward of and below the ship's centre of gravity.
+    density_kg_m3 : float
+        Density of the tank water.
+    damping_ratio : float
+        Linear loss as the damping ratio of the tank's free oscillation in a ship held still.
+    quadratic_loss : float
+        Dimensionless coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the duct speed.
+
+    Raises
+    ------
+    ValueError
+        If a length, area or density is not positive, or a loss is negative.
+    """
+
+    width_m: float
+    height_m: float
+    reservoir_area_m2: float
+    duct_area_m2: float
+    lx_m: float = 0.0
+    lz_m: float = 0.0
+    density_kg_m3: float = 1000.0
+    damping_ratio: float = 0.0
+    quadratic_loss: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in (
+            "width_m",
+            "height_m",
+            "reservoir_area_m2",
+            "duct_area_m2",
+            "density_kg_m3",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"tank {name} must be positive and finite, got {value}")
+        for name in ("damping_ratio", "quadratic_loss"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"tank {name} must be zero or more and finite, got {value}")
+
+    @property
+    def effective_length_m(self) -> float:
+        """Length 2H + L At/Ap of a uniform tube with the same inertia per reservoir area."""
+        return 2 * self.height_m + self.width_m * self.reservoir_area_m2 / self.duct_area_m2
+
+    @property
+    def natural_frequency_rad_s(self) -> float:
+        """Natural frequency sqrt(2 g / (2H + L At/Ap)) of the water in a ship held still."""
+        return math.sqrt(2 * GRAVITY_M_S2 / self.effective_length_m)
+
+    @property
+    def loss_pa_per_m_s(self) -> float:
+        """Linear pressure loss per reservoir speed dh/dt that gives `damping_ratio`."""
+        inertia = self.density_kg_m3 * self.effective_length_m
+        return 2 * self.damping_ratio * self.natural_frequency_rad_s * inertia
