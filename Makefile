@@ -1,0 +1,62 @@
+# utank-hil: `make bench` sets up and runs the main job, `make test` sets up and passes the tests.
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+.PHONY: help setup bench test test-fast check format benchmark docs lock clean
+
+help:
+	@echo "make setup      virtual environment with everything pinned in requirements.lock"
+	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
+	@echo "make test       lint, types and all tests, those on a real CAN bus included"
+	@echo "make test-fast  the tests that take seconds, without CAN"
+	@echo "make check      lint, format, strict types, generated documents"
+	@echo "make benchmark  speed, as ratios to something else in the same run"
+	@echo "make docs       write the generated documents anew"
+	@echo "make lock       resolve the dependencies again"
+	@echo "make clean      remove everything that can be made again"
+
+setup: $(READY)
+
+$(READY): requirements.lock pyproject.toml
+	@command -v python3 >/dev/null || { echo "python3 is missing: apt-get install python3 python3-venv" >&2; exit 1; }
+	@python3 -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "python3 3.11 or newer with venv is needed: apt-get install python3 python3-venv" >&2; exit 1; }
+	python3 -m venv $(VENV)
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+bench: setup
+	$(VENV)/bin/utank-hil bench
+
+check: setup
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(PYTHON) tools/document_catalogue.py --check
+
+test: check
+	$(VENV)/bin/pytest -m "not socketcan"
+	tools/vcan $(VENV)/bin/pytest -m socketcan tests/socketcan
+
+test-fast: setup
+	$(VENV)/bin/pytest -m "not socketcan and not slow"
+
+format: setup
+	$(VENV)/bin/ruff check --fix .
+	$(VENV)/bin/ruff format .
+
+benchmark: setup
+	@for script in tools/benchmark_*.py; do echo; echo "== $$script"; $(PYTHON) $$script || exit 1; done
+
+docs: setup
+	$(PYTHON) tools/document_catalogue.py
+
+lock: setup
+	$(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+		--no-header --no-annotate --no-emit-index-url --extra dev pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf $(VENV) .cache build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
