@@ -1,0 +1,169 @@
+"""The catalogue against the message table of the safety manual, and what it refuses."""
+
+import subprocess
+import sys
+
+import pytest
+from message_strategies import CASES, PROTECTED
+
+import utank_hil.canbus
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    Frame,
+    Heartbeat,
+    PumpCommand,
+    load_catalogue,
+)
+from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
+
+TABLE = {
+    "PUMP_CMD": (0x08FF1080, 20),
+    "DRIVE_STATUS_1": (0x08FF2081, 20),
+    "DRIVE_STATUS_2": (0x14FF2181, 100),
+    "SENSOR_MOTION": (0x08FF3082, 10),
+    "SENSOR_TANK": (0x0CFF3182, 20),
+    "SENSOR_PUMP": (0x0CFF3282, 20),
+    "CTRL_STATUS": (0x18FF1180, 100),
+    "OPERATOR_CMD": (0x0CFF4083, 200),
+    "HEARTBEAT_CONTROLLER": (0x18FF0080, 100),
+    "HEARTBEAT_DRIVE": (0x18FF0081, 100),
+    "HEARTBEAT_SENSORS": (0x18FF0082, 100),
+    "HEARTBEAT_OPERATOR": (0x18FF0083, 100),
+    "ADDRESS_CLAIM_CONTROLLER": (0x18EEFF80, None),
+    "ADDRESS_CLAIM_DRIVE": (0x18EEFF81, None),
+    "ADDRESS_CLAIM_SENSORS": (0x18EEFF82, None),
+    "ADDRESS_CLAIM_OPERATOR": (0x18EEFF83, None),
+}
+
+#: How the end of a signal's name says the unit of the DBC.
+UNIT_SUFFIXES = {
+    "Pa": "_pa",
+    "s": "_s",
+    "rad": "_rad",
+    "rad/s": "_rad_s",
+    "m": "_m",
+    "m3/s": "_m3_s",
+    "V": "_v",
+    "A": "_a",
+    "degC": "_c",
+    "1": "",
+}
+
+
+def altered(tmp_path, *changes):
+    text = DBC_PATH.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "altered.dbc"
+    path.write_text(text)
+    return path
+
+
+def test_identifiers_and_cycles_are_those_of_the_message_table():
+    found = {dbc.name: (dbc.frame_id, dbc.cycle_time) for _, _, dbc in CASES}
+    assert found == TABLE
+    assert load_catalogue().can_ids == {can_id for can_id, _ in TABLE.values()}
+    assert all(dbc.is_extended_frame and dbc.length == 8 for _, _, dbc in CASES)
+
+
+def test_everything_is_commented_has_receivers_and_says_its_unit_in_its_name():
+    for _, _, dbc in CASES:
+        assert dbc.comment, dbc.name
+        assert dbc.receivers, dbc.name
+        for signal in dbc.signals:
+            assert signal.comment, (dbc.name, signal.name)
+            if signal.unit is not None:
+                assert signal.name.endswith(UNIT_SUFFIXES[signal.unit]), (dbc.name, signal.name)
+
+
+def test_zero_is_sent_without_rounding():
+    """A zero pressure command is zero pressure, not half a step of it."""
+    for _, _, dbc in CASES:
+        for signal in dbc.signals:
+            if signal.minimum <= 0 <= signal.maximum:
+                raw = round(-signal.offset / signal.scale)
+                assert raw * signal.scale + signal.offset == 0, (dbc.name, signal.name)
+
+
+def test_data_ids_are_sixteen_and_no_two_messages_share_one_at_a_counter():
+    lists = [read_data_ids(dbc) for _, _, dbc in PROTECTED]
+    assert {len(ids) for ids in lists} == {16}
+    for at_one_counter in zip(*lists, strict=True):
+        assert len(set(at_one_counter)) == len(lists)
+
+
+def test_version_is_a_hash_of_the_dbc_and_never_not_available(tmp_path):
+    catalogue = load_catalogue()
+    assert 0 <= catalogue.version <= 4094
+    other = load_catalogue(altered(tmp_path, ("(8,-262144)", "(4,-131072)"), ("250000", "125000")))
+    assert other.version != catalogue.version
+    unix = tmp_path / "windows.dbc"
+    unix.write_bytes(DBC_PATH.read_bytes().replace(b"\n", b"\r\n"))
+    assert load_catalogue(unix).version == catalogue.version
+
+
+def test_messages_of_every_node_need_the_node():
+    with pytest.raises(ValueError, match="Heartbeat is sent by CONTROLLER, DRIVE, SENSORS"):
+        load_catalogue().transmitter(Heartbeat)
+    with pytest.raises(ValueError, match="no message PumpCommand sent by DRIVE"):
+        load_catalogue().receiver(PumpCommand, Address.DRIVE)
+    with pytest.raises(ValueError, match="no message Frame"):
+        load_catalogue().codec(Frame)
+    assert load_catalogue().codec(PumpCommand, Address.CONTROLLER).name == "PUMP_CMD"
+    assert load_catalogue().codec(AddressClaim, Address.DRIVE).can_id == 0x18EEFF81
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        (" roll_rad ", " role_rad ", "SENSOR_MOTION: signal role_rad has no field"),
+        (" roll_rad ", " role_rad ", "field roll_rad of SensorMotion has no signal"),
+        ("PUMP_CMD: 8 CONTROLLER", "PUMP_CMD: 8 DRIVE", "must end in the sender's address 0x81"),
+        ("PUMP_CMD: 8", "PUMP_CMD: 16", "PUMP_CMD: must have 8 bytes"),
+        ("PUMP_CMD:", "PUMP_COMMAND:", "PUMP_COMMAND: no message type"),
+        ("32|8@1+ (1,0) [0|254]", "32|8@1- (1,0) [0|120]", "control_word must be unsigned"),
+        ("[0|1.25]", "[0|1.275]", "timeout_s must keep its range"),
+        ("[0|1.25]", "[0|0]", "timeout_s needs a range"),
+        ("56|8@1+ (1,0) [0|15]", "56|8@1+ (2,0) [0|15]", "command_echo must have scale 1"),
+        ('6 "SHUTDOWN"', '5 "SHUTDOWN"', "control_word must have the value table of ControlWord"),
+        (' 255 "NOT_AVAILABLE" ;', " ;", "state must have the value table of DriveState"),
+        ("arm : 16|1@1+", "arm : 24|2@1+", "arm must have one bit"),
+        ('"03 05 00 06', '"05 00 06', "PUMP_CMD: DataIDs must be 16 bytes"),
+        ('"03 05 00 06', '"XX 05 00 06', "PUMP_CMD: DataIDs must be 16 bytes"),
+        ("counter : 8|4@1+", "counter : 8|3@1+", "needs counter at bit 8, 4 bits"),
+        ('"NmStationAddress" BU_ DRIVE 129', '"NmStationAddress" BU_ DRIVE 130', "node DRIVE"),
+    ],
+)
+def test_a_dbc_that_does_not_fit_the_message_types_is_refused(tmp_path, old, new, complaint):
+    with pytest.raises(ValueError, match="does not fit") as caught:
+        load_catalogue(altered(tmp_path, (old, new)))
+    assert complaint in str(caught.value)
+
+
+def test_a_missing_message_is_named(tmp_path):
+    text = DBC_PATH.read_text()
+    number = str(0x08FF1080 | 1 << 31)
+    blocks = text.split("\n\n")
+    kept = "\n\n".join(block for block in blocks if not block.startswith(f"BO_ {number}"))
+    lines = [line for line in kept.splitlines() if number not in line]
+    path = tmp_path / "short.dbc"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(ValueError, match="PUMP_CMD: missing"):
+        load_catalogue(path)
+
+
+def test_importing_and_loading_needs_no_compiler_and_no_plotting():
+    code = (
+        "import sys; from utank_hil.canbus import load_catalogue; "
+        "assert not {'cantools', 'can'} & set(sys.modules); load_catalogue(); "
+        "found = {'numba', 'matplotlib', 'control', 'scipy'} & set(sys.modules); "
+        "assert not found, found"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_an_unknown_public_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'NoSuchName'"):
+        utank_hil.canbus.NoSuchName  # noqa: B018

@@ -1,0 +1,119 @@
+"""The port on a real SocketCAN interface; run with ``tools/vcan pytest -m socketcan``."""
+
+import errno
+import subprocess
+
+import can
+import pytest
+from can.interfaces.socketcan import SocketcanBus
+
+from utank_hil.canbus import Frame, PortError, SocketCanPort
+
+pytestmark = pytest.mark.socketcan
+
+FRAME = Frame(0x18FF0081, bytes(range(8)))
+CHANNEL = "vcan7"
+
+
+def ip(*arguments):
+    subprocess.run(["ip", "link", *arguments], check=True, timeout=20)
+
+
+@pytest.fixture
+def interface():
+    """An interface of its own, so that taking it down disturbs nobody."""
+    ip("add", CHANNEL, "type", "vcan")
+    ip("set", CHANNEL, "up")
+    yield CHANNEL
+    if subprocess.run(["ip", "link", "show", CHANNEL], capture_output=True, timeout=20).returncode:
+        return
+    ip("del", CHANNEL)
+
+
+@pytest.fixture
+def ports(interface):
+    opened = [SocketCanPort(interface), SocketCanPort(interface)]
+    yield opened
+    for port in opened:
+        port.close()
+
+
+@pytest.fixture
+def raw_bus(interface):
+    """A bus that sends what a `Frame` can't be."""
+    with SocketcanBus(interface) as bus:
+        yield bus
+
+
+def test_frames_arrive_in_order_and_not_at_their_sender(ports):
+    here, there = ports
+    sent = [Frame(FRAME.can_id, bytes((number,) * 8)) for number in range(50)]
+    for frame in sent:
+        here.send(frame)
+    assert list(there.receive()) == sent
+    assert list(there.receive()) == []
+    assert list(here.receive()) == []
+
+
+def test_the_kernel_lets_only_the_asked_identifiers_through(interface, ports):
+    filtered = SocketCanPort(interface, can_ids=[FRAME.can_id])
+    try:
+        ports[0].send(Frame(0x08FF1080, b"\x01"))
+        ports[0].send(FRAME)
+        assert list(filtered.receive()) == [FRAME]
+    finally:
+        filtered.close()
+
+
+def test_standard_and_remote_frames_are_counted_and_left_out(ports, raw_bus):
+    raw_bus.send(can.Message(arbitration_id=0x123, is_extended_id=False, data=[1]))
+    raw_bus.send(can.Message(arbitration_id=FRAME.can_id, is_remote_frame=True, dlc=8))
+    raw_bus.send(can.Message(arbitration_id=FRAME.can_id, data=FRAME.data))
+    assert list(ports[0].receive()) == [FRAME]
+    assert (ports[0].standard_frames, ports[0].remote_frames) == (1, 1)
+
+
+def test_bus_off_is_a_port_error(ports, raw_bus):
+    raw_bus.send(can.Message(arbitration_id=0x040, is_error_frame=True, data=bytes(8)))
+    with pytest.raises(PortError, match=f"{CHANNEL}: bus-off"):
+        ports[0].receive()
+
+
+def test_an_interface_that_goes_down_is_reported_until_it_is_up_and_used(ports):
+    here, there = ports
+    ip("set", CHANNEL, "down")
+    for _ in range(3):
+        with pytest.raises(PortError, match=f"ip link set {CHANNEL} up"):
+            here.receive()
+        with pytest.raises(PortError) as caught:
+            here.send(FRAME)
+        assert caught.value.errno == errno.ENETDOWN
+    ip("set", CHANNEL, "up")
+    here.send(FRAME)
+    assert list(here.receive()) == []
+    with pytest.raises(PortError):  # what the kernel noted while it was down
+        there.receive()
+    here.send(FRAME)
+    assert FRAME in there.receive()
+
+
+def test_a_deleted_interface_is_reopened_when_it_is_back(ports):
+    here, there = ports
+    ip("del", CHANNEL)
+    for _ in range(4):
+        with pytest.raises(PortError):
+            here.receive()
+        with pytest.raises(PortError):
+            there.receive()
+    with pytest.raises(PortError, match="not found"):
+        here.send(FRAME)
+    ip("add", CHANNEL, "type", "vcan")
+    ip("set", CHANNEL, "up")
+    assert list(there.receive()) == []
+    here.send(FRAME)
+    assert list(there.receive()) == [FRAME]
+
+
+def test_an_interface_that_does_not_exist_is_named():
+    with pytest.raises(PortError, match="vcan99: not found"):
+        SocketCanPort("vcan99")

@@ -1,0 +1,133 @@
+"""The value tables of the catalogue. A value the table does not list decodes to None.
+
+Raw all-ones means "not available" and is no member: a field typed `Mode | None` carries it as None.
+"""
+
+from enum import IntEnum
+
+
+class Address(IntEnum):
+    """Source address of a node: the low byte of every identifier it sends."""
+
+    CONTROLLER = 0x80
+    DRIVE = 0x81
+    SENSORS = 0x82
+    OPERATOR = 0x83
+
+
+class Mode(IntEnum):
+    """Mode of the controller."""
+
+    INIT = 0
+    STANDBY = 1
+    PASSIVE = 2
+    ACTIVE = 3
+    FAULT = 4
+
+
+class Fault(IntEnum):
+    """What stopped the controller, or degrades it: one code a row of the fault table."""
+
+    NONE = 0
+    MOTION_SILENT = 1
+    TANK_SILENT = 2
+    PUMP_SENSOR_SILENT = 3
+    PROTECTION = 4
+    COUNTER_FROZEN = 5
+    UNKNOWN_IDENTIFIERS = 6
+    BUS_OVERLOAD = 7
+    ADDRESS_CONFLICT = 8
+    BUS_LOST = 9
+    STUCK_SIGNAL = 10
+    DRIFT = 11
+    SPIKES = 12
+    NOISE = 13
+    LEVEL_LIMIT = 14
+    DRIVE_NOT_FOLLOWING = 15
+    SATURATION = 16
+    SIGN_FLIP = 17
+    DRIVE_FAULT = 18
+    DRIVE_SILENT = 19
+    OVERRUN = 20
+    HEEL_LIMIT = 21
+    ROLL_AMPLIFIED = 22
+    OPERATOR_SILENT = 23
+    VERSION_MISMATCH = 24
+    AUTHENTICATION = 25
+    INTERNAL = 26
+
+
+class ControlWord(IntEnum):
+    """CiA 402 control word (object 0x6040), low byte, as the standard's commands."""
+
+    DISABLE_VOLTAGE = 0x00
+    QUICK_STOP = 0x02
+    SHUTDOWN = 0x06
+    SWITCH_ON = 0x07
+    ENABLE_OPERATION = 0x0F
+    FAULT_RESET = 0x80
+
+
+class DriveState(IntEnum):
+    """CiA 402 state, as the status word (object 0x6041) shows it under the mask 0x6F."""
+
+    NOT_READY_TO_SWITCH_ON = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY_TO_SWITCH_ON = 0x21
+    SWITCHED_ON = 0x23
+    OPERATION_ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION_ACTIVE = 0x0F
+    FAULT = 0x08
+
+
+class DriveFault(IntEnum):
+    """Why the pump drive is in its fault state."""
+
+    NONE = 0
+    OVERCURRENT = 1
+    OVERVOLTAGE = 2
+    UNDERVOLTAGE = 3
+    MOTOR_OVERTEMPERATURE = 4
+    DRIVE_OVERTEMPERATURE = 5
+    COMMAND_TIMEOUT = 6
+    COMMAND_REFUSED = 7
+    PRESSURE_SENSOR = 8
+    OVERSPEED = 9
+    OVERPRESSURE = 10
+    STALL = 11
+    INTERNAL = 12
+
+
+class Quality(IntEnum):
+    """A sensor's own verdict on what it sends."""
+
+    GOOD = 0
+    DEGRADED = 1
+    BAD = 2
+
+
+class Switch(IntEnum):
+    """A switch with wire supervision, two bits as in SAE J1939-71."""
+
+    OFF = 0
+    ON = 1
+    ERROR = 2
+
+
+class NodeState(IntEnum):
+    """State of a node, in its heartbeat."""
+
+    INITIALISING = 0
+    READY = 1
+    OPERATIONAL = 2
+    FAULT = 3
+
+
+class ResetCause(IntEnum):
+    """Why a node last started."""
+
+    POWER_ON = 0
+    COMMAND = 1
+    WATCHDOG = 2
+    CRASH = 3

@@ -1,0 +1,155 @@
+"""The two ends of one message: the counter on the way out, the verdict on the way in."""
+
+from enum import Enum
+from typing import Any, Final, Generic, TypeVar
+
+from utank_hil.canbus.codec import FRAME_BYTES, Codec
+from utank_hil.canbus.frame import Frame
+
+T = TypeVar("T", bound=tuple[Any, ...])
+
+#: Frames that may be missing between two accepted ones; more, and the stream must prove itself.
+MAX_LOST: Final = 3
+
+#: Frames in a row that must follow one another before a new counter is trusted.
+RESYNC_FRAMES: Final = 3
+
+#: Level of the leaky bucket at which a stream becomes invalid.
+BUCKET_LIMIT: Final = 5
+
+_COUNTER_MASK: Final = 15
+_NO_COUNTER: Final = -1
+
+
+class Rejection(Enum):
+    """Why a frame was not accepted."""
+
+    LENGTH = "wrong length"
+    CRC = "wrong CRC or data ID"
+    REPEATED = "counter repeated"
+    SEQUENCE = "counter out of sequence"
+
+
+class Transmitter(Generic[T]):
+    """Turns messages of one type into protected frames; one for each sender.
+
+    Attributes
+    ----------
+    can_id : int
+    cycle_ns : int
+        Time between two frames that the catalogue promises; 0 for none.
+    counter : int
+        Counter of the last frame.
+    """
+
+    __slots__ = ("_encode", "can_id", "counter", "cycle_ns")
+
+    def __init__(self, codec: Codec[T]) -> None:
+        self.can_id = codec.can_id
+        self.cycle_ns = codec.cycle_ns
+        self.counter = 0
+        self._encode = codec.encode
+
+    def frame(self, message: T) -> Frame:
+        """Return the next frame; values out of range saturate, NaN and None are not available."""
+        self.counter = counter = (self.counter + 1) & _COUNTER_MASK
+        return Frame(self.can_id, self._encode(message, counter))
+
+
+class Receiver(Generic[T]):
+    """Accepts or rejects the frames of one message; a rejected frame changes no trusted state.
+
+    The first good frame is accepted. After that a counter may skip up to `MAX_LOST` frames, counted
+    in `lost`. Any other step is rejected, until `RESYNC_FRAMES` frames in a row follow one another
+    without an accepted one between them: then the sender has restarted or the gap was long, and the
+    last of them is accepted. A single repeated, delayed or inserted frame thus never moves the
+    trusted counter, as long as it is less than ``16 - MAX_LOST - 1`` frames old: older, four bits
+    can't tell it from the next one. Age is not judged here: that needs the caller's clock.
+
+    Attributes
+    ----------
+    can_id : int
+    cycle_ns : int
+        Time between two frames that the catalogue promises; 0 for none.
+    valid : bool
+        Verdict on the stream by a leaky bucket, a rejected frame +1, an accepted one -1: False
+        before the first accepted frame and from `BUCKET_LIMIT` until the bucket is empty again.
+    lost : int
+        Frames found missing by the counter's step.
+    rejected : dict
+        Count of rejected frames by `Rejection`.
+    """
+
+    __slots__ = (
+        "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
+        "can_id", "cycle_ns", "lost", "rejected", "valid",
+    )  # fmt: skip
+
+    def __init__(self, codec: Codec[T]) -> None:
+        self.can_id = codec.can_id
+        self.cycle_ns = codec.cycle_ns
+        self.valid = False
+        self.lost = 0
+        self.rejected = dict.fromkeys(Rejection, 0)
+        self._decode = codec.decode
+        self._protected = codec.protected
+        self._bucket = 0
+        self._expected = _NO_COUNTER
+        self._candidate = _NO_COUNTER
+        self._run = 0
+
+    @property
+    def counter(self) -> int | None:
+        """Counter of the last accepted frame, None before the first."""
+        return None if self._expected == _NO_COUNTER else (self._expected - 1) & _COUNTER_MASK
+
+    def accept(self, frame: Frame) -> T | None:
+        """Return the message of a frame with this `can_id`, or None if it is rejected."""
+        data = frame.data
+        if len(data) != FRAME_BYTES:
+            self._reject(Rejection.LENGTH)
+            return None
+        message = self._decode(data)
+        if message is None:
+            self._reject(Rejection.CRC)
+            return None
+        counter = data[1] & _COUNTER_MASK
+        if counter == self._expected:
+            self._expected = (counter + 1) & _COUNTER_MASK
+            if self._bucket:
+                self._drain()
+            return message
+        return self._accept_out_of_step(message, counter)
+
+    def _accept_out_of_step(self, message: T, counter: int) -> T | None:
+        following = (counter + 1) & _COUNTER_MASK
+        if not self._protected:
+            self._drain()
+            return message
+        if self._expected != _NO_COUNTER:
+            missing = (counter - self._expected) & _COUNTER_MASK
+            if missing <= MAX_LOST:
+                self.lost += missing
+            else:
+                self._run = self._run + 1 if counter == self._candidate else 1
+                self._candidate = following
+                if self._run < RESYNC_FRAMES:
+                    repeated = missing == _COUNTER_MASK
+                    self._reject(Rejection.REPEATED if repeated else Rejection.SEQUENCE)
+                    return None
+        self._expected = following
+        self._drain()
+        return message
+
+    def _drain(self) -> None:
+        """One step down with the bucket, after an accepted frame."""
+        self._run = 0
+        self._bucket = max(self._bucket - 1, 0)
+        if not self._bucket:
+            self.valid = True
+
+    def _reject(self, reason: Rejection) -> None:
+        self.rejected[reason] += 1
+        self._bucket = min(self._bucket + 1, BUCKET_LIMIT)
+        if self._bucket == BUCKET_LIMIT:
+            self.valid = False

@@ -1,0 +1,256 @@
+"""One typed tuple per message of the catalogue; field names are the DBC's signal names.
+
+What a field's type says:
+
+* `float`: scaled to the unit in the name; NaN is "not available" on the bus, and what a value out
+  of range decodes to; encoding saturates at the range.
+* `E | None` (E an IntEnum) and `int | None`: None is "not available" and what a value outside the
+  table or range decodes to; encoding an integer saturates.
+* `bool`: one bit, for which there is no "not available".
+"""
+
+from typing import Final, NamedTuple
+
+from utank_hil.canbus.enumerations import (
+    ControlWord,
+    DriveFault,
+    DriveState,
+    Fault,
+    Mode,
+    NodeState,
+    Quality,
+    ResetCause,
+    Switch,
+)
+
+
+class PumpCommand(NamedTuple):
+    """PUMP_CMD, controller to drive, 20 ms.
+
+    Attributes
+    ----------
+    pressure_pa
+        Set-point of the pump's differential pressure; positive raises the starboard level.
+    control_word
+        CiA 402 command. None must not enable anything.
+    timeout_s
+        The drive goes to zero pressure on its own when no valid command came for so long.
+    """
+
+    pressure_pa: float
+    control_word: ControlWord | None
+    timeout_s: float
+
+
+class DriveStatus1(NamedTuple):
+    """DRIVE_STATUS_1, drive to controller, 20 ms.
+
+    Attributes
+    ----------
+    pressure_pa
+        Differential pressure as the drive measures it, signed as the command.
+    speed_rad_s
+        Speed of the pump, positive for positive pressure.
+    state
+        CiA 402 state.
+    command_echo
+        Counter of the last PUMP_CMD accepted; None before the first.
+    pressure_limited, speed_limited, rate_limited, power_limited
+        The limit holds back the pressure at present.
+    """
+
+    pressure_pa: float
+    speed_rad_s: float
+    state: DriveState | None
+    command_echo: int | None
+    pressure_limited: bool
+    speed_limited: bool
+    rate_limited: bool
+    power_limited: bool
+
+
+class DriveStatus2(NamedTuple):
+    """DRIVE_STATUS_2, drive to controller, 100 ms; power is `bus_voltage_v * current_a`.
+
+    Attributes
+    ----------
+    fault
+        Why the drive is in its fault state.
+    bus_voltage_v, current_a
+        Direct-current bus of the drive; current into the drive is positive.
+    motor_temperature_c, drive_temperature_c
+        Temperatures in degrees Celsius.
+    temperature_warning, voltage_warning
+        Near the limit that would trip the drive.
+    command_warning
+        Commands were rejected or lost lately.
+    sensor_warning
+        The drive's pressure feedback is implausible.
+    """
+
+    fault: DriveFault | None
+    bus_voltage_v: float
+    current_a: float
+    motor_temperature_c: float
+    drive_temperature_c: float
+    temperature_warning: bool
+    voltage_warning: bool
+    command_warning: bool
+    sensor_warning: bool
+
+
+class SensorMotion(NamedTuple):
+    """SENSOR_MOTION, sensors to controller, 10 ms; roll positive starboard down."""
+
+    roll_rad: float
+    roll_rate_rad_s: float
+    quality: Quality | None
+
+
+class SensorTank(NamedTuple):
+    """SENSOR_TANK, sensors to controller, 20 ms.
+
+    Attributes
+    ----------
+    port_level_m, starboard_level_m
+        Level above the still-water level, each on its own; negative below.
+    port_high, starboard_high
+        Independent high-level switches.
+    quality
+        Of both levels.
+    """
+
+    port_level_m: float
+    starboard_level_m: float
+    port_high: Switch | None
+    starboard_high: Switch | None
+    quality: Quality | None
+
+
+class SensorPump(NamedTuple):
+    """SENSOR_PUMP, sensors to controller, 20 ms.
+
+    Attributes
+    ----------
+    pressure_pa
+        Differential pressure across the pump, signed as the command.
+    flow_m3_s
+        Flow through the duct, positive to starboard; NaN where no flow meter is fitted.
+    quality
+        Of the pressure.
+    """
+
+    pressure_pa: float
+    flow_m3_s: float
+    quality: Quality | None
+
+
+class ControllerStatus(NamedTuple):
+    """CTRL_STATUS, controller to all, 100 ms.
+
+    Attributes
+    ----------
+    mode
+        Mode of the controller.
+    fault
+        The fault that is active or latched.
+    armed
+        The pump may be commanded.
+    alarm
+        An alarm is waiting to be acknowledged.
+    degraded
+        Running with a substitute or at a reduced limit.
+    saturated
+        The command is held at a limit.
+    not_realtime
+        The controller runs without real-time scheduling.
+    bus_load
+        Share of the bus in use, 0 to 1.
+    catalogue_version, configuration_version
+        Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
+    """
+
+    mode: Mode | None
+    fault: Fault | None
+    armed: bool
+    alarm: bool
+    degraded: bool
+    saturated: bool
+    not_realtime: bool
+    bus_load: float
+    catalogue_version: int | None
+    configuration_version: int | None
+
+
+class OperatorCommand(NamedTuple):
+    """OPERATOR_CMD, operator panel to controller, 200 ms and on change.
+
+    Attributes
+    ----------
+    mode_request
+        Mode wished for; None wishes nothing.
+    arm
+        Permission to use the pump; a rising edge arms, False disarms.
+    stop
+        Zero pressure at once.
+    reset
+        Rising edge: clear a latched fault.
+    acknowledge
+        Rising edge: accept the alarms.
+    """
+
+    mode_request: Mode | None
+    arm: bool
+    stop: bool
+    reset: bool
+    acknowledge: bool
+
+
+class Heartbeat(NamedTuple):
+    """HEARTBEAT_<NODE>, every node to all, 100 ms.
+
+    Attributes
+    ----------
+    state
+        State of the node.
+    reset_cause
+        Why it last started.
+    uptime_s
+        Time since then, in steps of 10 s; a fall is a restart.
+    catalogue_version, configuration_version
+        Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
+    transmit_error_count, receive_error_count
+        CAN error counters in steps of 16 (96 warning, 128 error passive); NaN where unknown.
+    """
+
+    state: NodeState | None
+    reset_cause: ResetCause | None
+    uptime_s: float
+    catalogue_version: int | None
+    configuration_version: int | None
+    transmit_error_count: float
+    receive_error_count: float
+
+
+class AddressClaim(NamedTuple):
+    """ADDRESS_CLAIM_<NODE>, every node at boot, unprotected: all 64 bits are SAE J1939-81's NAME.
+
+    A second holder of one's own address means: never arm.
+    """
+
+    name: int | None
+
+
+#: DBC name of each message; of those every node sends, without the node's name at the end.
+DBC_NAMES: Final[dict[type[tuple[object, ...]], str]] = {
+    PumpCommand: "PUMP_CMD",
+    DriveStatus1: "DRIVE_STATUS_1",
+    DriveStatus2: "DRIVE_STATUS_2",
+    SensorMotion: "SENSOR_MOTION",
+    SensorTank: "SENSOR_TANK",
+    SensorPump: "SENSOR_PUMP",
+    ControllerStatus: "CTRL_STATUS",
+    OperatorCommand: "OPERATOR_CMD",
+    Heartbeat: "HEARTBEAT",
+    AddressClaim: "ADDRESS_CLAIM",
+}

@@ -1,0 +1,170 @@
+"""SocketCAN through python-can, as a `Port`.
+
+No notifier thread and no periodic sending by the kernel: the loop drains the socket at the start of
+its tick and sends at the end, so a hanging loop is a silent one.
+"""
+
+import errno
+import socket
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import can
+from can.interfaces.socketcan import SocketcanBus
+
+from utank_hil.canbus.frame import Frame
+from utank_hil.canbus.port import PortError
+
+#: The kernel keeps about 280 frames for a socket; a babbling bus must not hold the loop longer.
+MAX_FRAMES_PER_CALL: Final = 320
+
+_EXTENDED_MASK: Final = 0x1FFFFFFF
+
+#: A deleted interface: its sockets never recover, not even when one of the same name comes back.
+_GONE: Final = (errno.ENODEV, errno.ENXIO)
+
+_REMEDIES: Final = {
+    errno.ENETDOWN: "bring it up: ip link set {channel} up",
+    errno.ENODEV: "plug in the adapter, or create the interface",
+    errno.ENXIO: "plug in the adapter, or create the interface",
+    errno.ENOBUFS: "transmit queue full: no node acknowledges, or the bus is overloaded",
+    errno.EAFNOSUPPORT: "the kernel has no CAN: modprobe can_raw",
+}
+
+#: Error classes of <linux/can/error.h> after which nothing of ours gets through.
+_ERROR_CLASSES: Final = {
+    0x001: "transmit timeout",
+    0x020: "no node acknowledges",
+    0x040: "bus-off",
+}
+_CHECK_BUS: Final = "check wiring, termination and bit rate"
+
+
+class SocketCanPort:
+    """A SocketCAN interface; see `Port` for `send`, `receive` and `close`.
+
+    An interface that was down is used again when it is up; one that was deleted is reopened by the
+    next call after it has come back. Every call until then raises PortError.
+
+    Parameters
+    ----------
+    channel : str
+        Name of the interface, such as ``can0``.
+    can_ids : iterable of int, optional
+        Extended identifiers the kernel lets through; all by default, which is what a node needs
+        that watches for strangers.
+
+    Attributes
+    ----------
+    error_frames, standard_frames, remote_frames : int
+        Frames received that are no `Frame`: error reports, 11-bit identifiers, remote requests.
+
+    Raises
+    ------
+    PortError
+        If there is no such interface, or no CAN in the kernel.
+    """
+
+    def __init__(self, channel: str, can_ids: Iterable[int] | None = None) -> None:
+        self.channel = channel
+        self.error_frames = 0
+        self.standard_frames = 0
+        self.remote_frames = 0
+        self._can_ids = None if can_ids is None else tuple(can_ids)
+        self._down = False
+        self._closed = False
+        self._bus: can.BusABC | None = None
+        self._open_bus()
+
+    def send(self, frame: Frame) -> None:
+        """Queue one frame; see `Port.send`."""
+        bus = self._open_bus()
+        message = can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data)
+        try:
+            bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise self._failure(error) from error
+        self._down = False
+
+    def receive(self) -> Sequence[Frame]:
+        """Return what has arrived, at most `MAX_FRAMES_PER_CALL` frames; see `Port.receive`.
+
+        What came just before a failure is lost with it.
+        """
+        bus = self._open_bus()
+        frames: list[Frame] = []
+        for _ in range(MAX_FRAMES_PER_CALL):
+            try:
+                # not recv(0): that measures on the wall clock, and blocks when it is set back
+                message, _filtered = bus._recv_internal(0)
+            except (can.CanError, OSError) as error:
+                raise self._failure(error) from error
+            if message is None:
+                break
+            if message.is_error_frame:
+                self._take_error_frame(message.arbitration_id)
+            elif message.is_remote_frame:
+                self.remote_frames += 1
+            elif not message.is_extended_id:
+                self.standard_frames += 1
+            else:
+                frames.append(Frame(message.arbitration_id, bytes(message.data)))
+        if frames:
+            self._down = False
+        elif self._down:
+            # the kernel reports it once and then is silent, as if the bus were merely quiet
+            raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
+        return frames
+
+    def close(self) -> None:
+        """Release the socket; idempotent."""
+        self._closed = True
+        self._close_bus()
+
+    def _close_bus(self) -> None:
+        if self._bus is not None:
+            self._bus.shutdown()
+            self._bus = None
+
+    def _open_bus(self) -> can.BusABC:
+        if self._closed:
+            raise self._port_error("closed", "open a new port")
+        if self._bus is None:
+            filters: list[can.typechecking.CanFilter] | None = None
+            if self._can_ids is not None:
+                filters = [
+                    {"can_id": can_id, "can_mask": _EXTENDED_MASK, "extended": True}
+                    for can_id in self._can_ids
+                ]
+            try:
+                # python-can leaks its socket if it can't bind it: ask for the interface first
+                socket.if_nametoindex(self.channel)
+            except OSError as error:
+                number = errno.ENODEV
+                raise self._port_error("not found", _REMEDIES[number], number) from error
+            try:
+                self._bus = SocketcanBus(
+                    self.channel, receive_own_messages=False, can_filters=filters
+                )
+            except OSError as error:
+                raise self._failure(error) from error
+        return self._bus
+
+    def _take_error_frame(self, classes: int) -> None:
+        self.error_frames += 1
+        for error_class, meaning in _ERROR_CLASSES.items():
+            if classes & error_class:
+                raise self._port_error(meaning, _CHECK_BUS)
+
+    def _failure(self, error: can.CanError | OSError) -> PortError:
+        """Note what an error says about the interface, and put it into words."""
+        number = error.error_code if isinstance(error, can.CanError) else error.errno
+        if number in _GONE:
+            self._close_bus()
+        self._down = self._down or number == errno.ENETDOWN
+        remedy = _REMEDIES.get(number or 0, _CHECK_BUS)
+        return self._port_error(str(error), remedy, number)
+
+    def _port_error(self, what: str, remedy: str, number: int | None = None) -> PortError:
+        text = f"CAN interface {self.channel}: {what}; {remedy.format(channel=self.channel)}"
+        return PortError(text) if number is None else PortError(number, text)
