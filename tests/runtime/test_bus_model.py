@@ -1,0 +1,130 @@
+"""The simulated bus against the rules of CAN, on frames queued at random."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from toy_nodes import BIT_NS, MS, frame
+
+from utank_hil.canbus.frame import Frame
+from utank_hil.runtime import SimulatedBus, frame_bits
+
+SECOND_NS = 1000 * MS
+
+# (time of queueing in bits, sender, identifier), in order of time
+queued = st.lists(
+    st.tuples(st.integers(0, 3000), st.integers(0, 3), st.integers(0, 9)), max_size=30
+).map(lambda rows: sorted(rows, key=lambda row: row[0]))
+
+
+def length_ns(sent: Frame) -> int:
+    return frame_bits(sent) * BIT_NS
+
+
+def carry(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:
+    """Put the rows on a bus; return (queued at, begun at, identifier, row) as they go over it."""
+    bus = SimulatedBus(bit_rate=250_000)
+    arrived = []
+
+    def advance(until_ns: int) -> None:
+        while (delivery := bus.next_delivery(until_ns)) is not None:
+            end_ns, _, sent = delivery
+            row = int.from_bytes(sent.data, "little")
+            begun_ns = end_ns + 3 * BIT_NS - length_ns(sent)
+            arrived.append((rows[row][0] * BIT_NS, begun_ns, sent.can_id, row))
+
+    for number, (bits, sender, can_id) in enumerate(rows):
+        advance(bits * BIT_NS)
+        bus.queue(sender, frame(can_id, number), bits * BIT_NS)
+    advance(100 * SECOND_NS)
+    return arrived
+
+
+@given(queued)
+def test_every_frame_arrives_once_and_only_one_is_on_the_bus_at_a_time(rows):
+    arrived = carry(rows)
+    assert sorted(row for *_, row in arrived) == list(range(len(rows)))
+    free_ns = 0
+    for queued_ns, begun_ns, can_id, row in arrived:
+        assert begun_ns >= queued_ns
+        assert begun_ns >= free_ns
+        free_ns = begun_ns + length_ns(frame(can_id, row))
+
+
+@given(queued)
+def test_no_frame_begins_while_a_more_urgent_one_waits(rows):
+    arrived = carry(rows)
+    for position, (_, begun_ns, can_id, row) in enumerate(arrived):
+        for other_queued_ns, _, other_id, other_row in arrived[position + 1 :]:
+            assert other_queued_ns > begun_ns or (can_id, row) < (other_id, other_row)
+
+
+@given(queued)
+def test_bus_is_never_idle_while_a_frame_waits(rows):
+    arrived = carry(rows)
+    free_ns = 0
+    for position, (_, begun_ns, can_id, row) in enumerate(arrived):
+        if begun_ns > free_ns:
+            assert min(queued_ns for queued_ns, *_ in arrived[position:]) == begun_ns
+        free_ns = begun_ns + length_ns(frame(can_id, row))
+
+
+def test_frame_on_the_bus_is_not_interrupted_by_a_more_urgent_one():
+    arrived = carry([(0, 0, 9), (1, 1, 5), (2, 2, 0), (3, 3, 5)])
+    assert [can_id for _, _, can_id, _ in arrived] == [9, 0, 5, 5]
+    assert arrived[1][1] == length_ns(frame(9, 0))
+
+
+def test_load_over_every_second_adds_up_to_the_load_of_the_run():
+    bus = SimulatedBus()
+    sent = frame(1)
+    for second, number in enumerate([100, 0, 1000, 1]):
+        bus.queue(0, sent, second * SECOND_NS)
+        for _ in range(number - 1):
+            bus.queue(0, sent, second * SECOND_NS)
+        while bus.next_delivery((second + 1) * SECOND_NS):
+            pass
+    statistics = bus.statistics(4 * SECOND_NS)
+    share = length_ns(sent) / SECOND_NS
+    assert statistics.window_loads == pytest.approx([100 * share, share, 1000 * share, share])
+    assert statistics.load == pytest.approx(1102 * share / 4)
+    assert statistics.frames == 1102
+
+
+def test_frame_across_a_border_counts_in_both_seconds():
+    bus = SimulatedBus()
+    sent = frame(1)
+    bus.queue(0, sent, SECOND_NS - 10 * BIT_NS)
+    assert bus.next_delivery(2 * SECOND_NS) is not None
+    loads = bus.statistics(2 * SECOND_NS).window_loads
+    assert loads == pytest.approx(
+        [10 * BIT_NS / SECOND_NS, (length_ns(sent) - 10 * BIT_NS) / SECOND_NS]
+    )
+
+
+def test_load_counts_a_frame_under_way_up_to_now():
+    bus = SimulatedBus()
+    bus.queue(0, frame(1), 0)
+    assert bus.next_delivery(10 * BIT_NS) is None
+    assert bus.statistics(10 * BIT_NS).load == 1.0
+    assert SimulatedBus().statistics(0).load == 0.0
+
+
+def test_queueing_delays_are_exact():
+    bus = SimulatedBus()
+    sent = frame(1)
+    for _ in range(100):
+        bus.queue(0, sent, 0)
+    assert bus.statistics(0).waiting == 100
+    while bus.next_delivery(SECOND_NS):
+        pass
+    statistics = bus.statistics(SECOND_NS)
+    assert statistics.delay_p50_ns == 49 * length_ns(sent)
+    assert statistics.delay_p99_ns == 98 * length_ns(sent)
+    assert statistics.delay_max_ns == 99 * length_ns(sent)
+    assert statistics.waiting == 0
+
+
+@pytest.mark.parametrize("bit_rate", [0, -1, 300_000, 2_000_000_001])
+def test_bit_rate_without_whole_nanoseconds_is_refused(bit_rate):
+    with pytest.raises(ValueError, match="bit_rate"):
+        SimulatedBus(bit_rate=bit_rate)

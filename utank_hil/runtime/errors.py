@@ -1,0 +1,21 @@
+"""The one error of the runners: a node raised."""
+
+
+class NodeError(RuntimeError):
+    """A node raised; the original exception is the `__cause__`.
+
+    Attributes
+    ----------
+    node_name : str
+        The node that raised.
+    time_ns : int
+        The time that the node had been handed, nanoseconds.
+    """
+
+    def __init__(self, node_name: str, method: str, time_ns: int, cause: Exception) -> None:
+        super().__init__(
+            f"node '{node_name}' failed in {method}() at {time_ns * 1e-9:.6f} s: "
+            f"{type(cause).__name__}: {cause}"
+        )
+        self.node_name = node_name
+        self.time_ns = time_ns

@@ -1,0 +1,148 @@
+"""Nodes that one runner drives: which are due, who hears whom, and whose fault an error is."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from math import gcd
+from typing import Final
+
+from utank_hil.canbus.frame import Frame
+from utank_hil.runtime.errors import NodeError
+from utank_hil.runtime.hooks import LinkObserver, Stoppable
+from utank_hil.runtime.node import Node
+
+OUTSIDE: Final = -1
+"""The sender of a frame that comes from no node of the group."""
+
+Send = Callable[[int, Frame, int], None]
+"""Called with (sender's index, frame, time in nanoseconds)."""
+
+
+class NodeGroup:
+    """The nodes of one runner, in the order given.
+
+    Parameters
+    ----------
+    nodes : sequence of Node
+        At least one; names must differ, periods must be positive.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The nodes' names, indexed by sender.
+    base_period_ns : int
+        Greatest common divisor of the nodes' periods.
+    next_tick_ns : int
+        When the next node is due.
+
+    Raises
+    ------
+    ValueError
+        If there is no node, a name comes twice, or a period is not positive.
+    """
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        self.names: Final = tuple(node.name for node in nodes)
+        if not nodes:
+            raise ValueError("nodes: a runner needs at least one node")
+        for name in self.names:
+            if self.names.count(name) > 1:
+                raise ValueError(f"nodes: two are named '{name}'; names tell them apart in traces")
+        for node in nodes:
+            if node.period_ns <= 0:
+                raise ValueError(
+                    f"node '{node.name}': period_ns is {node.period_ns}, must be positive"
+                )
+        self._nodes = tuple(nodes)
+        self._periods_ns = tuple(node.period_ns for node in nodes)
+        self.base_period_ns: Final = gcd(*self._periods_ns)
+        # Methods are bound once, and who hears a sender is looked up: this is the hot path of
+        # lockstep. The last row hears everything, so that OUTSIDE = -1 finds it.
+        self._ticks = tuple(node.tick for node in nodes)
+        receives = tuple(node.receive for node in nodes)
+        self._listeners = tuple(
+            tuple((index, receive) for index, receive in enumerate(receives) if index != sender)
+            for sender in range(len(nodes) + 1)
+        )
+        self.start(0)
+
+    def start(self, now_ns: int) -> None:
+        """Put every node's grid at `now_ns`: all are due then, and every period after it."""
+        self._origin_ns = now_ns
+        self._due_ns = [now_ns] * len(self._nodes)
+        self.next_tick_ns = now_ns
+
+    def tick(self, now_ns: int, send: Send) -> None:
+        """Tick every node that is due, once, and hand its frames to `send`.
+
+        A node that should have been ticked earlier is ticked now and is then due at the next point
+        of its own grid: late ticks are dropped, not caught up, and do not shift the grid.
+
+        Raises
+        ------
+        NodeError
+            If a node raises, or hands out a frame that `send` refuses.
+        """
+        due_ns, since_ns = self._due_ns, now_ns - self._origin_ns
+        index = 0
+        try:
+            for index, tick in enumerate(self._ticks):
+                if due_ns[index] <= now_ns:
+                    period_ns = self._periods_ns[index]
+                    due_ns[index] = now_ns + period_ns - since_ns % period_ns
+                    for frame in tick(now_ns):
+                        send(index, frame, now_ns)
+        except Exception as error:
+            raise NodeError(self.names[index], "tick", now_ns, error) from error
+        self.next_tick_ns = min(due_ns)
+
+    def deliver(self, sender: int, frame: Frame, now_ns: int) -> None:
+        """Hand one frame to every node but its sender.
+
+        Raises
+        ------
+        NodeError
+            If a node raises.
+        """
+        index = 0
+        try:
+            for index, receive in self._listeners[sender]:  # noqa: B007 - names the node that raised
+                receive(frame, now_ns)
+        except Exception as error:
+            raise NodeError(self.names[index], "receive", now_ns, error) from error
+
+    def link_error(self, now_ns: int, reason: str) -> None:
+        """Tell every node that wants to know that the bus can't be reached.
+
+        Raises
+        ------
+        NodeError
+            If a node raises.
+        """
+        for node in self._nodes:
+            if isinstance(node, LinkObserver):
+                try:
+                    node.link_error(now_ns, reason)
+                except Exception as error:
+                    raise NodeError(node.name, "link_error", now_ns, error) from error
+
+    def stop(self, now_ns: int, send: Send) -> None:
+        """Ask every node that has last frames for them, and hand them to `send`.
+
+        Raises
+        ------
+        NodeError
+            If a node raises; the others have been asked all the same.
+        """
+        with ExitStack() as everyone:  # calls every one, last entered first, whoever raises
+            for index in reversed(range(len(self._nodes))):
+                everyone.callback(self._stop_one, index, now_ns, send)
+
+    def _stop_one(self, index: int, now_ns: int, send: Send) -> None:
+        node = self._nodes[index]
+        if not isinstance(node, Stoppable):
+            return
+        try:
+            for frame in node.stop(now_ns):
+                send(index, frame, now_ns)
+        except Exception as error:
+            raise NodeError(node.name, "stop", now_ns, error) from error

@@ -1,0 +1,184 @@
+"""What the loop process asks of the operating system, and what it was given (Linux).
+
+Each measure answers a cause of late ticks that was measured: other processes (SCHED_FIFO), page
+faults (mlockall), deep CPU sleep states (/dev/cpu_dma_latency), the garbage collector, and other
+Python threads, which hold the interpreter for 5 ms at a time. A measure that is refused is
+reported, and the loop runs without it.
+"""
+
+import ctypes
+import gc
+import os
+import resource
+import struct
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+PRIORITY: Final = 80
+"""Above the kernel's interrupt threads (50), as cyclictest is usually run."""
+
+_MCL_CURRENT: Final = 1
+_MCL_FUTURE: Final = 2
+_CAP_IPC_LOCK: Final = 14
+_CPU_DMA_LATENCY: Final = Path("/dev/cpu_dma_latency")
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """One thing that was asked of the operating system.
+
+    Attributes
+    ----------
+    name : str
+        What was asked for.
+    granted : bool
+        Whether it is in force.
+    detail : str
+        What is in force, or why it is not and what would help.
+    """
+
+    name: str
+    granted: bool
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class SchedulingReport:
+    """What the loop process was granted at its start.
+
+    Attributes
+    ----------
+    measures : tuple of Measure
+        In the order asked.
+    native_threads : int
+        Threads of the process that are not Python's (of a linear-algebra library, say); they do
+        not hold the interpreter.
+    """
+
+    measures: tuple[Measure, ...]
+    native_threads: int
+
+    @property
+    def granted(self) -> bool:
+        """Whether everything is in force."""
+        return all(measure.granted for measure in self.measures)
+
+    def lines(self) -> list[str]:
+        """Return one line a measure, for people."""
+        return [
+            f"{measure.name}: {'yes' if measure.granted else 'NO'}, {measure.detail}"
+            for measure in self.measures
+        ]
+
+
+@contextmanager
+def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]:
+    """Make this process fit for the loop while the context lasts, as far as it is permitted to.
+
+    Enter it when everything is imported and built: what exists then is kept out of the garbage
+    collector, which stays off. The end of the context undoes everything.
+
+    Parameters
+    ----------
+    priority : int
+        Of SCHED_FIFO, 1 to 99.
+
+    Raises
+    ------
+    RuntimeError
+        If there is another Python thread: it would cost ticks, and no permission mends that.
+    ValueError
+        If the priority is out of range.
+    """
+    if not 1 <= priority <= 99:
+        raise ValueError(f"priority {priority}: SCHED_FIFO has 1 to 99")
+    others = [t.name for t in threading.enumerate() if t is not threading.current_thread()]
+    if others:
+        raise RuntimeError(
+            f"the loop must be the only Python thread, found {', '.join(others)}: "
+            "a thread beside it holds the interpreter for 5 ms at a time; use a process"
+        )
+    with ExitStack() as undo:
+        collector = _garbage_collector_off(undo)
+        measures = (
+            _fifo(undo, priority),
+            _memory_lock(undo),
+            _no_cpu_sleep(undo),
+            collector,
+        )
+        native_threads = len(os.listdir("/proc/self/task")) - 1
+        yield SchedulingReport(measures, native_threads)
+
+
+def _garbage_collector_off(undo: ExitStack) -> Measure:
+    if gc.isenabled():
+        undo.callback(gc.enable)
+    undo.callback(gc.unfreeze)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    return Measure("garbage collector off", True, f"{gc.get_freeze_count()} objects frozen")
+
+
+def _fifo(undo: ExitStack, priority: int) -> Measure:
+    name = "SCHED_FIFO"
+    found = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        # Children start without it: a stuck one could not be ended on a busy machine.
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except PermissionError:
+        limit, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
+        return Measure(
+            name, False, f"real-time priority limit is {limit}, needs {priority} (LimitRTPRIO=)"
+        )
+    undo.callback(_restore_scheduler, *found)
+    return Measure(name, True, f"priority {priority}")
+
+
+def _restore_scheduler(policy: int, param: os.sched_param) -> None:
+    try:
+        os.sched_setscheduler(0, policy, param)
+    except PermissionError:  # without CAP_SYS_NICE, reset-on-fork can't be taken back
+        os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, param)
+
+
+def _memory_lock(undo: ExitStack) -> Measure:
+    name = "memory locked"
+    limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    if limit != resource.RLIM_INFINITY and not _may_lock_any_memory():
+        # A finite limit would make a later allocation fail: worse than a page fault.
+        return Measure(name, False, f"memory lock limit is {limit} bytes (LimitMEMLOCK=infinity)")
+    size_kib = int(_field("self/status", "VmSize"))
+    if size_kib > int(_field("meminfo", "MemAvailable")):
+        return Measure(
+            name, False, f"{size_kib >> 10} MiB of address space exceed the memory available"
+        )
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
+        return Measure(name, False, os.strerror(ctypes.get_errno()))
+    undo.callback(libc.munlockall)
+    return Measure(name, True, f"{int(_field('self/status', 'VmLck')) >> 10} MiB")
+
+
+def _may_lock_any_memory() -> bool:
+    return bool(int(_field("self/status", "CapEff"), 16) >> _CAP_IPC_LOCK & 1)
+
+
+def _field(file: str, key: str) -> str:
+    """Return the first word after `key:` in a file of /proc; sizes there are in KiB."""
+    with (Path("/proc") / file).open() as lines:
+        return next(line.split()[1] for line in lines if line.startswith(f"{key}:"))
+
+
+def _no_cpu_sleep(undo: ExitStack) -> Measure:
+    name = "no deep CPU sleep"
+    try:
+        request = undo.enter_context(_CPU_DMA_LATENCY.open("wb", buffering=0))
+        request.write(struct.pack("i", 0))  # in force for as long as the file stays open
+    except OSError as error:
+        return Measure(name, False, f"{_CPU_DMA_LATENCY}: {error.strerror}")
+    return Measure(name, True, f"{_CPU_DMA_LATENCY} held at 0 us")
