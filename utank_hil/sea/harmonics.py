@@ -1,0 +1,83 @@
+"""A sum of sinusoids: how elevation, slope and wave moment are handed to whoever integrates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+BLOCK = 1 << 19  # cosines evaluated at a time in `at`: 4 MB
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Harmonics:
+    """x(t) = sum of amplitude cos(frequency t + phase).
+
+    Parameters
+    ----------
+    amplitude : ndarray, shape (N,)
+        In the unit of x; may be negative.
+    frequency_rad_s : ndarray, shape (N,)
+        Zero or more.
+    phase_rad : ndarray, shape (N,)
+    """
+
+    amplitude: FloatArray
+    frequency_rad_s: FloatArray
+    phase_rad: FloatArray
+
+    @property
+    def variance(self) -> float:
+        """Mean square over a long time, sum of amplitude^2 / 2."""
+        return float(self.amplitude @ self.amplitude / 2)
+
+    def at(self, time_s: FloatArray | float) -> FloatArray:
+        """Evaluate at any times by the direct sum.
+
+        Parameters
+        ----------
+        time_s : float or ndarray, any shape
+
+        Returns
+        -------
+        ndarray
+            Shaped as `time_s`.
+        """
+        times = np.asarray(time_s, dtype=float)
+        flat = times.ravel()
+        result = np.empty(flat.size)
+        rows = max(1, BLOCK // max(1, self.amplitude.size))
+        for start in range(0, flat.size, rows):
+            angle = np.multiply.outer(flat[start : start + rows], self.frequency_rad_s)
+            angle += self.phase_rad
+            result[start : start + rows] = np.cos(angle, out=angle) @ self.amplitude
+        return result.reshape(times.shape)
+
+    def series(self, step_s: float, count: int, start_s: float = 0.0) -> FloatArray:
+        """Evaluate on the even grid ``start_s + step_s * arange(count)``.
+
+        Time is split into a coarse and a fine part, t = T + s, and cos(w T + phase + w s) into its
+        two products: sqrt(count) cosines a component instead of `count`, and one matrix product.
+        Nothing is accumulated from step to step, so it equals `at` to rounding.
+
+        Returns
+        -------
+        ndarray, shape (count,)
+
+        Raises
+        ------
+        ValueError
+            If `step_s` is not positive or `count` is negative.
+        """
+        if not step_s > 0 or count < 0:
+            raise ValueError(f"series needs a positive step and count, got {step_s} and {count}")
+        columns = max(1, int(np.sqrt(count)))
+        rows = -(-count // columns)
+        coarse = start_s + step_s * columns * np.arange(rows)
+        fine = step_s * np.arange(columns)
+        slow = np.multiply.outer(coarse, self.frequency_rad_s) + self.phase_rad
+        fast = np.multiply.outer(self.frequency_rad_s, fine)
+        left = np.hstack([self.amplitude * np.cos(slow), -self.amplitude * np.sin(slow)])
+        right = np.vstack([np.cos(fast), np.sin(fast)])
+        grid: FloatArray = left @ right
+        return grid.ravel()[:count]

@@ -1,0 +1,103 @@
+"""Spectra measured one after the other at one place."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.sea.spectrum import Spectrum, band_edges
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredSpectra:
+    """A time series of spectra on one frequency grid.
+
+    Parameters
+    ----------
+    source : str
+        Where they come from, for messages.
+    time : ndarray of datetime64[s], shape (N,)
+        UTC, increasing.
+    frequency_hz : ndarray, shape (F,)
+        Centre frequencies of the bands.
+    density : ndarray, shape (N, F)
+        Spectral density in m^2/Hz; nan where the source has none.
+    direction_from_deg : ndarray, shape (N, F), optional
+        Mean direction the waves come from, degrees from true north; nan where the source has none.
+    """
+
+    source: str
+    time: npt.NDArray[np.datetime64]
+    frequency_hz: FloatArray
+    density: FloatArray
+    direction_from_deg: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[Spectrum]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> Spectrum:
+        """Return the spectrum at a position.
+
+        Bands without data at either end of the grid count as calm; ValueError if one is missing
+        in between, because the energy there is then unknown.
+        """
+        density = self._calm_ends()[index]
+        if np.isnan(density).any():
+            gap = self.frequency_hz[np.isnan(density)][0]
+            raise ValueError(
+                f"{self.source}: the spectrum of {self.time[index]} has no value at {gap:g} Hz: "
+                "choose another time"
+            )
+        direction = None if self.direction_from_deg is None else self.direction_from_deg[index]
+        return Spectrum(self.frequency_hz, density, direction)
+
+    def at(self, time: str | np.datetime64, within_s: float = 0.0) -> Spectrum:
+        """Spectrum measured at a time, or nearest to it.
+
+        Parameters
+        ----------
+        time : str or datetime64
+            UTC, such as ``"2019-02-10T05:40"``.
+        within_s : float
+            How far away the nearest measurement may be.
+
+        Raises
+        ------
+        ValueError
+            If there is none that near, or the time cannot be read.
+        """
+        wanted = np.datetime64(str(time), "s")
+        index = int(np.argmin(np.abs(self.time - wanted)))
+        if not abs((self.time[index] - wanted) / np.timedelta64(1, "s")) <= within_s:
+            raise ValueError(
+                f"{self.source}: no spectrum within {within_s:g} s of {wanted}; the nearest is of "
+                f"{self.time[index]}, all are from {self.time[0]} to {self.time[-1]}"
+            )
+        return self[index]
+
+    @property
+    def hs_m(self) -> FloatArray:
+        """Significant heights 4 sqrt(m0), shape (N,); nan where a band in between is missing."""
+        widths = np.diff(band_edges(self.frequency_hz))[:, 0]
+        heights: FloatArray = 4 * np.sqrt(self._calm_ends() @ widths)
+        return heights
+
+    @property
+    def tp_s(self) -> FloatArray:
+        """Peak periods, shape (N,); nan for a flat calm and where a band in between is missing."""
+        density = self._calm_ends()
+        period = 1 / self.frequency_hz[np.argmax(density, axis=1)]
+        known = np.isfinite(density).all(axis=1) & (density > 0).any(axis=1)
+        return np.where(known, period, np.nan)
+
+    def _calm_ends(self) -> FloatArray:
+        """Density with missing values at either end of a spectrum replaced by zero."""
+        present = np.isfinite(self.density)
+        begun = np.logical_or.accumulate(present, axis=1)
+        ahead = np.logical_or.accumulate(present[:, ::-1], axis=1)[:, ::-1]
+        return np.where(begun & ahead, self.density, 0.0)

@@ -1,0 +1,241 @@
+"""A realised sea: long-crested or short-crested wave components met by a ship.
+
+Ship-fixed horizontal axes, x forward and y to starboard, origin at the centre of gravity. A
+component travels in direction `heading_rad` from the x axis towards y and raises the surface by::
+
+    zeta = a cos(omega_e t - k (x cos(heading) + y sin(heading)) + phase)
+
+The wave slope that rolls the ship is the angle of the surface across her, positive like roll,
+starboard down: -d zeta / dy = k a sin(heading) cos(omega_e t + phase + pi/2) at the centre of
+gravity. A small ship on a long wave rights herself towards it, so the wave moment is the restoring
+stiffness times an effective slope::
+
+    K = k1 r(k, heading) k a sin(heading) cos(omega_e t + phase + pi/2)
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
+from utank_hil.sea.harmonics import Harmonics
+from utank_hil.sea.spectrum import Spectrum
+
+BEAM_RAD = math.pi / 2  # waves travelling from port to starboard
+
+
+@dataclass(frozen=True, slots=True)
+class EffectiveSlope:
+    """How much of the wave slope acts on the ship.
+
+    r = coefficient * exp(-k depth) * sinc(k |sin(heading)| beam / 2), sinc(x) = sin(x) / x.
+
+    Parameters
+    ----------
+    coefficient : float
+        Effective wave slope coefficient, the long-wave limit of r.
+    depth_m : float
+        Smith effect: the slope is taken this far below the surface, usually half the draught.
+    beam_m : float
+        The slope is averaged over this beam; short waves that fit under the hull cancel.
+
+    Raises
+    ------
+    ValueError
+        If a value is negative or not finite.
+    """
+
+    coefficient: float = 1.0
+    depth_m: float = 0.0
+    beam_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("coefficient", "depth_m", "beam_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"effective slope {name} must be zero or more, got {value}")
+
+    def factor(self, wavenumber_rad_m: FloatArray, heading_rad: FloatArray) -> FloatArray:
+        """Return the ratio r of effective to true slope, per component."""
+        across = wavenumber_rad_m * np.abs(np.sin(heading_rad)) * self.beam_m / 2
+        smith = np.exp(-wavenumber_rad_m * self.depth_m)
+        ratio: FloatArray = self.coefficient * smith * np.sinc(across / np.pi)
+        return ratio
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sea:
+    """Wave components as a ship meets them; make one with `Sea.irregular` or `Sea.regular`.
+
+    Parameters
+    ----------
+    amplitude_m, omega_rad_s, heading_rad, phase_rad : ndarray, shape (N,)
+        Amplitude, earth-frame frequency, direction of travel relative to the ship, phase.
+    speed_m_s : float
+        Ship's speed.
+    """
+
+    amplitude_m: FloatArray
+    omega_rad_s: FloatArray
+    heading_rad: FloatArray
+    phase_rad: FloatArray
+    speed_m_s: float = 0.0
+
+    @classmethod
+    def regular(
+        cls,
+        amplitude_m: float,
+        omega_rad_s: float,
+        *,
+        heading_rad: float = BEAM_RAD,
+        speed_m_s: float = 0.0,
+        phase_rad: float = 0.0,
+    ) -> "Sea":
+        """One regular wave; a crest passes the ship at t = 0 unless a phase is given.
+
+        Raises
+        ------
+        ValueError
+            If the amplitude is negative or the frequency is not positive.
+        """
+        if not (amplitude_m >= 0 and omega_rad_s > 0):
+            raise ValueError(
+                "a regular wave needs amplitude_m zero or more and omega_rad_s greater than zero, "
+                f"got {amplitude_m} and {omega_rad_s}"
+            )
+        return cls(
+            np.array([amplitude_m]),
+            np.array([omega_rad_s]),
+            np.array([heading_rad]),
+            np.array([phase_rad]),
+            speed_m_s,
+        )
+
+    @classmethod
+    def irregular(
+        cls,
+        spectrum: Spectrum,
+        seed: int,
+        *,
+        components: int = 512,
+        heading_rad: FloatArray | float = BEAM_RAD,
+        spreading: float | None = None,
+        speed_m_s: float = 0.0,
+    ) -> "Sea":
+        """Draw a sea from a spectrum: the same seed gives the same sea.
+
+        The spectrum is cut into `components` intervals, narrow where the energy is (equal steps of
+        the integral of sqrt(S)). Each holds one component with the interval's exact energy, its
+        frequency drawn from the spectrum within the interval, its phase evenly. So every sea has
+        the variance m0 exactly, the mean over seeds has the spectrum exactly, and since no two
+        frequencies are commensurate nothing repeats.
+
+        Parameters
+        ----------
+        spectrum : Spectrum
+        seed : int
+            Zero or more. Random numbers are the raw output of `numpy.random.PCG64`, whose stream
+            numpy guarantees, so a seed means the same sea in every numpy version.
+        components : int
+            Number of intervals.
+        heading_rad : float or ndarray, shape (F,)
+            Mean direction of travel relative to the ship, for all or for each band
+            (`Spectrum.heading_rad`): 0 following, pi head, +pi/2 from port to starboard.
+        spreading : float, optional
+            Exponent s of the short-crested spreading cos^2s(theta / 2) about the mean direction
+            (Longuet-Higgins 1963; 10 to 15 for wind sea, 25 and more for swell). Long-crested
+            when left out. Each component has one direction, so the sea stays ergodic.
+        speed_m_s : float
+            Ship's speed.
+
+        Raises
+        ------
+        ValueError
+            If the spectrum is a flat calm or an argument is out of range.
+        """
+        if components < 1:
+            raise ValueError(f"a sea needs one component or more, got {components}")
+        if spectrum.moment(0) == 0:
+            raise ValueError("the spectrum holds no energy: choose another hour")
+        if spreading is not None and not (math.isfinite(spreading) and spreading >= 0):
+            raise ValueError(f"spreading exponent must be zero or more, got {spreading}")
+        within, phase, order, across = _uniform(seed, (4, components))
+        edges = spectrum.band_edges_hz.ravel()  # lower, upper, lower, upper ...
+        width = np.diff(edges)[::2]
+        energy = _cumulative(spectrum.density * width)
+        effort = _cumulative(np.sqrt(spectrum.density) * width)
+        cuts = np.interp(np.linspace(0, effort[-1], components + 1), effort, edges)
+        energy_at_cuts = np.interp(cuts, edges, energy)
+        share = np.diff(energy_at_cuts)
+        frequency = np.interp(energy_at_cuts[:-1] + within * share, energy, edges)
+        mean = np.broadcast_to(np.asarray(heading_rad, dtype=float), spectrum.density.shape)
+        band = np.clip(np.searchsorted(edges[1::2], frequency), 0, width.size - 1)
+        heading = mean[band]
+        if spreading is not None:
+            # one draw in each of N equal slices of the distribution, in random order
+            heading = heading + _spread((np.argsort(order) + across) / components, spreading)
+        return cls(np.sqrt(2 * share), 2 * np.pi * frequency, heading, 2 * np.pi * phase, speed_m_s)
+
+    @property
+    def encounter_rad_s(self) -> FloatArray:
+        """Signed encounter frequencies; negative where the ship overtakes the wave."""
+        return encounter_frequency(self.omega_rad_s, self.heading_rad, self.speed_m_s)
+
+    @property
+    def elevation(self) -> Harmonics:
+        """Surface elevation at the ship's centre of gravity in m."""
+        return self._harmonics(self.amplitude_m, 0.0)
+
+    @property
+    def slope(self) -> Harmonics:
+        """Wave slope across the ship in rad, positive starboard down."""
+        wavenumber = wavenumber_rad_m(self.omega_rad_s)
+        return self._harmonics(self.amplitude_m * wavenumber * np.sin(self.heading_rad), np.pi / 2)
+
+    def roll_moment(
+        self, stiffness_nm_rad: float, effective_slope: EffectiveSlope | None = None
+    ) -> Harmonics:
+        """Wave moment on roll in N m.
+
+        Parameters
+        ----------
+        stiffness_nm_rad : float
+            Restoring stiffness k1 of the ship (`RollShip.stiffness_nm_rad`).
+        effective_slope : EffectiveSlope, optional
+            The full slope when left out.
+        """
+        ratio = (effective_slope or EffectiveSlope()).factor(
+            wavenumber_rad_m(self.omega_rad_s), self.heading_rad
+        )
+        slope = self.slope
+        return Harmonics(
+            stiffness_nm_rad * ratio * slope.amplitude, slope.frequency_rad_s, slope.phase_rad
+        )
+
+    def _harmonics(self, amplitude: FloatArray, lead_rad: float) -> Harmonics:
+        encounter = self.encounter_rad_s
+        phase = self.phase_rad + lead_rad
+        # cos is even: an overtaken wave is one of positive frequency with its phase reversed
+        return Harmonics(amplitude, np.abs(encounter), np.where(encounter < 0, -phase, phase))
+
+
+def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:
+    """Uniform numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
+    raw = np.random.PCG64(seed).random_raw(shape)
+    return (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
+
+
+def _cumulative(per_band: FloatArray) -> FloatArray:
+    """Integrate up to every lower and upper band edge; flat between bands."""
+    total = np.concatenate([[0.0], np.cumsum(per_band)])
+    return np.column_stack([total[:-1], total[1:]]).ravel()
+
+
+def _spread(probability: FloatArray, exponent: float) -> FloatArray:
+    """Quantiles of the density cos^2s(theta / 2) on (-pi, pi)."""
+    theta = np.linspace(-np.pi, np.pi, 8193)
+    density = np.cos(theta / 2) ** (2 * exponent)
+    cumulative = np.concatenate([[0.0], np.cumsum(density[1:] + density[:-1])])
+    return np.interp(probability, cumulative / cumulative[-1], theta)

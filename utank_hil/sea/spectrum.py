@@ -1,0 +1,150 @@
+"""A one-dimensional wave spectrum: energy in frequency bands.
+
+The spectral density S(f) in m^2/Hz is one-sided and constant within a band, which is what a buoy
+reports and what a fine grid of a formula comes to. All moments are sums over the bands, so the
+significant height 4 sqrt(m0) is the one that the measuring centre publishes.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+def band_edges(frequency_hz: FloatArray) -> FloatArray:
+    """Edges of the frequency bands that belong to given centre frequencies.
+
+    Halfway between neighbours where the spacing is even. Where it changes, between two evenly
+    spaced stretches, the gap is shared in proportion to the spacing on either side. For NDBC's
+    grids (0.0325, 0.0375, ... 0.0925, 0.1000, 0.1100, ...) this gives the bandwidths in NDBC's
+    "Description of NDBC wave spectra"; plain midpoints make the band at 0.1 Hz an eighth too
+    narrow.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (F,), F > 1
+        Increasing.
+
+    Returns
+    -------
+    ndarray, shape (F, 2)
+        Lower and upper edge of each band in Hz; bands never overlap.
+    """
+    gap = np.diff(frequency_hz)
+    # beyond the grid the spacing is taken to go on changing as it did last
+    before = max(2 * gap[0] - gap[min(1, gap.size - 1)], gap[0])
+    after = max(2 * gap[-1] - gap[max(-2, -gap.size)], gap[-1])
+    left = np.concatenate([[before], gap[:-1]])
+    right = np.concatenate([gap[1:], [after]])
+    margin = 1.02  # rounding in print must not look like a change of spacing
+    changes = (gap > margin * np.minimum(left, right)) & (margin * gap < np.maximum(left, right))
+    between = frequency_hz[:-1] + gap * np.where(changes, left / (left + right), 0.5)
+    # the outermost bands: symmetric, at most twice as wide as their neighbours
+    widths = np.diff(between) if between.size > 1 else gap
+    first_half = min(between[0] - frequency_hz[0], widths[0])
+    last_half = min(frequency_hz[-1] - between[-1], widths[-1])
+    lower = np.concatenate([[max(frequency_hz[0] - first_half, 0.0)], between])
+    upper = np.concatenate([between, [frequency_hz[-1] + last_half]])
+    upper[0] = frequency_hz[0] + first_half
+    lower[-1] = frequency_hz[-1] - last_half
+    return np.column_stack([lower, upper])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """Wave energy over frequency, at a fixed point (earth frame).
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (F,)
+        Centre frequencies of the bands, positive and increasing, F > 1.
+    density : ndarray, shape (F,)
+        One-sided spectral density in m^2/Hz, zero or more.
+    direction_from_deg : ndarray, shape (F,), optional
+        Mean direction the waves of each band come from, degrees clockwise from true north
+        (NDBC's alpha1).
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, the frequencies do not increase, or a value is not finite.
+    """
+
+    frequency_hz: FloatArray
+    density: FloatArray
+    direction_from_deg: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        frequency, density = self.frequency_hz, self.density
+        if frequency.ndim != 1 or frequency.size < 2 or density.shape != frequency.shape:
+            raise ValueError(
+                "spectrum needs two or more frequencies and as many densities, got shapes "
+                f"{frequency.shape} and {density.shape}"
+            )
+        if not (
+            np.isfinite(frequency).all() and frequency[0] > 0 and np.all(np.diff(frequency) > 0)
+        ):
+            raise ValueError("spectrum frequency_hz must be finite, positive and increasing")
+        if not (np.isfinite(density).all() and np.all(density >= 0)):
+            raise ValueError("spectrum density must be finite and zero or more")
+        if self.direction_from_deg is not None and self.direction_from_deg.shape != frequency.shape:
+            raise ValueError("spectrum direction_from_deg must have one value per frequency")
+
+    @property
+    def band_edges_hz(self) -> FloatArray:
+        """Lower and upper edges of the bands, shape (F, 2)."""
+        return band_edges(self.frequency_hz)
+
+    def moment(self, order: int) -> float:
+        """Integral of f^n S(f) df over the bands in m^2 Hz^n, for n of zero or more."""
+        lower, upper = self.band_edges_hz.T
+        power = order + 1
+        return float(self.density @ (upper**power - lower**power) / power)
+
+    @property
+    def hs_m(self) -> float:
+        """Significant wave height 4 sqrt(m0)."""
+        return 4 * math.sqrt(self.moment(0))
+
+    @property
+    def tp_s(self) -> float:
+        """Peak period, of the band with the greatest density; not a number for a flat calm."""
+        peak = int(np.argmax(self.density))
+        return float(1 / self.frequency_hz[peak]) if self.density[peak] > 0 else math.nan
+
+    @property
+    def tz_s(self) -> float:
+        """Mean zero-up-crossing period sqrt(m0 / m2); not a number for a flat calm."""
+        second = self.moment(2)
+        return math.sqrt(self.moment(0) / second) if second > 0 else math.nan
+
+    def heading_rad(self, course_deg: float) -> FloatArray:
+        """Direction of travel relative to a ship on a course, per band.
+
+        Parameters
+        ----------
+        course_deg : float
+            Ship's course, degrees clockwise from true north.
+
+        Returns
+        -------
+        ndarray, shape (F,)
+            In (-pi, pi]: 0 following, pi head, +pi/2 travelling from port to starboard.
+
+        Raises
+        ------
+        ValueError
+            If the spectrum has no directions, or one is missing where there is energy.
+        """
+        if self.direction_from_deg is None:
+            raise ValueError("spectrum has no directions: load it with the mean direction file")
+        missing = ~np.isfinite(self.direction_from_deg) & (self.density > 0)
+        if missing.any():
+            raise ValueError(
+                f"spectrum has no direction at {self.frequency_hz[missing][0]:g} Hz, "
+                "where it has energy: choose another hour or give a heading"
+            )
+        towards = np.radians(np.nan_to_num(self.direction_from_deg) + 180 - course_deg)
+        return np.pi - np.mod(np.pi - towards, 2 * np.pi)
