@@ -1,0 +1,323 @@
+"""Axial propeller pump in the duct, its drive, and the pressure loop around it (thesis Fig. 2.2).
+
+Blades as a screw. At the effective radius r the blade moves at r n, the water at u = Q / A, so it
+is met at W = sqrt((r n)^2 + u^2) and slips by s = p n - u, p the pitch per radian::
+
+    pressure rise   dP = rho / 2 lift W s
+    shaft torque    T  = p A dP + rho / 2 friction A r^2 n W
+    shaft power   T n  = dP Q + rho / 2 A W (lift s^2 + friction (r n)^2)
+
+The torque is that of a blade force normal to the blade, plus skin friction. So what the shaft gives
+is what the water gets plus losses that are never negative, in all four quadrants of speed n and
+flow Q. dP rises with n and falls with Q everywhere as long as the blade angle at r lies between
+19.5 and 70.5 degrees (1/sqrt(8) < p/r < sqrt(8)). A positive dP raises the starboard level.
+
+Inner loop. The set-point is limited, lagged and limited in rate to a reference; a PI controller on
+the reference's error adds to the reference, the inverse of the head curve at the present flow turns
+the sum into a speed, and the drive's speed loop follows within the limits of torque and power.
+Inside the limits the pressure follows the set-point like a first-order lag of `lag_s`.
+
+The functions take and return plain numbers and named tuples of numbers, so that they can be
+compiled (`compile_pump`); this module does not import a compiler.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from types import FunctionType
+from typing import Any, NamedTuple
+
+
+class PumpCoefficients(NamedTuple):
+    """What the step functions need of a `Pump`, in SI units."""
+
+    area: float
+    radius: float
+    pitch: float
+    half_rho_lift: float
+    half_rho_friction: float
+    inertia: float
+    max_speed: float
+    max_torque: float
+    max_power: float
+    max_pressure: float
+    max_pressure_rate: float
+    reference_lag: float
+    speed_bandwidth: float
+    gain: float
+    integral_time: float
+
+
+class PumpState(NamedTuple):
+    """State and last outputs of the pump; all zero at rest, see `AT_REST`."""
+
+    speed_rad_s: float
+    reference_pa: float  # the set-point after limit, lag and rate limit
+    integral_pa: float
+    pressure_pa: float  # pressure rise at the end of the step
+    torque_nm: float  # motor torque during the step
+    power_w: float  # shaft power, mean of the step; negative when the water drives the motor
+    limited: bool  # speed, torque or power was at its limit
+
+
+AT_REST = PumpState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+
+
+@dataclass(frozen=True, slots=True)
+class Pump:
+    """Propeller pump, motor and drive.
+
+    Parameters
+    ----------
+    duct_area_m2 : float
+        Cross-section A that the propeller fills.
+    radius_m, pitch_m : float
+        Effective blade radius r, and advance p per radian without slip.
+    lift, friction : float
+        Blade coefficients for rho / 2: solidity times lift slope, and skin friction.
+    inertia_kg_m2 : float
+        Rotor, motor (referred to the propeller) and entrained water.
+    max_speed_rad_s, max_torque_nm, max_power_w : float
+        Limits of motor and drive, in either direction; power is the shaft's.
+    max_pressure_pa, max_pressure_rate_pa_s : float
+        Limits of the reference.
+    lag_s : float
+        Time constant of pressure behind set-point, inside the limits.
+    speed_bandwidth_rad_s : float
+        Bandwidth of the drive's speed loop.
+    pressure_gain, integral_time_s : float
+        Proportional gain and integral time of the pressure loop.
+    density_kg_m3 : float
+
+    Raises
+    ------
+    ValueError
+        If a value is not positive and finite, if the pitch makes the head curve ambiguous, or if
+        the loop is slower than the lag.
+    """
+
+    duct_area_m2: float
+    radius_m: float
+    pitch_m: float
+    lift: float
+    friction: float
+    inertia_kg_m2: float
+    max_speed_rad_s: float
+    max_torque_nm: float
+    max_power_w: float
+    max_pressure_pa: float
+    max_pressure_rate_pa_s: float
+    lag_s: float = 0.1
+    speed_bandwidth_rad_s: float = 30.0
+    pressure_gain: float = 1.0
+    integral_time_s: float = 0.5
+    density_kg_m3: float = 1000.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"pump {field.name} must be positive and finite, got {value}")
+        if not 1 / math.sqrt(8) < self.pitch_m / self.radius_m < math.sqrt(8):
+            raise ValueError(
+                f"pump pitch_m must be 0.354 to 2.83 times radius_m, got {self.pitch_m} and "
+                f"{self.radius_m}: outside, one pressure belongs to several speeds"
+            )
+        if self.reference_lag_s <= 0:
+            raise ValueError(
+                f"pump lag_s = {self.lag_s} must exceed the loop's own lag of "
+                f"{self._loop_lag_s:g} s: raise it, speed_bandwidth_rad_s or pressure_gain"
+            )
+
+    @classmethod
+    def for_duct(cls, area_m2: float, max_pressure_pa: float = 50e3) -> "Pump":
+        """Pump for a duct, similar to the first ship's.
+
+        The first ship's (6.22 m^2, 50 kPa at up to 45 m^3/s, 2.25 MW to the water) is of the size
+        of a 3.5 MW tunnel thruster: 2.8 m, 25 rad/s, 67 % efficient there. Geometric similarity
+        with water speeds as the square root of pressure gives the others: shaft speed as
+        sqrt(P/A), torque P A^1.5, power P^1.5 A, inertia A^2.5.
+
+        Parameters
+        ----------
+        area_m2 : float
+            Duct cross-section: 6.22 for the first ship, 0.19 for Patti-B.
+        max_pressure_pa : float
+        """
+        if not (area_m2 > 0 and max_pressure_pa > 0):
+            raise ValueError(
+                f"pump needs positive area and pressure, got {area_m2}, {max_pressure_pa}"
+            )
+        size = math.sqrt(area_m2 / 6.22)  # ratio of lengths
+        speed = math.sqrt(max_pressure_pa / 50e3)  # ratio of water and blade speeds
+        return cls(
+            duct_area_m2=area_m2,
+            radius_m=0.985 * size,
+            pitch_m=0.40 * size,
+            lift=1.405,
+            friction=0.005,
+            inertia_kg_m2=1700.0 * size**5,
+            max_speed_rad_s=28.0 * speed / size,
+            max_torque_nm=200e3 * speed**2 * size**3,
+            max_power_w=3.6e6 * speed**3 * size**2,
+            max_pressure_pa=max_pressure_pa,
+            max_pressure_rate_pa_s=10 * max_pressure_pa,
+        )
+
+    @property
+    def reference_lag_s(self) -> float:
+        """Lag of the reference: what is left of `lag_s` after the loop's own."""
+        return self.lag_s - self._loop_lag_s
+
+    @property
+    def _loop_lag_s(self) -> float:
+        return 1 / (self.speed_bandwidth_rad_s * (1 + self.pressure_gain))
+
+    @property
+    def coefficients(self) -> PumpCoefficients:
+        """The argument of the step functions."""
+        return PumpCoefficients(
+            area=self.duct_area_m2,
+            radius=self.radius_m,
+            pitch=self.pitch_m,
+            half_rho_lift=self.density_kg_m3 / 2 * self.lift,
+            half_rho_friction=self.density_kg_m3 / 2 * self.friction,
+            inertia=self.inertia_kg_m2,
+            max_speed=self.max_speed_rad_s,
+            max_torque=self.max_torque_nm,
+            max_power=self.max_power_w,
+            max_pressure=self.max_pressure_pa,
+            max_pressure_rate=self.max_pressure_rate_pa_s,
+            reference_lag=self.reference_lag_s,
+            speed_bandwidth=self.speed_bandwidth_rad_s,
+            gain=self.pressure_gain,
+            integral_time=self.integral_time_s,
+        )
+
+
+def pump_pressure(speed: float, flow: float, c: PumpCoefficients) -> float:
+    """Pressure rise in Pa at a speed (rad/s) and a flow to starboard (m^3/s)."""
+    u = flow / c.area
+    return c.half_rho_lift * math.hypot(c.radius * speed, u) * (c.pitch * speed - u)
+
+
+def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, float]:
+    """Torque of the water on the shaft in N m and its slope with speed in N m s, not negative."""
+    u = flow / c.area
+    rn = c.radius * speed
+    w = math.hypot(rn, u) + 1e-9  # never divided by zero
+    slip = c.pitch * speed - u
+    drag = c.pitch * c.half_rho_lift * slip + c.half_rho_friction * c.radius * rn
+    drag_slope = c.half_rho_lift * c.pitch**2 + c.half_rho_friction * c.radius**2
+    slope = c.area * (c.radius * rn / w * drag + w * drag_slope)
+    return c.area * w * drag, max(slope, 0.0)
+
+
+def pump_losses(speed: float, flow: float, c: PumpCoefficients) -> float:
+    """Shaft power minus hydraulic power in W: slip and blade friction, never negative."""
+    u = flow / c.area
+    rn = c.radius * speed
+    slip = c.pitch * speed - u
+    per_speed = c.half_rho_lift * slip * slip + c.half_rho_friction * rn * rn
+    return c.area * math.hypot(rn, u) * per_speed
+
+
+def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
+    """Speed in rad/s that gives a pressure rise at a flow: the inverse of `pump_pressure`."""
+    u = flow / c.area
+    wanted = pressure / c.half_rho_lift
+    # start from the slip of s (a |s| + b |u|) = wanted, exact with no flow and with no slip
+    a = c.radius / c.pitch
+    b = math.sqrt(1.0 + a * a) * abs(u)
+    slip = 2.0 * wanted / (b + math.sqrt(b * b + 4.0 * a * abs(wanted)) + 1e-12)
+    speed = (u + slip) / c.pitch
+    for _ in range(8):  # Newton; the head curve is smooth and monotone
+        w = math.hypot(c.radius * speed, u)
+        slip = c.pitch * speed - u
+        slope = w * c.pitch + c.radius * c.radius * speed * slip / (w + 1e-12)
+        if slope < 1e-9:
+            break
+        change = (w * slip - wanted) / slope
+        speed -= change
+        if abs(change) < 1e-12 * abs(speed):
+            break
+    return speed
+
+
+def pump_step(
+    state: PumpState, setpoint: float, flow: float, step_s: float, c: PumpCoefficients
+) -> PumpState:
+    """Advance drive and pump by a step under closed pressure loop.
+
+    Parameters
+    ----------
+    state : PumpState
+    setpoint : float
+        Pressure asked for, Pa; held over the step.
+    flow : float
+        Flow to starboard Q = At dh/dt, m^3/s; held over the step.
+    step_s : float
+        Up to some 20 ms.
+    c : PumpCoefficients
+
+    Returns
+    -------
+    PumpState
+    """
+    target = min(max(setpoint, -c.max_pressure), c.max_pressure)
+    change = (target - state.reference_pa) * (1.0 - math.exp(-step_s / c.reference_lag))
+    bound = c.max_pressure_rate * step_s
+    reference = state.reference_pa + min(max(change, -bound), bound)
+
+    error = reference - pump_pressure(state.speed_rad_s, flow, c)
+    free = pump_speed(reference + c.gain * error + state.integral_pa, flow, c)
+    command = min(max(free, -c.max_speed), c.max_speed)
+
+    # the load is taken at the end of the step (linearised), which is stable at any step
+    load, slope = pump_load(state.speed_rad_s, flow, c)
+    stiffness = c.inertia / step_s + slope
+    rise = (command - state.speed_rad_s) * (1.0 - math.exp(-step_s * c.speed_bandwidth))
+    asked = load + stiffness * rise
+    torque, speed = 0.0, state.speed_rad_s
+    for _ in range(2):  # the power limit needs the speed at the end of the step
+        fastest = max(abs(state.speed_rad_s), abs(speed), 1e-9)
+        ceiling = min(c.max_torque, c.max_power / fastest)
+        torque = min(max(asked, -ceiling), ceiling)
+        speed = state.speed_rad_s + (torque - load) / stiffness
+
+    limited = command != free or torque != asked
+    integral = state.integral_pa
+    if not limited:  # anti-windup: an actuator at its limit teaches the integral nothing
+        integral += error * step_s / c.integral_time
+    return PumpState(
+        speed,
+        reference,
+        integral,
+        pump_pressure(speed, flow, c),
+        torque,
+        torque * (state.speed_rad_s + speed) / 2.0,
+        limited,
+    )
+
+
+def pump_coast(state: PumpState, flow: float, step_s: float, c: PumpCoefficients) -> PumpState:
+    """Advance by a step with the motor off: the water turns the rotor. Arguments as `pump_step`."""
+    load, slope = pump_load(state.speed_rad_s, flow, c)
+    speed = state.speed_rad_s - load / (c.inertia / step_s + slope)
+    return PumpState(speed, 0.0, 0.0, pump_pressure(speed, flow, c), 0.0, 0.0, False)
+
+
+def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Compiled `pump_step` and `pump_coast`.
+
+    Parameters
+    ----------
+    compiler : callable
+        For example ``numba.njit(cache=True)``. The functions are handed to it over a namespace of
+        their own, in which the ones they call are compiled already.
+    """
+    scope = dict(globals())
+    for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
+        name = function.__name__
+        scope[name] = compiler(FunctionType(function.__code__, scope, name))
+    return scope["pump_step"], scope["pump_coast"]
