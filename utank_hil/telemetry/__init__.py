@@ -1,0 +1,47 @@
+"""Telemetry: a shared-memory ring out of the loop, Rerun recordings, a live view and pictures.
+
+The ring is light and may be imported by the controller process. What needs Rerun or matplotlib is
+loaded when its name is first used; so is the recorder, which is also run as a module.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
+from utank_hil.telemetry.viewer import Viewer, open_viewer
+
+if TYPE_CHECKING:
+    from utank_hil.telemetry.picture import BenchCurve, draw_bench
+    from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
+    from utank_hil.telemetry.recording import read_recording, write_recording
+
+__all__ = [
+    "BenchCurve",
+    "RecorderError",
+    "RecorderProcess",
+    "RecorderReport",
+    "RingError",
+    "RingReader",
+    "RingWriter",
+    "Viewer",
+    "draw_bench",
+    "open_viewer",
+    "read_recording",
+    "write_recording",
+]
+
+_LAZY = {
+    "BenchCurve": "picture",
+    "RecorderError": "recorder",
+    "RecorderProcess": "recorder",
+    "RecorderReport": "recorder",
+    "draw_bench": "picture",
+    "read_recording": "recording",
+    "write_recording": "recording",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)

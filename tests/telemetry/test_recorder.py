@@ -1,0 +1,211 @@
+"""The recorder process: nothing lost, nothing waited for, readable however it ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import (
+    RecorderError,
+    RecorderProcess,
+    RecorderReport,
+    RingWriter,
+    read_recording,
+)
+
+
+def table(rows: int) -> np.ndarray:
+    """Rows of 10 ms that tell their number in every column."""
+    number = np.arange(rows)
+    values = number[:, None] * np.linspace(1, 2, len(SIGNALS))
+    values[:, SIGNALS.index("time_s")] = number / 100
+    values[:, SIGNALS.index("mode")] = np.minimum(number // 100, 4)
+    values[:, SIGNALS.index("fault")] = 0
+    return values
+
+
+def feed(ring: RingWriter, rows: np.ndarray) -> None:
+    for row in rows:
+        ring.write(row)
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def recorded(file: Path) -> np.ndarray:
+    run = read_recording(file)["live"]
+    return np.stack([run[column] for column in SIGNALS], axis=1)
+
+
+def listening_addresses(pid: int) -> set[str]:
+    """Hexadecimal IPv4 addresses on which a process listens, from the kernel's own table."""
+    sockets = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        try:
+            sockets.add(descriptor.readlink().name)
+        except FileNotFoundError:
+            continue
+    lines = [line.split() for line in Path(f"/proc/{pid}/net/tcp").read_text().splitlines()[1:]]
+    mine = [line for line in lines if f"socket:[{line[9]}]" in sockets and line[3] == "0A"]
+    return {line[1].partition(":")[0] for line in mine}
+
+
+def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) -> None:
+    rows = table(500)
+    file = tmp_path / "run.rrd"
+    with RingWriter(SIGNALS) as ring:
+        feed(ring, rows[:100])  # before the recorder is there
+        recorder = RecorderProcess(ring.name, file)
+        feed(ring, rows[100:])
+    report = recorder.stop()
+    assert report == RecorderReport(rows=500, lost=0)
+    assert recorder.stop() is report
+    np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
+    RrdReader(file).store()  # needs the footer
+    assert recorder.url is None
+
+
+def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None:
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, tmp_path / "run.rrd")
+        feed(ring, table(10))
+    wait_for(lambda: recorder._process.poll() == 0)
+    assert recorder.stop().rows == 10
+
+
+def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    rows = table(200)
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, file)
+        feed(ring, rows)
+        time.sleep(1.0)
+        recorder._process.kill()
+        with pytest.raises(RecorderError, match="exit code -9"):
+            recorder.stop()
+    np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
+
+
+def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    rows = table(300)
+    with RingWriter(SIGNALS, capacity=64) as ring:
+        recorder = RecorderProcess(ring.name, file)
+        os.kill(recorder._process.pid, signal.SIGSTOP)
+        feed(ring, rows)
+        os.kill(recorder._process.pid, signal.SIGCONT)
+    report = recorder.stop()
+    assert report == RecorderReport(rows=64, lost=236)
+    np.testing.assert_allclose(recorded(file), rows[236:], rtol=4e-16)
+    texts = [
+        text
+        for chunk in RrdReader(file).stream().filter(components="TextLog:text")
+        for text in chunk.to_record_batch().column("TextLog:text").to_pylist()
+    ]
+    assert texts == [["236 rows lost: the recorder was too slow"]]
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
+    tmp_path: Path, stop: signal.Signals
+) -> None:
+    file = tmp_path / "run.rrd"
+    module = "utank_hil.telemetry.recorder"
+    with RingWriter(SIGNALS) as ring:
+        command = [sys.executable, "-W", "error", "-m", module, "--ring", ring.name]
+        process = subprocess.Popen(
+            [*command, "--file", str(file)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        process.stdout.readline()
+        feed(ring, table(7))
+        process.send_signal(stop)
+        output, _ = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert output.split() == ['{"rows":', "7,", '"lost":', "0}"]
+    assert len(recorded(file)) == 7
+
+
+def test_recorder_ends_when_the_writer_is_killed(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    code = f"""
+import sys, numpy as np
+from utank_hil.telemetry import RingWriter
+ring = RingWriter({SIGNALS!r})
+ring.write(np.zeros({len(SIGNALS)}))
+print(ring.name, flush=True)
+sys.stdin.read()
+"""
+    writer = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert writer.stdout is not None
+    recorder = RecorderProcess(writer.stdout.readline().strip(), file)
+    writer.kill()
+    wait_for(lambda: recorder._process.poll() == 0)
+    writer.communicate()
+    assert recorder.stop() == RecorderReport(rows=1, lost=0)
+    assert len(recorded(file)) == 1
+
+
+def test_live_server_listens_on_loopback_only(tmp_path: Path) -> None:
+    with (
+        RingWriter(SIGNALS) as ring,
+        RecorderProcess(ring.name, tmp_path / "run.rrd", live=True) as recorder,
+    ):
+        assert recorder.url is not None
+        assert recorder.url.startswith("rerun+http://127.0.0.1:")
+        assert listening_addresses(recorder._process.pid) == {"0100007F"}
+
+
+@pytest.mark.slow
+def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    limit = 300_000
+    module = "utank_hil.telemetry.recorder"
+    with RingWriter(SIGNALS) as ring:
+        command = ["-m", module, "--ring", ring.name, "--file", str(file)]
+        process = subprocess.Popen(
+            ["prlimit", f"--fsize={limit}", sys.executable, "-X", "dev", *command],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout is not None
+        process.stdout.readline()
+        feed(ring, table(100))
+        time.sleep(1.0)
+        feed(ring, table(8000))
+    try:
+        _, complaint = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 1
+    assert f"recording {file} failed" in complaint
+    assert file.stat().st_size <= limit
+    np.testing.assert_allclose(recorded(file)[:100], table(100), rtol=4e-16)
+
+
+def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(RecorderError, match="did not start"):
+        RecorderProcess("utank-no-such-ring", tmp_path / "run.rrd")
+    assert "is its writer running" in capfd.readouterr().err
+    with RingWriter(SIGNALS) as ring, pytest.raises(RecorderError, match="did not start"):
+        RecorderProcess(ring.name, tmp_path / "no-such-folder" / "run.rrd")
+    assert "no-such-folder" in capfd.readouterr().err

@@ -1,0 +1,108 @@
+"""Recordings: what is written comes back, whatever happened to the file's end."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from utank_hil.canbus.enumerations import Fault
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import read_recording, write_recording
+
+COLUMNS = (*SIGNALS, "true_roll_rad", "wave_moment_nm")
+
+
+def random_run(rows: int, seed: int) -> np.ndarray:
+    values = np.random.default_rng(seed).standard_normal((rows, len(COLUMNS)))
+    values[:, 0] = np.arange(rows) / 20
+    values[:, COLUMNS.index("mode")] = np.arange(rows) * 5 // rows
+    values[:, COLUMNS.index("fault")] = np.arange(rows) // 1000 % 3
+    return values
+
+
+def test_runs_come_back_under_their_names(tmp_path: Path) -> None:
+    runs = {
+        "passive": random_run(20_000, 1),
+        "dpc": random_run(9000, 2),
+        "GPC / roll, 2°": random_run(1, 3),
+    }
+    runs["dpc"][17, 3] = np.nan
+    file = tmp_path / "bench.rrd"
+    write_recording(file, COLUMNS, runs)
+    back = read_recording(file)
+    assert list(back) == list(runs)
+    for run, rows in runs.items():
+        assert set(back[run]) == set(COLUMNS)
+        np.testing.assert_array_equal(back[run]["time_s"], rows[:, 0])
+        for i, column in enumerate(COLUMNS):
+            np.testing.assert_allclose(back[run][column], rows[:, i], rtol=4e-16)
+
+
+def test_the_blueprint_is_in_the_file(tmp_path: Path) -> None:
+    write_recording(tmp_path / "a.rrd", COLUMNS, {"passive": random_run(10, 0)})
+    assert len(RrdReader(tmp_path / "a.rrd").blueprints()) == 1
+
+
+def test_states_are_logged_when_they_change(tmp_path: Path) -> None:
+    rows = np.zeros((5, 3))
+    rows[:, 0] = np.arange(5.0)
+    rows[:, 1] = [1, 2, 2, 4, 9]
+    rows[:, 2] = [0, 0, 0, Fault.DRIVE_SILENT, 99]
+    write_recording(tmp_path / "a.rrd", ["time_s", "mode", "fault"], {"passive": rows})
+    chunks = RrdReader(tmp_path / "a.rrd").stream().filter(components="StateChange:state")
+    (batch,) = (chunk.to_record_batch() for chunk in chunks)
+    assert batch.column("StateChange:state").to_pylist() == [
+        ["STANDBY"],
+        ["PASSIVE"],
+        ["FAULT: DRIVE_SILENT"],
+        ["mode 9: fault 99"],
+    ]
+    times_ns = batch.column("time").to_numpy().astype(np.int64)
+    assert times_ns.tolist() == [0, 1_000_000_000, 3_000_000_000, 4_000_000_000]
+
+
+def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: Path) -> None:
+    rows = random_run(40_000, 4)
+    whole, cut = tmp_path / "whole.rrd", tmp_path / "cut.rrd"
+    write_recording(whole, COLUMNS, {"passive": rows})
+    content = whole.read_bytes()
+    counts = []
+    for share in (0.5, 0.8, 0.999):
+        cut.write_bytes(content[: int(share * len(content))])
+        time_s = read_recording(cut)["passive"]["time_s"]
+        np.testing.assert_array_equal(time_s, rows[: len(time_s), 0])
+        counts.append(len(time_s))
+    assert 15_000 < counts[0] < counts[1] < counts[2] <= len(rows)
+
+
+def test_an_hour_of_three_runs_is_written_in_two_seconds(tmp_path: Path) -> None:
+    runs = {name: random_run(72_000, i) for i, name in enumerate(("passive", "dpc", "gpc"))}
+    file = tmp_path / "hour.rrd"
+    start = time.perf_counter()
+    write_recording(file, COLUMNS, runs)
+    assert time.perf_counter() - start < 2.0
+    assert file.stat().st_size < 1.1 * sum(rows.nbytes for rows in runs.values())
+
+
+def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "a.rrd"
+    file.write_bytes(b"not a recording at all")
+    with pytest.raises(ValueError, match=r"a\.rrd"):
+        read_recording(file)
+
+
+def test_tables_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "a.rrd"
+    with pytest.raises(ValueError, match="at least one run"):
+        write_recording(file, COLUMNS, {})
+    with pytest.raises(ValueError, match="'dpc'"):
+        write_recording(file, COLUMNS, {"passive": random_run(3, 0), "dpc": np.zeros((3, 2))})
+    with pytest.raises(ValueError, match="time_s"):
+        write_recording(file, ["roll_rad"], {"passive": np.zeros((3, 1))})
+    with pytest.raises(ValueError, match="no rows"):
+        write_recording(file, COLUMNS, {"passive": np.zeros((0, len(COLUMNS)))})
+    with pytest.raises(ValueError, match="SI units"):
+        write_recording(file, ["time_s", "roll_deg"], {"passive": np.zeros((3, 2))})
+    assert not file.exists()

@@ -1,0 +1,298 @@
+"""The ring against a plain list, against another process, and against sudden death."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from utank_hil.telemetry import RingError, RingReader, RingWriter
+
+SHM = Path("/dev/shm")
+
+
+@pytest.fixture(autouse=True)
+def no_segment_left_behind() -> Iterator[None]:
+    yield
+    assert not list(SHM.glob(f"utank-{os.getpid()}-*"))
+
+
+def rows_from(first: int, count: int, width: int) -> np.ndarray:
+    """Rows that carry their own number in every value."""
+    return np.arange(first, first + count, dtype=float)[:, None] * np.arange(1, width + 1)
+
+
+class BroadcastModel(RuleBasedStateMachine):
+    """Two readers of a ring of five rows see what a list and a cursor each would show them."""
+
+    CAPACITY = 5
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.writer = RingWriter(["a", "b"], capacity=self.CAPACITY)
+        self.written: list[list[float]] = []
+        self.readers: list[RingReader] = []
+        self.cursors: list[int] = []
+        self.lost: list[int] = []
+        self.attach()
+
+    @rule(values=st.lists(st.tuples(st.floats(), st.floats()), max_size=8))
+    def write(self, values: list[tuple[float, float]]) -> None:
+        for row in values:
+            self.writer.write(np.array(row))
+            self.written.append(list(row))
+
+    @rule()
+    def attach(self) -> None:
+        if len(self.readers) < 2:
+            self.readers.append(RingReader(self.writer.name))
+            self.cursors.append(max(0, len(self.written) - self.CAPACITY))
+            self.lost.append(0)
+
+    @rule(which=st.integers(0, 1), limit=st.none() | st.integers(0, 7))
+    def read(self, which: int, limit: int | None) -> None:
+        which = which % len(self.readers)
+        oldest = max(self.cursors[which], len(self.written) - self.CAPACITY)
+        self.lost[which] += oldest - self.cursors[which]
+        expected = self.written[oldest:][:limit]
+        self.cursors[which] = oldest + len(expected)
+        got = self.readers[which].read(limit)
+        assert got.shape == (len(expected), 2)
+        np.testing.assert_array_equal(got, np.reshape(expected, (-1, 2)))
+
+    @invariant()
+    def losses_are_counted(self) -> None:
+        assert [reader.lost for reader in self.readers] == self.lost
+        assert self.writer.count == len(self.written)
+
+    def teardown(self) -> None:
+        self.writer.close()
+        assert all(reader.ended for reader in self.readers)
+        for reader in self.readers:
+            reader.close()
+
+
+TestBroadcastModel = BroadcastModel.TestCase
+TestBroadcastModel.settings = settings(max_examples=40, stateful_step_count=30, deadline=None)
+
+
+def test_reader_drains_a_ring_after_its_writer_closed_it() -> None:
+    writer = RingWriter(["a", "b", "c"])
+    with RingReader(writer.name) as reader:
+        writer.write(np.array([1.0, np.nan, -np.inf]))
+        writer.close()
+        assert reader.columns == ("a", "b", "c")
+        assert reader.ended
+        np.testing.assert_array_equal(reader.read(), [[1.0, np.nan, -np.inf]])
+
+
+def test_rows_read_stay_valid_after_both_ends_are_closed() -> None:
+    with RingWriter(["a"]) as writer, RingReader(writer.name) as reader:
+        writer.write(np.array([7.0]))
+        rows = reader.read()
+    np.testing.assert_array_equal(rows, [[7.0]])
+
+
+def test_a_half_written_row_is_held_back_then_counted_as_lost() -> None:
+    with RingWriter(["a", "b"], capacity=4) as writer, RingReader(writer.name) as reader:
+        for row in rows_from(0, 3, 2):
+            writer.write(row)
+        with (SHM / writer.name).open("r+b") as segment:  # the second value of row 1
+            size = os.fstat(segment.fileno()).st_size
+            segment.seek(size - 4 * 24 + 24 + 8)
+            segment.write(b"\x01")
+        np.testing.assert_array_equal(reader.read(), rows_from(0, 1, 2))
+        assert len(reader.read()) == 0
+        assert reader.lost == 0
+        for row in rows_from(3, 2, 2):  # row 4 takes the place of row 0, row 5 would that of row 1
+            writer.write(row)
+        np.testing.assert_array_equal(reader.read(), rows_from(2, 3, 2))
+        assert reader.lost == 1
+
+
+def test_a_row_of_the_previous_lap_is_not_taken_for_a_new_one() -> None:
+    with RingWriter(["a"], capacity=2) as writer, RingReader(writer.name) as reader:
+        for value in (1.0, 2.0):
+            writer.write(np.array([value]))
+        slots = (SHM / writer.name).read_bytes()[-32:]
+        assert len(reader.read()) == 2
+        for value in (3.0, 4.0):
+            writer.write(np.array([value]))
+        with (SHM / writer.name).open("r+b") as segment:  # new stores not visible yet
+            segment.seek(-32, os.SEEK_END)
+            segment.write(slots)
+        assert len(reader.read()) == 0
+
+
+def test_a_reader_cannot_write() -> None:
+    with RingWriter(["a"]) as writer, RingReader(writer.name) as reader:
+        assert not reader._slots.flags.writeable
+        with pytest.raises(ValueError, match="read-only"):
+            reader._words[0] = 0
+
+
+def test_a_stalled_reader_does_not_hold_up_the_writer() -> None:
+    with RingWriter(["a"], capacity=8) as writer, RingReader(writer.name) as reader:
+        for row in rows_from(0, 1000, 1):
+            writer.write(row)
+        np.testing.assert_array_equal(reader.read(), rows_from(992, 8, 1))
+        assert reader.lost == 992
+
+
+@pytest.mark.parametrize("row", [np.zeros(2), np.zeros(4)])
+def test_a_row_of_another_width_is_refused(row: np.ndarray) -> None:
+    with RingWriter(["a", "b", "c"]) as writer:
+        with pytest.raises(ValueError, match="3 columns"):
+            writer.write(row)
+        assert writer.count == 0
+
+
+def test_a_closed_ring_takes_no_rows() -> None:
+    writer = RingWriter(["a"])
+    writer.close()
+    writer.close()
+    with pytest.raises(ValueError, match="closed"):
+        writer.write(np.zeros(1))
+
+
+def test_bad_arguments_are_refused() -> None:
+    with pytest.raises(ValueError, match="different names"):
+        RingWriter(["a", "a"])
+    with pytest.raises(ValueError, match="columns"):
+        RingWriter([])
+    with pytest.raises(ValueError, match="two rows"):
+        RingWriter(["a"], capacity=1)
+
+
+def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
+    with pytest.raises(RingError, match="is its writer running"):
+        RingReader(f"utank-{os.getpid()}-none")
+    foreign = SHM / f"utank-{os.getpid()}-foreign"
+    for content in (b"short", bytes(4096)):
+        foreign.write_bytes(content)
+        with pytest.raises(RingError, match="telemetry ring"):
+            RingReader(foreign.name)
+        with pytest.raises(RingError, match="remove it"):
+            RingWriter(["a"], name=foreign.name)
+    foreign.unlink()
+
+
+def test_the_name_of_a_living_writer_is_not_taken_over() -> None:
+    with RingWriter(["a"]) as writer, pytest.raises(RingError, match="its writer runs"):
+        RingWriter(["a"], name=writer.name)
+
+
+WRITE_FOR_EVER = """
+import sys, numpy as np
+from utank_hil.telemetry import RingWriter
+writer = RingWriter([str(i) for i in range(14)], capacity=64, name=sys.argv[1])
+print("ready", flush=True)
+sys.stdin.readline()
+number, steps = 0, np.arange(1.0, 15.0)
+row = np.empty(14)
+while True:
+    np.multiply(steps, number, out=row)
+    writer.write(row)
+    number += 1
+"""
+
+
+@contextlib.contextmanager
+def python(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,  # the tracker reports what a killed writer left behind
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def begin(process: subprocess.Popen[str]) -> None:
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_no_torn_row_from_a_writer_at_full_speed() -> None:
+    name = f"utank-{os.getpid()}-stress"
+    seen = 0
+    last = -1.0
+    with python(WRITE_FOR_EVER, name) as process, RingReader(name) as reader:
+        begin(process)
+        deadline = time.monotonic() + 1.5
+        while time.monotonic() < deadline and (seen < 200_000 or reader.lost == 0):
+            rows = reader.read()
+            if len(rows):
+                np.testing.assert_array_equal(rows, rows[:, :1] * np.arange(1, 15))
+                assert rows[0, 0] > last
+                assert (np.diff(rows[:, 0]) > 0).all()
+                last = rows[-1, 0]
+                seen += len(rows)
+        assert last + 1 == seen + reader.lost  # every row was either handed out or counted
+        assert seen > 1000
+        assert reader.lost > 0
+        process.kill()
+        process.wait()
+    wait_for(lambda: not (SHM / name).exists())
+
+
+def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed() -> None:
+    name = f"utank-{os.getpid()}-killed"
+    with python(WRITE_FOR_EVER, name) as process, RingReader(name) as reader:
+        begin(process)
+        wait_for(lambda: len(reader.read()) > 0)
+        assert not reader.ended
+        os.kill(process.pid, signal.SIGKILL)
+        wait_for(lambda: reader.ended)  # nobody has waited for the process yet
+        wait_for(lambda: not (SHM / name).exists())
+
+
+def test_the_segment_of_a_dead_writer_is_replaced() -> None:
+    name = f"utank-{os.getpid()}-orphan"
+    untracked = "from multiprocessing import resource_tracker\n" + WRITE_FOR_EVER.replace(
+        "print(", "resource_tracker.unregister('/' + writer.name, 'shared_memory'); print("
+    )
+    with python(untracked, name) as process:
+        process.kill()
+        process.wait()
+    assert (SHM / name).exists()
+    with RingWriter(["new"], name=name) as writer, RingReader(writer.name) as reader:
+        assert reader.columns == ("new",)
+
+
+def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
+    code = """
+import sys
+from utank_hil.telemetry import RingReader
+reader = RingReader(sys.argv[1])
+assert reader.read().shape == (1, 1)
+"""
+    with RingWriter(["a"]) as writer:
+        writer.write(np.zeros(1))
+        for _ in range(2):
+            subprocess.run([sys.executable, "-W", "error", "-c", code, writer.name], check=True)
+        assert (SHM / writer.name).exists()

@@ -1,0 +1,147 @@
+"""The picture of a bench: what the tank did to the ship, passive beside active."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.typing import RcKeyType
+
+ZOOM_S: Final = 180.0
+_LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
+
+# Dark grey for the reference, then Okabe and Ito's colours, told apart by colour-blind eyes
+_COLORS: Final = ("#555555", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
+_STYLE: "Final[dict[RcKeyType, Any]]" = {
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#888888",
+    "axes.grid": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class BenchCurve:
+    """One run of a bench, as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+        Name in the legend.
+    time_s, roll_rad, level_m, pressure_pa : array (n,)
+        Level is the starboard surface above its still level.
+    """
+
+    name: str
+    time_s: FloatArray
+    roll_rad: FloatArray
+    level_m: FloatArray
+    pressure_pa: FloatArray
+
+
+def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
+    """Draw roll, level and pressure of all runs: the whole time, and the worst three minutes.
+
+    Parameters
+    ----------
+    curves : sequence of BenchCurve
+        The first is the reference, the passive tank: the zoom is around its largest roll, and it is
+        drawn in grey behind the others.
+    path : Path
+        The `.png` file; written anew.
+    title : str
+        Stands above the picture.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ValueError
+        If there are no curves, or more than the colours that can be told apart.
+    """
+    if not 1 <= len(curves) <= len(_COLORS):
+        raise ValueError(f"can draw 1 to {len(_COLORS)} runs in one picture, got {len(curves)}")
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    whole = (float(curves[0].time_s[0]), float(curves[0].time_s[-1]))
+    zoom = _worst_span(curves[0], whole)
+    spans = [whole] if zoom == whole else [whole, zoom]
+    with mpl.rc_context(rc=_STYLE):
+        figure = Figure(figsize=(13.0 if len(spans) > 1 else 9.0, 7.5), layout="constrained")
+        FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
+        axes = figure.subplots(3, len(spans), sharex="col", sharey="row", squeeze=False)
+        for column, span_s in zip(axes.T, spans, strict=True):
+            _draw_column(column, curves, span_s)
+        if len(spans) > 1:
+            unit_s, _ = _time_unit(whole)
+            for axis in axes[:, 0]:
+                axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color="#F0E442", alpha=0.35, lw=0)
+            axes[0, 0].set_title("Whole run", loc="left", fontsize=10)
+            axes[0, 1].set_title("Around the largest roll", loc="left", fontsize=10)
+        for axis, label in zip(axes[:, 0], _LABELS, strict=True):
+            axis.set_ylabel(label)
+        figure.align_ylabels()
+        figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
+        handles = axes[0, -1].get_lines()[: len(curves)]
+        figure.legend(
+            handles, _legend(curves), loc="outside lower left", ncols=len(curves), frameon=False
+        )
+        figure.savefig(path, dpi=130)
+    return path
+
+
+def _worst_span(reference: BenchCurve, whole: tuple[float, float]) -> tuple[float, float]:
+    """Return `ZOOM_S` around the largest roll, or all of a run that is not much longer."""
+    if whole[1] - whole[0] < 2 * ZOOM_S:
+        return whole
+    worst_s = float(reference.time_s[np.argmax(np.abs(reference.roll_rad))])
+    start_s = min(max(worst_s - ZOOM_S / 2, whole[0]), whole[1] - ZOOM_S)
+    return start_s, start_s + ZOOM_S
+
+
+def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
+    """Return the length in seconds, and the name, of the unit a time axis is labelled in."""
+    return (60.0, "min") if span_s[1] - span_s[0] > 600.0 else (1.0, "s")
+
+
+def _draw_column(
+    axes: "Sequence[Axes]", curves: Sequence[BenchCurve], span_s: tuple[float, float]
+) -> None:
+    """Draw roll, level and pressure over one span of time."""
+    unit_s, unit = _time_unit(span_s)
+    width = 0.5 if unit_s > 1 else 1.4
+    for curve, color in zip(curves, _COLORS, strict=False):
+        shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
+        time = curve.time_s[shown] / unit_s
+        values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
+        for axis, value in zip(axes, values, strict=True):
+            axis.plot(time, value[shown], color=color, linewidth=width)
+    axes[-1].set_xlim(span_s[0] / unit_s, span_s[1] / unit_s)
+    axes[-1].set_xlabel(f"Time ({unit})")
+
+
+def _legend(curves: Sequence[BenchCurve]) -> list[str]:
+    """Name each curve, with its RMS roll and what that is against the first."""
+    rms = [float(np.rad2deg(np.sqrt(np.mean(curve.roll_rad**2)))) for curve in curves]
+    names: list[str] = []
+    for curve, value in zip(curves, rms, strict=True):
+        change = f" ({value / rms[0] - 1:+.0%})".replace("-", "−") if names and rms[0] else ""
+        names.append(f"{curve.name}: roll {value:.2f}° RMS{change}")
+    return names

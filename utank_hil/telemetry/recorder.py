@@ -1,0 +1,231 @@
+"""The recorder: a process that takes rows from a ring to a Rerun file and to live viewers.
+
+`RecorderProcess` starts it from a bench or from the deployed controller; `python -m
+utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
+is closed, when the ring's writer dies, or on SIGINT or SIGTERM, with all rows written. The
+controller never waits for it: what it cannot take in time is overwritten, and counted here.
+"""
+
+import argparse
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, Self
+
+from utank_hil.telemetry.ring import RingError, RingReader
+from utank_hil.telemetry.viewer import LOOPBACK, free_port, live_url, rerun_environment
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+BATCH_S: Final = 0.5  # every batch costs the file 1 kB; a kill loses up to two
+LIVE_RUN: Final = "live"
+_LIVE_MEMORY: Final = "64MiB"  # what a viewer that connects late can still see; bounds the memory
+_START_TIMEOUT_S: Final = 30.0
+_STOP_TIMEOUT_S: Final = 30.0
+_FLUSH_TIMEOUT_S: Final = 5.0
+_NICENESS: Final = 5
+
+
+class RecorderError(RuntimeError):
+    """The recorder process did not start, or ended badly."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderReport:
+    """What a recorder did.
+
+    Attributes
+    ----------
+    rows : int
+        Rows recorded.
+    lost : int
+        Rows the ring overwrote before they were read.
+    """
+
+    rows: int
+    lost: int
+
+
+def record(ring: str, file: Path, live_port: int | None = None) -> RecorderReport:
+    """Record a ring until it ends or SIGINT or SIGTERM comes; the work of the recorder process.
+
+    Parameters
+    ----------
+    ring : str
+        Name of the ring.
+    file : Path
+        The `.rrd` file; written anew.
+    live_port : int, optional
+        Serve viewers on this loopback port as well.
+
+    Raises
+    ------
+    RingError
+        If there is no such ring.
+    RuntimeError
+        If the file can't be written, be it from the start or because the disk is full.
+    """
+    import rerun as rr
+
+    from utank_hil.telemetry.blueprint import make_blueprint
+    from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths
+
+    stop = _stop_pipe()
+    with RingReader(ring) as reader:
+        sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(file)]
+        if live_port is not None:
+            sinks.append(rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY))
+        recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
+        recording.set_sinks(*sinks, default_blueprint=make_blueprint(reader.columns, [LIVE_RUN]))
+        log = RunLog(recording, run_paths([LIVE_RUN])[0], reader.columns)
+        _say({"ready": 1})
+        recorded = noted = 0
+        while True:
+            last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
+            rows = reader.read()
+            if reader.lost > noted:
+                log.note(f"{reader.lost - noted} rows lost: the recorder was too slow")
+                noted = reader.lost
+            if len(rows):
+                log.write(rows)
+                _flush(recording)  # into the file, so that a kill finds it there
+                recorded += len(rows)
+            if last:
+                break
+        _flush(recording)
+        recording.disconnect()
+        return RecorderReport(recorded, reader.lost)
+
+
+class RecorderProcess:
+    """A recorder in a process of its own; ready when the constructor returns.
+
+    Start it before the loop: it takes about a second, most of it Rerun's import. It runs in a
+    session of its own, so Ctrl-C in the terminal does not end it before the loop's last rows.
+
+    Parameters
+    ----------
+    ring : str
+        Name of the ring.
+    file : Path
+        The `.rrd` file; written anew.
+    live : bool
+        Serve viewers on a free loopback port.
+
+    Attributes
+    ----------
+    url : str or None
+        Where viewers find the live stream.
+
+    Raises
+    ------
+    RecorderError
+        If the recorder does not come up; its own message is on standard error.
+    """
+
+    def __init__(self, ring: str, file: Path, live: bool = False) -> None:
+        command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
+        self.url: str | None = None
+        if live:
+            port = free_port()
+            command += ["--live-port", str(port)]
+            self.url = live_url(port)
+        self._report: RecorderReport | None = None
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            env=rerun_environment(),
+            start_new_session=True,
+            text=True,
+        )
+        output = self._process.stdout
+        assert output is not None
+        ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
+        self._output = output
+        if not (ready and output.readline()):
+            self._kill()
+            raise RecorderError(f"the recorder of {file} did not start")
+
+    def stop(self) -> RecorderReport:
+        """Have the last rows written and wait for the end of the process; idempotent.
+
+        Raises
+        ------
+        RecorderError
+            If the process failed, or does not end; its own message is on standard error.
+        """
+        if self._report is None:
+            self._process.terminate()
+            try:
+                code = self._process.wait(_STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                self._kill()
+                raise RecorderError("the recorder did not end and was killed") from None
+            with self._output:
+                if code != 0:
+                    raise RecorderError(f"the recorder failed, exit code {code}")
+                self._report = RecorderReport(**json.loads(self._output.readline()))
+        return self._report
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._output.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+
+def _main() -> None:
+    parser = argparse.ArgumentParser(description="Record a telemetry ring into a Rerun file.")
+    parser.add_argument("--ring", required=True, metavar="NAME")
+    parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
+    parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
+    arguments = parser.parse_args()
+    os.environ.update(rerun_environment())
+    os.nice(_NICENESS)
+    try:
+        _say(asdict(record(arguments.ring, arguments.file, arguments.live_port)))
+    except (RingError, RuntimeError) as error:
+        print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
+        os._exit(1)  # Rerun's exit hook would wait for ever for a writer that is gone
+
+
+def _flush(recording: "rr.RecordingStream") -> None:
+    """Wait for the writer; with no limit to that, it would be for ever when the disk is full."""
+    recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+
+
+def _stop_pipe() -> int:
+    """Return a descriptor that becomes readable when SIGINT or SIGTERM arrives."""
+    readable, written = os.pipe()
+    os.set_blocking(written, False)
+    signal.set_wakeup_fd(written)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: None)  # the pipe tells
+    return readable
+
+
+def _say(message: dict[str, int]) -> None:
+    """Tell the parent, one JSON object a line."""
+    print(json.dumps(message), flush=True)
+
+
+if __name__ == "__main__":
+    _main()

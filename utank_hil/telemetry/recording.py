@@ -1,0 +1,126 @@
+"""Whole recordings: written at once after a lockstep bench, and read back."""
+
+import subprocess
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import rerun as rr
+from rerun.chunk import Chunk, RrdReader
+from rerun.error_utils import RerunWarning
+
+from utank_hil.arrays import FloatArray
+from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.rerun_log import (
+    APPLICATION,
+    ARCHETYPE,
+    COMPONENT,
+    TIME_COLUMN,
+    TIMELINE,
+    RunLog,
+    run_of,
+    run_paths,
+    time_index,
+)
+from utank_hil.telemetry.units import column_of
+from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
+
+_ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
+_BLOCK_ROWS: Final = 8192  # the viewer loads a file by such blocks
+
+
+def write_recording(path: Path, columns: Sequence[str], runs: Mapping[str, FloatArray]) -> None:
+    """Write runs side by side on one time line into a recording, with its blueprint.
+
+    Parameters
+    ----------
+    path : Path
+        The `.rrd` file; written anew.
+    columns : sequence of str
+        Names of the values of a row, SI units, `time_s` among them.
+    runs : mapping of str to array (n, len(columns))
+        Rows of each run by its name; the first is taken for the one to compare with.
+
+    Raises
+    ------
+    ValueError
+        If there is no run, a table is empty or does not fit the columns, `time_s` is missing, or a
+        column is not in SI units.
+    RuntimeError
+        If the file can't be written.
+    """
+    if not runs:
+        raise ValueError("a recording needs at least one run")
+    for run, rows in runs.items():
+        if rows.ndim != 2 or rows.shape[1] != len(columns):
+            raise ValueError(f"run {run!r}: {rows.shape} is not (n, {len(columns)}), the columns")
+        if len(rows) == 0:
+            raise ValueError(f"run {run!r} has no rows")
+    time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
+    blueprint = make_blueprint(columns, list(runs), span_s=(time_s.min(), time_s.max()))
+    recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
+    recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
+    for path_of_run, rows in zip(run_paths(list(runs)), runs.values(), strict=True):
+        log = RunLog(recording, path_of_run, columns)
+        for start in range(0, len(rows), _BLOCK_ROWS):
+            log.write(rows[start : start + _BLOCK_ROWS])
+    recording.flush()
+    recording.disconnect()
+
+
+def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
+    """Read the runs of a recording, live ones and ones that were cut off included.
+
+    Returns
+    -------
+    dict
+        Columns by run and name, in SI units, each an array (n,); `time_s` to the nanosecond,
+        the others to the rounding of their change of unit.
+
+    Raises
+    ------
+    ValueError
+        If the file is no recording, or holds no telemetry.
+    """
+    blocks: dict[str, list[dict[str, FloatArray]]] = {}
+    for chunk in _telemetry_chunks(path):
+        batch = chunk.to_record_batch()
+        row = batch.column(_ROWS).flatten()
+        block = {TIME_COLUMN: batch.column(TIMELINE).to_numpy().astype(np.int64) / 1e9}
+        for field in row.type:
+            column, unit = column_of(field.name)
+            block[column] = row.field(field.name).to_numpy() / unit.scale
+        blocks.setdefault(run_of(chunk.entity_path), []).append(block)
+    if not blocks:
+        raise ValueError(f"{path}: no telemetry in this recording")
+    return {
+        run: {column: np.concatenate([b[column] for b in parts]) for column in parts[0]}
+        for run, parts in blocks.items()
+    }
+
+
+def _telemetry_chunks(path: Path) -> list[Chunk]:
+    """Return the chunks that hold rows; a file cut off within a message is mended on the way."""
+    try:
+        return _read_chunks(path)
+    except RuntimeError as error:
+        if "exceeds file size" not in str(error):
+            raise ValueError(f"{path}: {error}") from error
+    with tempfile.TemporaryDirectory() as folder:
+        mended = Path(folder) / path.name
+        command = [rerun_binary(), "rrd", "optimize", str(path), "-o", str(mended)]
+        subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
+        return _read_chunks(mended)
+
+
+def _read_chunks(path: Path) -> list[Chunk]:
+    with warnings.catch_warnings():
+        # what a killed recorder leaves behind; the rows are there
+        warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)
+        reader = RrdReader(path)
+    if not reader.recordings():
+        return []
+    return reader.stream().filter(components=_ROWS).to_chunks()

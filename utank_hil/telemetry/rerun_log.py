@@ -1,0 +1,140 @@
+"""Telemetry rows into a Rerun recording.
+
+A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
+One entity instead of one a signal makes the file two to three times smaller at a live recorder's
+batch size, and the names in the file say what is in it. Mode and fault are logged once more as
+text, on change only, for the state lane.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa  # it ships no annotations
+import rerun as rr
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.telemetry.units import field_of
+
+APPLICATION: Final = "utank-hil"
+TIME_COLUMN: Final = "time_s"
+TIMELINE: Final = "time"
+ARCHETYPE: Final = "telemetry"
+COMPONENT: Final = "row"
+
+STATE_COLUMNS: Final = ("mode", "fault")
+"""Columns that together are the state lane of a run."""
+
+_ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
+
+_MODE_COLORS: Final = {
+    Mode.INIT: 0x777777FF,
+    Mode.STANDBY: 0x999999FF,
+    Mode.PASSIVE: 0x0072B2FF,
+    Mode.ACTIVE: 0x009E73FF,
+    Mode.FAULT: 0xD55E00FF,
+}
+
+
+def _state_name(mode: float, fault: float) -> str:
+    """Name a state, such as `ACTIVE` or `FAULT: DRIVE_SILENT`; unknown values as numbers."""
+    name = Mode(int(mode)).name if mode in set(Mode) else f"mode {mode:g}"
+    if fault == Fault.NONE:
+        return name
+    return f"{name}: {Fault(int(fault)).name if fault in set(Fault) else f'fault {fault:g}'}"
+
+
+class RunLog:
+    """Writes the rows of one run.
+
+    Parameters
+    ----------
+    recording : rerun.RecordingStream
+        Where the rows go.
+    path : str
+        Entity of the run, from `run_paths`.
+    columns : sequence of str
+        Names of a row's values; `time_s` must be among them.
+
+    Raises
+    ------
+    ValueError
+        If there is no `time_s`, or a column is not in SI units.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, path: str, columns: Sequence[str]) -> None:
+        self._recording = recording
+        self._path = path
+        self._time = time_index(columns)
+        self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
+        self._state: list[int] = []
+        self._last = np.full(2, np.nan)
+        if has_state(columns):
+            self._state = [columns.index(c) for c in STATE_COLUMNS]
+            colors = {_state_name(m, f): _MODE_COLORS[m] for m in Mode for f in Fault}
+            style = rr.StateConfiguration(values=list(colors), colors=list(colors.values()))
+            recording.log(state_path(path), style, static=True, strict=True)
+
+    def write(self, rows: FloatArray) -> None:
+        """Append rows, an array (n, width); NaN is kept and leaves a gap in the plot."""
+        time_ns = np.rint(rows[:, self._time] * 1e9).astype("timedelta64[ns]")
+        row = pa.StructArray.from_arrays(
+            [pa.array(rows[:, i] * field.unit.scale) for i, field in self._fields],
+            names=[field.name for _, field in self._fields],
+        )
+        self._recording.send_columns(
+            self._path,
+            [rr.TimeColumn(TIMELINE, duration=time_ns)],
+            rr.DynamicArchetype.columns(archetype=ARCHETYPE, components={COMPONENT: row}),
+            strict=True,
+        )
+        if self._state:
+            self._write_state(time_ns, rows[:, self._state])
+
+    def _write_state(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
+        """Log the state's name wherever mode or fault changes."""
+        before = np.vstack([self._last, states[:-1]])
+        changed = (states != before).any(axis=1)
+        self._last = states[-1].copy()
+        if changed.any():
+            self._recording.send_columns(
+                state_path(self._path),
+                [rr.TimeColumn(TIMELINE, duration=time_ns[changed])],
+                rr.StateChange.columns(state=[_state_name(*state) for state in states[changed]]),
+                strict=True,
+            )
+
+    def note(self, text: str) -> None:
+        """Log a warning about the recording itself."""
+        self._recording.log(f"{self._path}/log", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+
+
+def time_index(columns: Sequence[str]) -> int:
+    """Return the place of the time among the columns, which must be there (else ValueError)."""
+    if TIME_COLUMN not in columns:
+        raise ValueError(f"telemetry needs a column {TIME_COLUMN!r}, got {tuple(columns)}")
+    return columns.index(TIME_COLUMN)
+
+
+def has_state(columns: Sequence[str]) -> bool:
+    """Tell whether rows of these columns have a state lane."""
+    return set(STATE_COLUMNS) <= set(columns)
+
+
+def run_paths(runs: Sequence[str]) -> list[str]:
+    """Return the entity of each run; numbered, because the viewer draws them in order of path."""
+    return [f"/{i}/{rr.escape_entity_path_part(run)}" for i, run in enumerate(runs, start=1)]
+
+
+def run_of(path: str) -> str:
+    """Return the name of the run whose entity this is."""
+    escaped = path.split("/", 2)[2]
+    return _ESCAPE.sub(lambda m: chr(int(m["code"], 16)) if m["code"] else m["mark"], escaped)
+
+
+def state_path(path: str) -> str:
+    """Return the entity of a run's state lane."""
+    return f"{path}/state"

@@ -1,0 +1,105 @@
+"""Opens the Rerun viewer on a recording or on a live stream, on this machine only."""
+
+import importlib.util
+import os
+import socket
+import subprocess
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+from urllib.parse import quote
+
+LOOPBACK: Final = "127.0.0.1"  # Rerun's own default is every interface
+
+
+class Viewer:
+    """A running viewer; `open_viewer` makes one.
+
+    Attributes
+    ----------
+    url : str or None
+        Where a browser finds the viewer; None if it has a window of its own.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], url: str | None) -> None:
+        self._process = process
+        self.url = url
+
+    def wait(self) -> None:
+        """Wait until the user closes the window; for ever if the viewer is in a browser."""
+        self._process.wait()
+
+    def close(self) -> None:
+        """End the viewer; idempotent."""
+        self._process.terminate()
+        self._process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def open_viewer(source: Path | str) -> Viewer:
+    """Show a recording, or a live stream, in a window or else in the browser.
+
+    Where there is no display the viewer is served on loopback, and `Viewer.url` is to be opened
+    in a browser of this machine (or through an ssh tunnel).
+
+    Parameters
+    ----------
+    source : Path or str
+        A file, or the `url` of a `RecorderProcess`.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    """
+    if isinstance(source, Path) and not source.is_file():
+        raise FileNotFoundError(f"no recording {source}")
+    command = [rerun_binary(), "--bind", LOOPBACK]
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        command += ["--port", "auto"]
+        url = None
+    else:
+        data_port, page_port = free_port(), free_port()
+        command += ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
+        data = live_url(data_port) if isinstance(source, Path) else source
+        url = f"http://{LOOPBACK}:{page_port}?url={quote(data, safe='')}"
+    process = subprocess.Popen(
+        [*command, str(source)], env=rerun_environment(), stdin=subprocess.DEVNULL
+    )
+    return Viewer(process, url)
+
+
+def rerun_binary() -> str:
+    """Return the viewer's executable itself: the `rerun` script would leave it behind if killed."""
+    package = importlib.util.find_spec("rerun_cli")
+    assert package is not None
+    assert package.origin is not None
+    return str(Path(package.origin).with_name("rerun"))
+
+
+def rerun_environment() -> dict[str, str]:
+    """Return an environment in which Rerun does not call home, and reports warnings only."""
+    return os.environ | {"CI": "1", "RUST_LOG": "warn"}
+
+
+def live_url(port: int) -> str:
+    """Return where viewers find what a process of this machine serves on a port."""
+    return f"rerun+http://{LOOPBACK}:{port}/proxy"
+
+
+def free_port() -> int:
+    """Return a port of the loopback interface that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
