@@ -1,0 +1,1 @@
+"""Analysis: margins, frequency responses, figures of a run."""

@@ -81,9 +81,7 @@ def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
     inverse = np.linalg.inv(mass)
     effort = np.array([[0.0, 1.0], [tank.reservoir_area_m2, 0.0]])
     # first order in q and q', then sorted into (phi, phi', h, h')
-    a = np.block(
-        [[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]]
-    )
+    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
     b = np.vstack([np.zeros((2, 2)), inverse @ effort])
     order = [0, 2, 1, 3]
     return ss(

@@ -1,4 +1,4 @@
-"""The ship in roll: inertia, damping and restoring."""
+"""The ship in roll: inertia, damping, restoring, and what heels it."""
 
 import math
 from dataclasses import dataclass
@@ -8,34 +8,77 @@ from dataclasses import dataclass
 class RollShip:
     """A ship that only rolls, without its tank water.
 
+    The restoring moment is ``k1 phi + k3 phi^3 + k5 phi^5 + ...`` or, if `gz_m` is given, the
+    displacement times a spline through the righting levers. The linear models use inertia,
+    stiffness and linear damping alone.
+
     Parameters
     ----------
     inertia_kg_m2 : float
         Roll inertia I about the centre of gravity, added inertia included.
     stiffness_nm_rad : float
-        Hydrostatic restoring moment k1 per roll angle.
+        Hydrostatic restoring moment k1 per roll angle at zero heel: displacement times GM.
     damping_nms_rad : float
-        Linear roll damping d1.
+        Linear roll damping d1, thesis b44.
+    quadratic_damping_nms2_rad2 : float
+        Damping moment per ``|roll rate| roll rate``, thesis b44q.
+    restoring_odd_nm : tuple of float
+        Higher coefficients (k3, k5, ...) of the restoring polynomial, N m per rad^3, rad^5, ...
+    displacement_n : float
+        Weight that the righting levers are multiplied with; needed with `gz_m` only.
+    gz_step_rad : float
+        Spacing of the heel angles of `gz_m`.
+    gz_m : tuple of float
+        Righting levers at heel 0, `gz_step_rad`, 2 `gz_step_rad`, ...; the first is 0.
+    offset_moment_nm : float
+        Moment of off-centre weight in the upright ship; it heels with the cosine of the roll angle.
+    wind_moment_nm : float
+        Steady wind moment, the same at every angle.
 
     Raises
     ------
     ValueError
-        If inertia or stiffness is not positive, or the damping is negative.
+        If inertia or stiffness is not positive, a damping is negative, a number is not finite, or
+        the table of levers is incomplete or given beside a polynomial.
     """
 
     inertia_kg_m2: float
     stiffness_nm_rad: float
     damping_nms_rad: float = 0.0
+    quadratic_damping_nms2_rad2: float = 0.0
+    restoring_odd_nm: tuple[float, ...] = ()
+    displacement_n: float = 0.0
+    gz_step_rad: float = 0.0
+    gz_m: tuple[float, ...] = ()
+    offset_moment_nm: float = 0.0
+    wind_moment_nm: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("inertia_kg_m2", "stiffness_nm_rad"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"ship {name} must be positive and finite, got {value}")
-        if not (math.isfinite(self.damping_nms_rad) and self.damping_nms_rad >= 0):
-            raise ValueError(
-                f"ship damping_nms_rad must be zero or more, got {self.damping_nms_rad}"
-            )
+        for name in ("damping_nms_rad", "quadratic_damping_nms2_rad2"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"ship {name} must be zero or more and finite, got {value}")
+        for name in ("offset_moment_nm", "wind_moment_nm"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"ship {name} must be finite, got {getattr(self, name)}")
+        if not all(map(math.isfinite, (*self.restoring_odd_nm, *self.gz_m))):
+            raise ValueError("ship restoring_odd_nm and gz_m must hold finite numbers only")
+        if self.gz_m:
+            self._check_levers()
+
+    def _check_levers(self) -> None:
+        if self.restoring_odd_nm:
+            raise ValueError("ship gz_m and restoring_odd_nm exclude each other: remove one")
+        if len(self.gz_m) < 4 or self.gz_m[0] != 0:
+            raise ValueError("ship gz_m needs at least 4 levers, the first of them 0 at zero heel")
+        for name in ("displacement_n", "gz_step_rad"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"ship {name} must be positive to go with gz_m, got {value}")
 
     @property
     def natural_frequency_rad_s(self) -> float:

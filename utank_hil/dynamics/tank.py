@@ -35,12 +35,17 @@ class Tank:
     damping_ratio : float
         Linear loss as the damping ratio of the tank's free oscillation in a ship held still.
     quadratic_loss : float
-        Dimensionless coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the duct speed.
+        Coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the speed in the duct.
+    headroom_m : float
+        Height of the reservoirs' roof above the still level.
+    restitution : float
+        Ratio of the level's speeds after and before it strikes a limit: 0 plastic, 1 elastic.
 
     Raises
     ------
     ValueError
-        If a length, area or density is not positive, or a loss is negative.
+        If a length, area or density is not positive, a loss is negative, or the restitution lies
+        outside 0 to 1.
     """
 
     width_m: float
@@ -52,6 +57,8 @@ class Tank:
     density_kg_m3: float = 1000.0
     damping_ratio: float = 0.0
     quadratic_loss: float = 0.0
+    headroom_m: float = math.inf
+    restitution: float = 0.0
 
     def __post_init__(self) -> None:
         for name in (
@@ -68,6 +75,13 @@ class Tank:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"tank {name} must be zero or more and finite, got {value}")
+        for name in ("lx_m", "lz_m"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"tank {name} must be finite, got {getattr(self, name)}")
+        if not self.headroom_m > 0:
+            raise ValueError(f"tank headroom_m must be positive, got {self.headroom_m}")
+        if not 0 <= self.restitution <= 1:
+            raise ValueError(f"tank restitution must lie in 0 to 1, got {self.restitution}")
 
     @property
     def effective_length_m(self) -> float:
@@ -84,3 +98,14 @@ class Tank:
         """Linear pressure loss per reservoir speed dh/dt that gives `damping_ratio`."""
         inertia = self.density_kg_m3 * self.effective_length_m
         return 2 * self.damping_ratio * self.natural_frequency_rad_s * inertia
+
+    @property
+    def quadratic_loss_pa_per_m2_s2(self) -> float:
+        """Quadratic pressure loss per ``|dh/dt| dh/dt``, from `quadratic_loss`."""
+        area_ratio = self.reservoir_area_m2 / self.duct_area_m2
+        return self.quadratic_loss * self.density_kg_m3 / 2 * area_ratio**2
+
+    @property
+    def level_limit_m(self) -> float:
+        """Level at which one reservoir is full or the other one empty, whichever comes first."""
+        return min(self.headroom_m, self.height_m)

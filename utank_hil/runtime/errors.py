@@ -19,3 +19,8 @@ class NodeError(RuntimeError):
         )
         self.node_name = node_name
         self.time_ns = time_ns
+        self._arguments = node_name, method, time_ns, cause
+
+    def __reduce__(self) -> tuple[type["NodeError"], tuple[str, str, int, Exception]]:
+        # benches run in processes of their own, and the error has to come back from there
+        return NodeError, self._arguments

@@ -1,18 +1,6 @@
 """The columns of one telemetry row: what the controller node shows of itself every tick."""
 
-from enum import IntEnum
 from typing import Final
-
-
-class Mode(IntEnum):
-    """Mode of the controller, as CTRL_STATUS carries it."""
-
-    INIT = 0
-    STANDBY = 1
-    PASSIVE = 2
-    ACTIVE = 3
-    FAULT = 4
-
 
 SIGNALS: Final = (
     "time_s",

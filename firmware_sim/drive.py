@@ -1,0 +1,196 @@
+"""The pump drive: takes pressure commands, judges them on its own, and runs the pump.
+
+The drive is the last line: it goes to zero pressure when commands stop (by the timeout that came
+with the last one), and refuses a command outside its own limits, whatever the controller thinks.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+
+from firmware_sim.drive_states import DriveStates
+from firmware_sim.plant import Plant
+from utank_hil.canbus import (
+    Address,
+    Catalogue,
+    DriveFault,
+    DriveState,
+    DriveStatus1,
+    DriveStatus2,
+    Frame,
+    NodeState,
+    PumpCommand,
+)
+from utank_hil.runtime.housekeeping import Housekeeping
+
+NANOSECONDS = 1e-9
+MISCODED_COMMANDS_TO_TRIP = 5
+# half a step of the set-point on the bus: a command at the limit may have been rounded up by it
+ROUNDING_PA = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLimits:
+    """What the drive takes from a command, set in the drive and not by the controller.
+
+    Attributes
+    ----------
+    pressure_pa : float
+        Largest set-point to either side.
+    pressure_rate_pa_s : float
+        Largest change of the set-point away from zero.
+    longest_timeout_ms : float
+        Longest command timeout the drive agrees to.
+    bus_voltage_v : float
+        Direct-current bus the drive feeds from.
+
+    Raises
+    ------
+    ValueError
+        If a limit is not positive.
+    """
+
+    pressure_pa: float = 50e3
+    pressure_rate_pa_s: float = 250e3
+    longest_timeout_ms: float = 100.0
+    bus_voltage_v: float = 1000.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not getattr(self, field.name) > 0:
+                raise ValueError(f"drive {field.name} must be positive")
+
+
+class PumpDrive:
+    """Pump drive with CiA 402 states.
+
+    Parameters
+    ----------
+    plant : Plant
+        Whose pump to drive.
+    limits : DriveLimits
+    catalogue : Catalogue
+    configuration_version : int
+        Sent in the heartbeat, for the controller to compare with its own.
+
+    Attributes
+    ----------
+    refused : int
+        Commands outside the drive's limits so far.
+    """
+
+    name = "drive"
+    period_ns = 10_000_000
+
+    def __init__(
+        self,
+        plant: Plant,
+        limits: DriveLimits,
+        catalogue: Catalogue,
+        *,
+        configuration_version: int,
+    ) -> None:
+        self._plant = plant
+        self._limits = limits
+        self._states = DriveStates()
+        self._commands = catalogue.receiver(PumpCommand)
+        self._status_1 = catalogue.transmitter(DriveStatus1)
+        self._status_2 = catalogue.transmitter(DriveStatus2)
+        self._housekeeping = Housekeeping(Address.DRIVE, catalogue, configuration_version)
+        self._accepted_ns = 0
+        self._timeout_ns = 0
+        self._echo: int | None = None
+        self._setpoint_pa = 0.0
+        self._refused_in_a_row = 0
+        self._shown_state = self._states.state
+        self._ticks = 0
+        self.refused = 0
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a command if it is intact and inside the drive's own limits."""
+        if frame.can_id != self._commands.can_id:
+            return
+        command = self._commands.accept(frame)
+        if command is None:
+            return
+        if not self._permitted(command, now_ns):
+            self.refused += 1
+            self._refused_in_a_row += 1
+            if self._refused_in_a_row >= MISCODED_COMMANDS_TO_TRIP:
+                self._states.trip(DriveFault.COMMAND_REFUSED)
+            return
+        self._refused_in_a_row = 0
+        self._accepted_ns = now_ns
+        self._timeout_ns = round(command.timeout_s / NANOSECONDS)
+        self._echo = self._commands.counter
+        self._states.command(command.control_word)
+        enabled = self._states.state is DriveState.OPERATION_ENABLED
+        self._setpoint_pa = command.pressure_pa if enabled else 0.0
+
+    def _permitted(self, command: PumpCommand, now_ns: int) -> bool:
+        limits, pressure_pa = self._limits, command.pressure_pa
+        if not abs(pressure_pa) <= limits.pressure_pa + ROUNDING_PA:  # not available is NaN and fails too
+            return False
+        if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
+            return False
+        toward_zero = abs(pressure_pa) <= abs(self._setpoint_pa) and (
+            pressure_pa * self._setpoint_pa >= 0.0
+        )
+        # a tick of grace: frames come with jitter, the set-point only every cycle
+        elapsed_s = (now_ns - self._accepted_ns + self.period_ns) * NANOSECONDS
+        step_pa = abs(pressure_pa - self._setpoint_pa)
+        return toward_zero or step_pa <= limits.pressure_rate_pa_s * elapsed_s
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Watch over the commands, drive the pump, report."""
+        states, plant = self._states, self._plant
+        states.tick()
+        enabled = states.state is DriveState.OPERATION_ENABLED
+        if enabled and now_ns - self._accepted_ns > self._timeout_ns:
+            states.trip(DriveFault.COMMAND_TIMEOUT)
+            enabled = False
+        if not enabled:
+            self._setpoint_pa = 0.0
+        plant.advance(now_ns)
+        plant.drive_pump(self._setpoint_pa, enabled=enabled)
+        frames = []
+        if self._ticks % 2 == 0 or states.state is not self._shown_state:
+            frames.append(self._status_1_frame())
+            self._shown_state = states.state
+        if self._ticks % 10 == 0:
+            frames.append(self._status_2_frame())
+        faulted = states.fault is not DriveFault.NONE
+        frames.extend(
+            self._housekeeping.frames(now_ns, NodeState.FAULT if faulted else NodeState.OPERATIONAL)
+        )
+        self._ticks += 1
+        return frames
+
+    def _status_1_frame(self) -> Frame:
+        plant = self._plant
+        return self._status_1.frame(
+            DriveStatus1(
+                pressure_pa=plant.pressure_pa,
+                speed_rad_s=plant.pump_speed_rad_s,
+                state=self._states.state,
+                command_echo=self._echo,
+                pressure_limited=plant.pressure_limited,
+                speed_limited=plant.speed_limited,
+                rate_limited=plant.rate_limited,
+                power_limited=plant.power_limited,
+            )
+        )
+
+    def _status_2_frame(self) -> Frame:
+        return self._status_2.frame(
+            DriveStatus2(
+                fault=self._states.fault,
+                bus_voltage_v=self._limits.bus_voltage_v,
+                current_a=self._plant.pump_power_w / self._limits.bus_voltage_v,
+                motor_temperature_c=float("nan"),
+                drive_temperature_c=float("nan"),
+                temperature_warning=False,
+                voltage_warning=False,
+                command_warning=self._refused_in_a_row > 0,
+                sensor_warning=False,
+            )
+        )

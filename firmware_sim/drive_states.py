@@ -1,0 +1,67 @@
+"""The CiA 402 state machine of a drive (IEC 61800-7-201), as far as a pump drive needs it."""
+
+from utank_hil.canbus import ControlWord, DriveFault, DriveState
+
+_S, _C = DriveState, ControlWord
+
+# state -> control word -> next state; what is not listed changes nothing
+_TRANSITIONS: dict[DriveState, dict[ControlWord, DriveState]] = {
+    _S.SWITCH_ON_DISABLED: {_C.SHUTDOWN: _S.READY_TO_SWITCH_ON},
+    _S.READY_TO_SWITCH_ON: {
+        _C.SWITCH_ON: _S.SWITCHED_ON,
+        _C.QUICK_STOP: _S.SWITCH_ON_DISABLED,
+        _C.DISABLE_VOLTAGE: _S.SWITCH_ON_DISABLED,
+    },
+    _S.SWITCHED_ON: {
+        _C.ENABLE_OPERATION: _S.OPERATION_ENABLED,
+        _C.SHUTDOWN: _S.READY_TO_SWITCH_ON,
+        _C.QUICK_STOP: _S.SWITCH_ON_DISABLED,
+        _C.DISABLE_VOLTAGE: _S.SWITCH_ON_DISABLED,
+    },
+    _S.OPERATION_ENABLED: {
+        _C.SWITCH_ON: _S.SWITCHED_ON,
+        _C.SHUTDOWN: _S.READY_TO_SWITCH_ON,
+        _C.QUICK_STOP: _S.QUICK_STOP_ACTIVE,
+        _C.DISABLE_VOLTAGE: _S.SWITCH_ON_DISABLED,
+    },
+    _S.QUICK_STOP_ACTIVE: {_C.DISABLE_VOLTAGE: _S.SWITCH_ON_DISABLED},
+}
+
+
+class DriveStates:
+    """State and fault of the drive.
+
+    Attributes
+    ----------
+    state : DriveState
+    fault : DriveFault
+        Why the drive is in FAULT; NONE otherwise.
+    """
+
+    def __init__(self) -> None:
+        self.state = DriveState.NOT_READY_TO_SWITCH_ON
+        self.fault = DriveFault.NONE
+        self._word: ControlWord | None = None
+
+    def tick(self) -> None:
+        """Take the transitions that need no command: self-test, stop and fault reaction done."""
+        if self.state is _S.NOT_READY_TO_SWITCH_ON or self.state is _S.QUICK_STOP_ACTIVE:
+            self.state = _S.SWITCH_ON_DISABLED
+        elif self.state is _S.FAULT_REACTION_ACTIVE:
+            self.state = _S.FAULT
+
+    def command(self, word: ControlWord | None) -> None:
+        """Follow a control word; None, an unknown word, disables the voltage."""
+        word = _C.DISABLE_VOLTAGE if word is None else word
+        rising = word is not self._word
+        self._word = word
+        if self.state is _S.FAULT:
+            if word is _C.FAULT_RESET and rising:
+                self.state, self.fault = _S.SWITCH_ON_DISABLED, DriveFault.NONE
+            return
+        self.state = _TRANSITIONS.get(self.state, {}).get(word, self.state)
+
+    def trip(self, fault: DriveFault) -> None:
+        """Go to fault, by way of its reaction; the first fault stays."""
+        if self.fault is DriveFault.NONE:
+            self.state, self.fault = _S.FAULT_REACTION_ACTIVE, fault

@@ -1,0 +1,234 @@
+"""One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from firmware_sim.assembly import ShipSide, build_ship_side
+from firmware_sim.scenario import Scenario
+from firmware_sim.truth import TRUTH, TruthRecorder
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import SocketCanPort
+from utank_hil.config import ControllerConfig
+from utank_hil.runtime import (
+    Lockstep,
+    LoopStatistics,
+    Node,
+    RealTimeLoop,
+    SchedulingReport,
+    SimulatedBus,
+    real_time_scheduling,
+)
+from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.runtime.controller_node import TICK_NS, ControllerNode
+from utank_hil.runtime.panel import TimedAction
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.table import Table
+
+SECOND_NS: Final = 1_000_000_000
+RECORD_TICKS: Final = 5
+"""Of the controller's ticks, every fifth is kept: 20 Hz, ample for a ship."""
+RECORD_NS: Final = RECORD_TICKS * TICK_NS
+RECORD_S: Final = RECORD_NS / SECOND_NS
+COLUMNS: Final = (*SIGNALS, *TRUTH)
+
+
+class Watch(Protocol):
+    """Looks on from outside while a run goes on."""
+
+    def stopped(self, done_s: float) -> bool:
+        """Take note of the progress; say whether the run shall end now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A run to do.
+
+    Attributes
+    ----------
+    name : str
+    scenario : Scenario
+    controller : ControllerConfig
+    script : tuple of TimedAction
+        What the operator does.
+    seed : int
+    duration_s : float
+    """
+
+    name: str
+    scenario: Scenario
+    controller: ControllerConfig
+    script: tuple[TimedAction, ...]
+    seed: int
+    duration_s: float
+
+    @property
+    def ticks(self) -> int:
+        """Ticks of the controller in the run."""
+        return round(self.duration_s * SECOND_NS / TICK_NS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopResult:
+    """How one real-time loop kept its time."""
+
+    statistics: LoopStatistics
+    scheduling: SchedulingReport
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """What one run left behind.
+
+    Attributes
+    ----------
+    name : str
+    rows : ndarray, shape (n, len(COLUMNS))
+        Controller's telemetry and the truth, every `RECORD_S`.
+    bus_load : float
+        Mean share of the bus in use.
+    refused_commands : int
+        Commands that the drive found outside its own limits.
+    energy_j : float
+        Work of the pump's shaft.
+    loop : LoopResult or None
+        Of the loop with the controller; None in simulated time.
+    """
+
+    name: str
+    rows: FloatArray
+    bus_load: float
+    refused_commands: int
+    energy_j: float
+    loop: LoopResult | None = None
+
+    def column(self, name: str) -> FloatArray:
+        """One column of `rows`, shape (n,)."""
+        return self.rows[:, COLUMNS.index(name)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShipRun:
+    """The ship's half of a run on a real bus; `start_ns` on the monotonic clock."""
+
+    rows: FloatArray
+    start_ns: int
+    refused_commands: int
+    energy_j: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControllerRun:
+    """The controller's half of a run on a real bus; `start_ns` on the monotonic clock."""
+
+    rows: FloatArray
+    start_ns: int
+    loop: LoopResult
+
+
+def run_lockstep(job: Job, watch: Watch) -> Run:
+    """Run in simulated time; the same job gives the same rows, bit for bit."""
+    ship, truth, truth_table = _ship(job)
+    controller, table = _controller(job)
+    lockstep = Lockstep(
+        [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
+    )
+    end_ns = job.ticks * TICK_NS
+    while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
+        lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+    return Run(
+        job.name,
+        _side_by_side(table.rows, truth_table.rows),
+        lockstep.bus.statistics(lockstep.now_ns).load,
+        ship.drive.refused,
+        ship.plant.pump_energy_j,
+    )
+
+
+def run_in_one_process(job: Job, watch: Watch) -> Run:
+    """Run in real time with all nodes in one loop and no bus but the loop itself."""
+    ship, truth, truth_table = _ship(job)
+    statistics = LoopStatistics()
+    controller, table = _controller(job, statistics)
+    loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
+    rows = _side_by_side(table.rows, truth_table.rows)
+    return Run(
+        job.name,
+        rows,
+        float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
+        ship.drive.refused,
+        ship.plant.pump_energy_j,
+        loop,
+    )
+
+
+def run_ship(job: Job, channel: str, watch: Watch) -> ShipRun:
+    """Run the ship's side on a SocketCAN interface."""
+    ship, truth, truth_table = _ship(job)
+    _run_loop(job, [*ship.nodes, truth], channel, LoopStatistics(), watch)
+    return ShipRun(truth_table.rows, truth.start_ns, ship.drive.refused, ship.plant.pump_energy_j)
+
+
+def run_controller(job: Job, channel: str, watch: Watch) -> ControllerRun:
+    """Run the controller's side on a SocketCAN interface."""
+    statistics = LoopStatistics()
+    controller, table = _controller(job, statistics)
+    loop = _run_loop(job, [controller], channel, statistics, watch)
+    return ControllerRun(table.rows, controller.start_ns, loop)
+
+
+def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
+    """Put the halves of a run on a real bus side by side, on the controller's time."""
+    shift = round((controller.start_ns - ship.start_ns) / RECORD_NS)
+    truth = ship.rows[max(shift, 0) :]
+    told = controller.rows[max(-shift, 0) :]
+    rows = _side_by_side(told, truth)
+    return Run(
+        name,
+        rows,
+        float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
+        ship.refused_commands,
+        ship.energy_j,
+        controller.loop,
+    )
+
+
+def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, Table]:
+    ship = build_ship_side(job.scenario, job.seed, job.script)
+    table = Table(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    return ship, TruthRecorder(ship.plant, table, RECORD_NS), table
+
+
+def _controller(job: Job, statistics: LoopStatistics | None = None) -> tuple[ControllerNode, Table]:
+    table = Table(len(SIGNALS), job.ticks, RECORD_TICKS)
+    node = build_controller_node(job.controller, statistics=statistics, sink=table.write)
+    return node, table
+
+
+def _run_loop(
+    job: Job,
+    nodes: list[Node],
+    channel: str | None,
+    statistics: LoopStatistics,
+    watch: Watch,
+) -> LoopResult:
+    port = None if channel is None else SocketCanPort(channel)
+    loop = RealTimeLoop(nodes, port, statistics=statistics)
+    tick_s = TICK_NS / SECOND_NS
+
+    def stop() -> bool:
+        return watch.stopped((statistics.ticks + statistics.skipped) * tick_s)
+
+    try:
+        with real_time_scheduling() as scheduling:
+            loop.run(stop, job.ticks * TICK_NS)
+    finally:
+        if port is not None:
+            port.close()
+    return LoopResult(statistics, scheduling)
+
+
+def _side_by_side(told: FloatArray, truth: FloatArray) -> FloatArray:
+    count = min(len(told), len(truth))
+    return np.hstack([told[:count], truth[:count]])

@@ -1,0 +1,164 @@
+"""The sensor node: motion sensor, tank level gauges, high-level switches and pump pressure."""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from firmware_sim.plant import Plant
+from utank_hil.canbus import (
+    Address,
+    Catalogue,
+    Frame,
+    Quality,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    Switch,
+)
+from utank_hil.runtime.housekeeping import Housekeeping
+
+MOTION_PERIOD_NS = 10_000_000
+NOISE_BLOCK = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class SensorErrors:
+    """What the sensors add to the truth; noise is white and Gaussian, given as standard deviation.
+
+    Attributes
+    ----------
+    roll_noise_rad, roll_rate_noise_rad_s : float
+        Noise of the motion sensor.
+    motion_delay_ms : float
+        Age of the motion sensor's sample when it is sent, a whole number of its 10 ms cycles.
+    level_noise_m : float
+        Noise of each level gauge.
+    pressure_noise_pa : float
+        Noise of the pressure sensor.
+    high_level_m : float
+        Level above still water at which a reservoir's high-level switch closes.
+
+    Raises
+    ------
+    ValueError
+        If a noise is negative, or the delay no whole number of cycles.
+    """
+
+    roll_noise_rad: float = 2e-4
+    roll_rate_noise_rad_s: float = 5e-4
+    motion_delay_ms: float = 20.0
+    level_noise_m: float = 0.005
+    pressure_noise_pa: float = 100.0
+    high_level_m: float = 4.6
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not getattr(self, field.name) >= 0:
+                raise ValueError(f"sensors {field.name} must be zero or more")
+        if self.motion_delay_ms * 1_000_000 % MOTION_PERIOD_NS:
+            raise ValueError(
+                f"sensors motion_delay_ms must be a multiple of 10, got {self.motion_delay_ms}"
+            )
+
+
+class _Noise:
+    """Standard normal numbers, drawn in blocks because one at a time is slow."""
+
+    def __init__(self, seed: int) -> None:
+        self._generator = np.random.Generator(np.random.PCG64(seed))
+        self._left: list[float] = []
+
+    def draw(self) -> float:
+        if not self._left:
+            self._left = self._generator.standard_normal(NOISE_BLOCK).tolist()
+        return self._left.pop()
+
+
+class SensorNode:
+    """Measures the plant and sends what it measured.
+
+    Parameters
+    ----------
+    plant : Plant
+        The ship to measure.
+    errors : SensorErrors
+    catalogue : Catalogue
+    configuration_version : int
+        Sent in the heartbeat, for the controller to compare with its own.
+    seed : int
+        Of the noise.
+    """
+
+    name = "sensors"
+    period_ns = MOTION_PERIOD_NS
+
+    def __init__(
+        self,
+        plant: Plant,
+        errors: SensorErrors,
+        catalogue: Catalogue,
+        *,
+        configuration_version: int,
+        seed: int,
+    ) -> None:
+        self._plant = plant
+        self._errors = errors
+        self._noise = _Noise(seed)
+        delay_ticks = round(errors.motion_delay_ms * 1e6 / MOTION_PERIOD_NS)
+        self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
+        self._motion_sender = catalogue.transmitter(SensorMotion)
+        self._tank_sender = catalogue.transmitter(SensorTank)
+        self._pump_sender = catalogue.transmitter(SensorPump)
+        self._housekeeping = Housekeeping(Address.SENSORS, catalogue, configuration_version)
+        self._ticks = 0
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Sensors listen to nobody."""
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Measure, and send what is due."""
+        plant, errors, draw = self._plant, self._errors, self._noise.draw
+        plant.advance(now_ns)
+        self._motion.append((plant.roll_rad, plant.roll_rate_rad_s))
+        roll_rad, rate_rad_s = self._motion[0]
+        frames = [
+            self._motion_sender.frame(
+                SensorMotion(
+                    roll_rad + errors.roll_noise_rad * draw(),
+                    rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
+                    Quality.GOOD,
+                )
+            )
+        ]
+        if self._ticks % 2 == 0:
+            frames.append(self._tank_frame(plant.level_m))
+            frames.append(
+                self._pump_sender.frame(
+                    SensorPump(
+                        plant.pressure_pa + errors.pressure_noise_pa * draw(),
+                        plant.flow_m3_s,
+                        Quality.GOOD,
+                    )
+                )
+            )
+        frames.extend(self._housekeeping.frames(now_ns))
+        self._ticks += 1
+        return frames
+
+    def _tank_frame(self, level_m: float) -> Frame:
+        noise_m, limit_m, draw = (
+            self._errors.level_noise_m,
+            self._errors.high_level_m,
+            self._noise.draw,
+        )
+        return self._tank_sender.frame(
+            SensorTank(
+                -level_m + noise_m * draw(),
+                level_m + noise_m * draw(),
+                Switch.ON if -level_m > limit_m else Switch.OFF,
+                Switch.ON if level_m > limit_m else Switch.OFF,
+                Quality.GOOD,
+            )
+        )

@@ -1,0 +1,64 @@
+"""What really happened: the plant's state, recorded beside what the controller saw."""
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from firmware_sim.plant import Plant
+from utank_hil.canbus import Frame
+from utank_hil.telemetry.table import Table
+
+TRUTH: Final = (
+    "true_roll_rad",
+    "true_level_m",
+    "true_pressure_pa",
+    "true_shaft_power_w",
+    "wave_moment_nm",
+)
+
+
+class TruthRecorder:
+    """Looks at the plant on a fixed grid; a node without frames.
+
+    Parameters
+    ----------
+    plant : Plant
+    table : Table
+        Takes the rows, columns `TRUTH`.
+    period_ns : int
+        Time between two rows.
+
+    Attributes
+    ----------
+    start_ns : int
+        Time of the first row; -1 before it.
+    """
+
+    name = "truth"
+
+    def __init__(self, plant: Plant, table: Table, period_ns: int) -> None:
+        self.period_ns = period_ns
+        self._plant = plant
+        self._table = table
+        self._row = np.zeros(len(TRUTH))
+        self.start_ns = -1
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Hear nothing: the truth is not on the bus."""
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Record one row."""
+        if self.start_ns < 0:
+            self.start_ns = now_ns
+        plant = self._plant
+        plant.advance(now_ns)
+        self._row[:] = (
+            plant.roll_rad,
+            plant.level_m,
+            plant.pressure_pa,
+            plant.pump_power_w,
+            plant.wave_moment_nm,
+        )
+        self._table.write(self._row)
+        return ()

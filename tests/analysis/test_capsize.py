@@ -1,0 +1,116 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from utank_hil.analysis.capsize import (
+    capsize_probability,
+    capsize_threshold,
+    equilibria,
+    erosion,
+    safe_basin,
+    without_tank,
+)
+from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate
+
+# Table 4.1
+PATTI = RollShip(1.468e6, 2.366e6 * 0.2138, 3.206e3, 9.882e4, restoring_odd_nm=(-2.366e6 * 0.6713,))
+TANK = Tank(5.0, 2.0, 2.0, 0.19, damping_ratio=0.1)
+MODEL = RollModel(PATTI, TANK)
+VANISHING = math.sqrt(0.2138 / 0.6713)
+
+
+def test_without_a_tank_the_saddles_lie_at_the_root_of_c1_over_c3():
+    found = equilibria(without_tank(MODEL))
+    assert [e.stable for e in found] == [False, True, False]
+    np.testing.assert_allclose([e.roll_rad for e in found], [-VANISHING, 0, VANISHING], atol=1e-7)
+
+
+def test_the_tank_s_free_surface_narrows_the_range_of_stability():
+    port, centre, starboard = equilibria(MODEL)
+    assert centre.stable
+    assert not port.stable
+    assert port.roll_rad == pytest.approx(-starboard.roll_rad)
+    assert 0.3 < starboard.roll_rad < VANISHING
+    assert starboard.level_m == pytest.approx(2.5 * math.tan(starboard.roll_rad))
+    assert np.abs(MODEL.derivative([starboard.roll_rad, 0, starboard.level_m, 0])).max() < 1e-9
+
+
+def test_wind_heels_the_equilibrium_and_shrinks_the_lee_side():
+    model = without_tank(RollModel(replace(PATTI, wind_moment_nm=3e4), TANK))
+    port, centre, starboard = equilibria(model)
+    assert centre.roll_rad > 0.05
+    assert starboard.roll_rad < VANISHING < -port.roll_rad
+
+
+def test_the_calm_basin_is_bounded_by_the_heteroclinic_cycle():
+    """Undamped: survives if and only if its energy lies below the saddle's."""
+    ship = replace(PATTI, damping_nms_rad=0.0, quadratic_damping_nms2_rad2=0.0)
+    model = without_tank(RollModel(ship, TANK))
+    roll = np.linspace(-0.5, 0.5, 21)
+    rate = np.linspace(-0.35, 0.35, 21)
+    safe = safe_basin(model, roll, rate, 200.0)
+
+    def potential(phi):
+        return 2.366e6 * (0.2138 / 2 * phi**2 - 0.6713 / 4 * phi**4)
+
+    energy = 0.5 * 1.468e6 * rate[:, None] ** 2 + potential(roll)
+    margin = energy / potential(VANISHING) - 1
+    clear = np.abs(margin) > 1e-3
+    np.testing.assert_array_equal(safe[clear], (margin < 0)[clear])
+    assert 0.2 < safe.mean() < 0.9
+
+
+def test_waves_erode_the_basin():
+    roll, rate = np.linspace(-0.55, 0.55, 15), np.linspace(-0.35, 0.35, 15)
+    told = []
+    area = erosion(
+        without_tank(MODEL), np.array([0.0, 4e4, 9e4]), 0.6, roll, rate, 60.0, progress=told.append
+    )
+    assert area[0] == 1
+    assert area[0] > area[1] > area[2]
+    assert told[-1] == 1
+
+
+def test_threshold_separates_survival_from_capsize():
+    bare = without_tank(MODEL)
+    found = capsize_threshold(bare, 0.6, 2e5, duration_s=200.0)
+    assert 0 < found.capsizing_nm - found.safe_nm <= 1e-3 * found.capsizing_nm
+    for amplitude, capsizes in ((found.safe_nm, False), (found.capsizing_nm, True)):
+        run = simulate(bare, 200.0, wave=WaveMoment([amplitude], [0.6], [0.0]))
+        assert math.isfinite(run.capsized_s) == capsizes
+
+
+def test_patti_b_thresholds_lie_near_the_printed_ones():
+    """Printed: 5.086e4 N m capsizes her without a tank, 8.646e4 with it; Lz, friction not given."""
+    bare = capsize_threshold(without_tank(MODEL), 0.6, 2e5).capsizing_nm
+    assert bare == pytest.approx(5.086e4, rel=0.15)
+    passive = capsize_threshold(
+        RollModel(PATTI, replace(TANK, lz_m=-1.0, damping_ratio=0.3)), 0.6, 2e5
+    ).capsizing_nm
+    assert passive == pytest.approx(8.646e4, rel=0.1)
+    assert passive > 1.5 * bare
+
+
+def test_nothing_capsizes_below_the_highest_amplitude_tried():
+    found = capsize_threshold(MODEL, 0.6, 1e3, duration_s=60.0)
+    assert found == (1e3, math.inf)
+
+
+def test_probability_has_the_exact_binomial_interval():
+    rng = np.random.default_rng(6)
+    frequency = np.linspace(0.4, 0.9, 20)
+    seas = WaveMoment(np.full((60, 20), 5e3), frequency, rng.uniform(0, math.tau, (60, 20)))
+    found = capsize_probability(without_tank(MODEL), seas, 200.0)
+    assert found.ships == 60
+    assert 0 < found.capsized < 60
+    assert found.low < found.estimate == found.capsized / 60 < found.high
+    # Clopper-Pearson: 2.5 % of binomials at the upper end have as few, at the lower end as many
+    from scipy.stats import binom
+
+    assert binom.cdf(found.capsized, 60, found.high) == pytest.approx(0.025)
+    assert binom.sf(found.capsized - 1, 60, found.low) == pytest.approx(0.025)
+    calm = capsize_probability(MODEL, WaveMoment(np.zeros((60, 20)), *seas[1:]), 20.0)
+    assert (calm.estimate, calm.low) == (0, 0)
+    assert calm.high == pytest.approx(1 - 0.025 ** (1 / 60))

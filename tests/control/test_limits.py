@@ -1,0 +1,108 @@
+"""Pump limits: each holds, and the level barrier keeps the pump from flooding a reservoir."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.control import CommandLimiter, PumpLimits
+from utank_hil.dynamics import Tank
+
+TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
+PERIOD_S = 0.02
+
+numbers = st.floats(-1e6, 1e6)
+motions = st.lists(st.tuples(numbers, st.floats(-6, 6), st.floats(-4, 4)), min_size=1, max_size=50)
+
+
+@given(motions)
+def test_pressure_and_rate_hold_for_any_wish_and_motion(sequence):
+    limits = PumpLimits(pressure_pa=50e3, rate_pa_s=100e3)
+    limiter = CommandLimiter(limits, TANK, PERIOD_S)
+    commands = [0.0, *(limiter.limit(*sample) for sample in sequence)]
+    assert np.abs(commands).max() <= 50e3
+    assert np.abs(np.diff(commands)).max() <= 100e3 * PERIOD_S * (1 + 1e-12)
+
+
+@given(numbers, st.floats(-6, 6), st.floats(-4, 4))
+def test_mirrored_motion_gives_the_mirrored_command(desired, level, rate):
+    limits = PumpLimits(rate_pa_s=1e9, power_w=4e5)
+    one = CommandLimiter(limits, TANK, PERIOD_S).limit(desired, level, rate)
+    other = CommandLimiter(limits, TANK, PERIOD_S).limit(-desired, -level, -rate)
+    assert one == -other
+
+
+@given(numbers, st.floats(-6, 6), st.floats(-4, 4))
+def test_power_put_into_the_water_stays_below_its_limit(desired, level, rate):
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9, power_w=2e5), TANK, PERIOD_S)
+    command = limiter.limit(desired, level, rate)
+    assert command * TANK.reservoir_area_m2 * rate <= 2e5 * (1 + 1e-12)
+
+
+def test_small_motion_leaves_the_wish_alone():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9), TANK, PERIOD_S)
+    assert limiter.limit(31e3, 0.5, 0.3) == 31e3
+
+
+@pytest.mark.parametrize("start_m", [0.0, 1.5, -3.0])
+def test_pump_pushing_with_the_flow_never_overshoots_the_level(start_m):
+    # bang-bang in step with the water, the worst a controller can ask for, in a ship at rest
+    limits = PumpLimits(level_m=3.85)
+    limiter = CommandLimiter(limits, TANK, PERIOD_S)
+    level, rate, pressure, highest = start_m, 0.01, 0.0, 0.0
+    inertia = TANK.density_kg_m3 * TANK.effective_length_m
+    stiffness = 2 * TANK.density_kg_m3 * 9.80665
+    for k in range(60_000):
+        if k % 10 == 0:
+            command = limiter.limit(np.copysign(1e6, rate), level, rate)
+        pressure += 0.002 / 0.1 * (command - pressure)  # the drive's lag
+        rate += 0.002 * (pressure - stiffness * level - TANK.loss_pa_per_m_s * rate) / inertia
+        level += 0.002 * rate
+        highest = max(highest, abs(level))
+    assert 3.4 < highest < 3.85
+
+
+def test_mean_of_the_commands_between_two_steps():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
+    commands = [limiter.limit(50e3, 0.0, 0.0) for _ in range(10)]
+    assert limiter.mean_since_last_call() == pytest.approx(np.mean(commands))
+    limiter.limit(0.0, 0.0, 0.0)
+    assert limiter.mean_since_last_call() == pytest.approx(limiter.command_pa)
+
+
+def test_cut_is_at_zero_at_once_and_ramp_at_the_rate_limit():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
+    for _ in range(20):
+        limiter.limit(50e3, 0.0, 0.0)
+    before = limiter.command_pa
+    assert limiter.ramp_to_zero() == pytest.approx(before - 1e5 * PERIOD_S)
+    assert limiter.cut() == limiter.command_pa == 0.0
+
+
+def test_ramp_to_zero_ends_there_even_where_the_level_barrier_would_brake():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9), TANK, PERIOD_S)
+    assert limiter.limit(0.0, 3.7, 1.0) < 0.0
+    assert limiter.ramp_to_zero() == 0.0
+
+
+def test_a_share_of_the_pressure_bounds_the_command():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9), TANK, PERIOD_S)
+    assert limiter.limit(50e3, 0.0, 0.0, share=0.5) == 25e3
+    assert limiter.limiting
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"pressure_pa": 0.0},
+        {"rate_pa_s": -1.0},
+        {"level_m": float("nan")},
+        {"power_w": 0.0},
+        {"brake_share": 1.5},
+        {"sharpness": 0.5},
+        {"lookahead_s": -0.1},
+    ],
+)
+def test_bad_limits_are_refused_by_name(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        PumpLimits(**bad)

@@ -1,0 +1,60 @@
+"""PD on the level: a virtual tank, at the optimum."""
+
+import numpy as np
+import pytest
+
+from utank_hil.analysis.closed_loop import closed_loop_response
+from utank_hil.analysis.margins import margins
+from utank_hil.control.gain import GainLaw
+from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
+from utank_hil.control.pd import PD_MEASURED, design_pd
+from utank_hil.control.ship_design import pump_model
+from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics.linear import coupled_matrices
+
+SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
+TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
+
+
+def test_level_in_a_ship_held_still_has_the_optimal_frequency_and_damping():
+    law = design_pd(SHIP, TANK)
+    ratios, ship_frequency = ship_ratios(SHIP, TANK)
+    best = passive_optimum(ratios)
+    mass, damping, stiffness = (matrix[1, 1] for matrix in coupled_matrices(SHIP, TANK))
+    kp, kd = TANK.reservoir_area_m2 * law.gain[0]
+    frequency = np.sqrt((stiffness + kp) / mass)
+    assert frequency / ship_frequency == pytest.approx(best.frequency_ratio)
+    assert (damping + kd) / (2 * mass * frequency) == pytest.approx(best.damping_ratio)
+
+
+def test_roll_over_frequency_peaks_at_the_optimum_when_the_loop_is_fast():
+    law = design_pd(SHIP, TANK, sample_time_s=1e-3)
+    ratios, ship_frequency = ship_ratios(SHIP, TANK)
+    model = coupled_model(SHIP, TANK)
+    w = np.linspace(0.3, 0.9, 4000)
+    motions, _ = closed_loop_response(law, model, PD_MEASURED, w)
+    static_heel = 1 / coupled_matrices(SHIP, TANK)[2][0, 0]
+    best = passive_optimum(ratios)
+    assert np.abs(motions[:, 0]).max() / static_heel == pytest.approx(best.peak, rel=2e-3)
+    passive, _ = closed_loop_response(None, model, PD_MEASURED, w)
+    assert np.abs(motions[:, 0]).max() < 0.5 * np.abs(passive[:, 0]).max()
+    assert ship_frequency == pytest.approx(0.4985, abs=1e-4)
+
+
+def test_delay_and_lag_of_the_pump_are_harmless():
+    system = pump_model(SHIP, TANK, PD_MEASURED)
+    found = margins(design_pd(SHIP, TANK), system, delay_s=0.05, lag_s=0.1)
+    assert found.radius < 1
+    assert found.peak_sensitivity < 2
+    assert found.delay_margin_s > 0.2
+
+
+def test_gain_law_answers_the_newest_measurement_less_its_reference():
+    law = GainLaw(np.array([[1.0, -2.0]]), 0.1)
+    controller = law.controller()
+    assert controller.step(np.array([3.0, 1.0])) == [-1.0]
+    assert controller.step(np.array([3.0, 1.0]), np.array([3.0, 0.0])) == [2.0]
+    z = np.exp(1j * np.array([0.1, 1.0]))
+    a, b, c, d, _ = law.matrices()
+    for point, response in zip(z, law.response(z), strict=True):
+        np.testing.assert_allclose(response, c @ np.linalg.solve(point * np.eye(2) - a, b) + d)

@@ -1,0 +1,117 @@
+"""A sampled law on the continuous plant, exactly: sampled-data theory, no simulation.
+
+The law sees samples and its commands are held, delayed and lagged; between the samples the plant is
+continuous. With v the law's input count (see `utank_hil.dynamics.sampling`), the sampled loop is::
+
+    y(z) = P(z) v(z) + samples of the wave's effect,    v(z) = C(z) y(z)
+    L(z) = C(z) P(z),    S(z) = 1 / (1 - L(z)),    z = exp(j w Ts)
+
+(L carries the law's sign, so negative feedback has L near -1.) A wave of frequency w below half the
+sampling frequency gives samples of that frequency alone. The held command then has components at w
+and its aliases; the motions returned are those at w.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.interface import LinearLaw
+from utank_hil.dynamics.sampling import LinearModel, sample
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+
+def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
+    """Transfer matrix of a model at complex points s (or z), shape (N, outputs, inputs)."""
+    a, b, c, d = system.A, system.B, system.C, system.D
+    resolvent = np.asarray(points)[:, None, None] * np.eye(a.shape[0]) - a
+    response: ComplexArray = c @ np.linalg.solve(resolvent, b.astype(np.complex128)) + d
+    return response
+
+
+def closed_loop_eigenvalues(
+    law: LinearLaw, plant: "StateSpace | LinearModel", gain: float = 1.0
+) -> ComplexArray:
+    """Eigenvalues of the sampled closed loop.
+
+    Parameters
+    ----------
+    law : LinearLaw
+    plant : control.StateSpace or LinearModel
+        Sampled plant from the law's inputs to its outputs (`sampled_model`).
+    gain : float
+        Factor on the plant.
+    """
+    compensator = law.matrices()
+    reach, direct = gain * plant.B, gain * plant.D
+    inner = compensator.A + compensator.B @ direct @ compensator.C
+    closed = np.block([[plant.A, reach @ compensator.C], [compensator.B @ plant.C, inner]])
+    return np.linalg.eigvals(closed).astype(np.complex128)
+
+
+def closed_loop_radius(
+    law: LinearLaw, plant: "StateSpace | LinearModel", gain: float = 1.0
+) -> float:
+    """Greatest magnitude of `closed_loop_eigenvalues`; below one the loop is stable."""
+    return float(np.abs(closed_loop_eigenvalues(law, plant, gain)).max())
+
+
+def closed_loop_response(
+    law: LinearLaw | None,
+    system: "StateSpace",
+    measured: tuple[str, ...],
+    frequency_rad_s: FloatArray,
+    delay_s: float = 0.0,
+    lag_s: float = 0.0,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Motions and pump pressure per unit of wave moment, at the wave's frequency.
+
+    Parameters
+    ----------
+    law : LinearLaw or None
+        None leaves the tank passive.
+    system : control.StateSpace
+        Continuous, inputs pressure_pa and wave_moment_nm (`coupled_model`).
+    measured : tuple of str
+        Names of the outputs that the law sees, in its order.
+    frequency_rad_s : ndarray, shape (N,)
+        Positive, below pi / Ts.
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Returns
+    -------
+    motions : ndarray, shape (N, outputs of system)
+    pressure : ndarray, shape (N,)
+        Actual pressure, after delay and lag.
+
+    Raises
+    ------
+    ValueError
+        If a frequency is outside (0, pi / Ts).
+    """
+    w = np.asarray(frequency_rad_s, dtype=np.float64)
+    s = np.asarray(1j * w, dtype=np.complex128)
+    open_loop = state_space_response(system, s)
+    pressure_column = system.input_labels.index("pressure_pa")
+    wave_column = system.input_labels.index("wave_moment_nm")
+    from_wave, from_pressure = open_loop[:, :, wave_column], open_loop[:, :, pressure_column]
+    if law is None:
+        return from_wave, np.zeros(len(w), dtype=np.complex128)
+    sample_time_s = law.sample_time_s
+    if not ((w > 0) & (w < np.pi / sample_time_s)).all():
+        raise ValueError(f"frequencies must lie in (0, {np.pi / sample_time_s:.3f}) rad/s")
+    rows = [system.output_labels.index(name) for name in measured]
+    z = np.exp(1j * w * sample_time_s)
+    seen = system[list(measured), ["pressure_pa"]]
+    plant = sample(seen, sample_time_s, delay_s, lag_s)
+    compensator = law.response(z)
+    loop = (compensator @ state_space_response(plant, z))[:, 0, 0]
+    command = (compensator @ from_wave[:, rows, None])[:, 0, 0] / (1 - loop)
+    # v(k) is held over [t_{k-1} + d, t_k + d)
+    hold = (1 - np.exp(-1j * w * sample_time_s)) / (1j * w * sample_time_s)
+    path = hold * np.exp(-1j * w * (delay_s - sample_time_s)) / (1 + 1j * w * lag_s)
+    pressure = path * command
+    return from_wave + from_pressure * pressure[:, None], pressure

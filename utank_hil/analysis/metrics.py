@@ -1,0 +1,103 @@
+"""Figures that sum up a run: how much the ship rolled and what the pump did for it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class RollStatistics:
+    """Roll over a record.
+
+    Attributes
+    ----------
+    rms_rad : float
+        Root mean square of the roll angle.
+    significant_rad : float
+        Significant single amplitude, see `significant_amplitude`.
+    maximum_rad : float
+        Largest roll to either side.
+    """
+
+    rms_rad: float
+    significant_rad: float
+    maximum_rad: float
+
+
+def significant_amplitude(signal: FloatArray) -> float:
+    """Mean of the highest third of the single amplitudes between zero up-crossings.
+
+    For a narrow-banded Gaussian signal this is close to twice the standard deviation.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+        Evenly sampled; its mean is taken out first.
+
+    Returns
+    -------
+    float
+        In the signal's unit; zero when the record holds no whole cycle.
+    """
+    centred = signal - signal.mean()
+    starts = np.flatnonzero((centred[:-1] < 0) & (centred[1:] >= 0)) + 1
+    if len(starts) < 2:
+        return 0.0
+    whole = centred[: starts[-1]]
+    heights = np.maximum.reduceat(whole, starts[:-1]) - np.minimum.reduceat(whole, starts[:-1])
+    highest = np.sort(heights)[-max(1, len(heights) // 3) :]
+    return float(highest.mean() / 2)
+
+
+def roll_statistics(roll_rad: FloatArray) -> RollStatistics:
+    """Statistics of a roll record, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        If the record is empty.
+    """
+    if roll_rad.size == 0:
+        raise ValueError("roll record is empty: run longer than the time left out at its start")
+    return RollStatistics(
+        rms_rad=float(np.sqrt(np.mean(np.square(roll_rad)))),
+        significant_rad=significant_amplitude(roll_rad),
+        maximum_rad=float(np.max(np.abs(roll_rad))),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PumpStatistics:
+    """What the pump did over a record.
+
+    Attributes
+    ----------
+    pressure_rms_pa, pressure_peak_pa : float
+        Of the differential pressure across the pump.
+    power_mean_w, power_peak_w : float
+        Shaft power taken from the ship; regenerated power does not count.
+    level_peak_m : float
+        Largest deviation of a reservoir's level from still water.
+    """
+
+    pressure_rms_pa: float
+    pressure_peak_pa: float
+    power_mean_w: float
+    power_peak_w: float
+    level_peak_m: float
+
+
+def pump_statistics(
+    pressure_pa: FloatArray, power_w: FloatArray, level_m: FloatArray
+) -> PumpStatistics:
+    """Statistics of the pump's records, each of shape (n,)."""
+    drawn = np.maximum(power_w, 0.0)
+    return PumpStatistics(
+        pressure_rms_pa=float(np.sqrt(np.mean(np.square(pressure_pa)))),
+        pressure_peak_pa=float(np.max(np.abs(pressure_pa))),
+        power_mean_w=float(drawn.mean()),
+        power_peak_w=float(drawn.max()),
+        level_peak_m=float(np.max(np.abs(level_m))),
+    )

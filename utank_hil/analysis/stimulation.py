@@ -1,0 +1,104 @@
+"""Rolling a ship up on still water with the pump, then letting the tank quiet her, Fig. 2.8."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollRun, RollShip, Tank, simulate
+from utank_hil.dynamics.simulate import whole_steps
+
+STEP_S = 0.02
+
+
+class Stimulation(NamedTuple):
+    """What happened on still water.
+
+    Attributes
+    ----------
+    run : RollRun
+    stimulated_rad : float
+        Greatest roll in the last cycle before the pump stops.
+    level_lead_rad : float
+        Phase by which the level leads the roll in that cycle.
+    cycles_to_tenth : float
+        Cycles after the stop until the roll stays below a tenth of it.
+    """
+
+    run: RollRun
+    stimulated_rad: float
+    level_lead_rad: float
+    cycles_to_tenth: float
+
+
+def tuned_tank(ship: RollShip, tank: Tank) -> Tank:
+    """The tank with its duct sized for the ship's natural roll frequency, thesis 2.6.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+
+    Returns
+    -------
+    Tank
+
+    Raises
+    ------
+    ValueError
+        If the reservoirs alone are already slower than the ship.
+    """
+    duct_part_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2 - 2 * tank.height_m
+    if duct_part_m <= 0:
+        raise ValueError(
+            f"a tank of height_m {tank.height_m} can't be as fast as the ship's "
+            f"{ship.natural_frequency_rad_s:.3g} rad/s: lower it"
+        )
+    return replace(tank, duct_area_m2=tank.width_m * tank.reservoir_area_m2 / duct_part_m)
+
+
+def stimulate_on_still_water(
+    model: RollModel,
+    pressure_pa: float,
+    frequency_rad_s: float,
+    *,
+    off_s: float = 141.0,
+    duration_s: float = 300.0,
+) -> Stimulation:
+    """Pump sinusoidally from rest, stop, and watch the roll fall.
+
+    Parameters
+    ----------
+    model : RollModel
+    pressure_pa : float
+        Amplitude of the pump pressure.
+    frequency_rad_s : float
+    off_s : float
+        Time at which the pump stops.
+    duration_s : float
+
+    Returns
+    -------
+    Stimulation
+
+    Raises
+    ------
+    ValueError
+        If the pump runs for less than a cycle, or to the end.
+    """
+    cycle_s = math.tau / frequency_rad_s
+    if not cycle_s < off_s < duration_s:
+        raise ValueError(f"off_s must lie between {cycle_s:.3g} and {duration_s}, got {off_s}")
+    time = STEP_S * np.arange(whole_steps("duration_s", duration_s, STEP_S))
+    pressure = np.where(time < off_s, pressure_pa * np.sin(frequency_rad_s * time), 0.0)
+    run = simulate(model, duration_s, pressure_pa=pressure, step_s=STEP_S)
+    size = np.abs(run.state[:, 0])
+    last = (run.time_s > off_s - cycle_s) & (run.time_s <= off_s)
+    stimulated = float(size[last].max())
+    turning = np.exp(-1j * frequency_rad_s * run.time_s[last])
+    roll, level = (np.sum(run.state[last, k] * turning) for k in (0, 2))
+    loud = run.time_s[size > stimulated / 10]
+    return Stimulation(
+        run, stimulated, float(np.angle(level / roll)), float((loud[-1] - off_s) / cycle_s)
+    )

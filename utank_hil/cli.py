@@ -1,0 +1,18 @@
+"""Command line ``utank-hil``."""
+
+from utank_hil.commands.bench import bench
+from utank_hil.commands.check import check
+from utank_hil.commands.common import new_app
+from utank_hil.commands.panel import panel
+from utank_hil.commands.run import run
+
+app = new_app("Hardware-in-the-loop controller stack for active U-tube anti-roll tanks.")
+app.command()(bench)
+app.command()(run)
+app.command()(check)
+app.command()(panel)
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

@@ -1,0 +1,1 @@
+"""The commands of ``utank-hil``, one file each."""

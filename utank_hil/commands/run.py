@@ -1,0 +1,103 @@
+"""``utank-hil run``: the deployed controller alone."""
+
+import json
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from utank_hil.canbus import SocketCanPort
+from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.timing import timing_table
+from utank_hil.config import ControllerConfig
+from utank_hil.runtime import (
+    LoopStatistics,
+    RealTimeLoop,
+    real_time_scheduling,
+    stop_on_signals,
+)
+from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RecorderProcess, RingWriter, open_viewer
+
+RING_ROWS = 8192  # 82 s: a recorder that sleeps less loses nothing
+
+
+def run(
+    config: Annotated[Path, typer.Argument(help="Controller configuration.")],
+    bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
+    duration: Duration = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the recording; without it none is made.")
+    ] = None,
+    json_: Json = False,
+    view: View = False,
+) -> None:
+    """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
+
+    It starts in STANDBY. Only an operator at the panel arms it.
+
+    [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
+    """
+    loaded = load(config, ControllerConfig)
+    _refuse_low_margins(loaded)
+    statistics = LoopStatistics()
+    with ExitStack() as stack:
+        try:
+            port = SocketCanPort(bus)
+        except OSError as error:
+            fail(error)
+        stack.callback(port.close)
+        stop = stack.enter_context(stop_on_signals())
+        sink = None
+        file = None
+        if out is not None or view:
+            folder = OUT if out is None else out
+            folder.mkdir(parents=True, exist_ok=True)
+            file = folder / "run.rrd"
+            ring = RingWriter(SIGNALS, capacity=RING_ROWS)
+            sink = ring.write
+            recorder = RecorderProcess(ring.name, file, live=view)
+            # first the ring is closed, then the recorder takes what is left of it
+            stack.callback(recorder.stop)
+            stack.callback(ring.close)
+            if view and recorder.url is not None:
+                viewer = stack.enter_context(open_viewer(recorder.url))
+                if viewer.url is not None:
+                    notes.print(f"Open {viewer.url} in a browser.", soft_wrap=True)
+        node = build_controller_node(loaded, statistics=statistics, sink=sink)
+        with real_time_scheduling() as scheduling:
+            for line in scheduling.lines():
+                notes.print(line, soft_wrap=True)
+            notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
+            RealTimeLoop([node], port, statistics=statistics).run(
+                stop, None if duration is None else round(duration * 1e9)
+            )
+    if json_:
+        summary = {
+            "mode": node.mode.name,
+            "fault": node.fault.name,
+            "loop": statistics.summary(),
+            "recording": None if file is None else str(file),
+        }
+        sys.stdout.write(json.dumps(summary) + "\n")
+        return
+    console = Console(highlight=False)
+    console.print(timing_table({loaded.name: statistics}))
+    console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
+    if file is not None:
+        console.print(f"recording: {shown(file)}", soft_wrap=True)
+
+
+def _refuse_low_margins(config: ControllerConfig) -> None:
+    from utank_hil.commands.check import judge
+
+    report = judge(config)
+    failures = () if report is None else report.failures()
+    for failure in failures:
+        notes.print(f"[yellow]margins:[/yellow] {failure}", soft_wrap=True)
+    if failures and not config.accept_low_margins:
+        fail("the law misses its margins; redesign it, or set accept_low_margins: true")

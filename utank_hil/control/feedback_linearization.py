@@ -1,0 +1,176 @@
+"""Feedback linearization of roll with the tank's pump, thesis section 4.3.2.
+
+The pump enters both accelerations of the nonlinear model (`utank_hil.dynamics.nonlinear`)::
+
+    phi'' = f_phi + g_phi P,    h'' = f_h + g_h P,    g_phi = -m_c At / det,  g_h = m_phi At / det
+
+both positive. The output s = phi + kL l sin(h / l), for which kL = 0 leaves the roll angle itself,
+has relative degree 2, and with c = cos(h / l)::
+
+    s'' = f_phi + kL (c f_h - sin(h / l) h'^2 / l) + (g_phi + kL c g_h) P
+
+    P = (-w^2 s - 2 zeta w s' - f_phi - kL (c f_h - sin(h / l) h'^2 / l)) / (g_phi + kL c g_h)
+
+makes s'' + 2 zeta w s' + w^2 s = 0 in still water, exactly and at any angle. (4.11) is this with
+kL = 0 and the sign of its v turned; the thesis has l = 1 m.
+
+What is left is the zero dynamics, the water's motion under s = 0::
+
+    kL = 0:        h'' + g / (H + Lz) h = K_wave / m_c                        (4.10), no damping
+    small angles:  (m_phi kL - m_c) h'' + b kL h' + (k_phi kL + rho g At L) h = -K_wave
+
+so with kL = 0 the level swings on for ever after a disturbance, and kL > 0 borrows damping from the
+ship at the price of the roll phi = -kL h. Neither knows the reservoirs' limits: therefore the
+pressure is blended out, and the tank left passive, while the swing of the level
+sqrt(h^2 + (h' / w_0)^2) goes from a soft to a hard limit.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackLinearization:
+    """The law and its model; measured are roll, roll rate, level and level rate.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    frequency_rad_s, damping_ratio : float
+        w and zeta of the linear response that the output s is given.
+    soft_level_m, hard_level_m : float
+        Swing of the level up to which the law acts in full, and from which on it does not act.
+    shift_rad_m : float
+        kL, zero or more.
+    shift_length_m : float
+        l.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or the pump loses its grip on the shifted output within
+        the hard limit of the level.
+    """
+
+    ship: RollShip
+    tank: Tank
+    frequency_rad_s: float
+    damping_ratio: float
+    soft_level_m: float
+    hard_level_m: float
+    shift_rad_m: float = 0.0
+    shift_length_m: float = 1.0
+    sample_time_s: float = 0.01
+    model: RollModel = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_rad_s", "damping_ratio", "shift_length_m", "sample_time_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"feedback linearization {name} must be positive, got {value}")
+        if not 0 < self.soft_level_m < self.hard_level_m:
+            raise ValueError(
+                "feedback linearization needs 0 < soft_level_m < hard_level_m, got "
+                f"{self.soft_level_m} and {self.hard_level_m}"
+            )
+        if not (math.isfinite(self.shift_rad_m) and self.shift_rad_m >= 0):
+            raise ValueError(f"shift_rad_m must be zero or more, got {self.shift_rad_m}")
+        object.__setattr__(self, "model", RollModel(self.ship, self.tank))
+        reach = min(self.hard_level_m, self.tank.level_limit_m)
+        levels = np.linspace(0.0, reach, 201)
+        grips = [self._grip(level) for level in levels.tolist()]
+        if min(grips) < 0.1 * grips[0]:
+            raise ValueError(
+                f"the pump loses its grip on phi + kL l sin(h / l) within {reach} m of level: "
+                "lower shift_rad_m or raise shift_length_m"
+            )
+
+    @property
+    def zero_dynamics_rad_s(self) -> float:
+        """Frequency sqrt(g / (H + Lz)) of the level under zero roll, (4.10)."""
+        return math.sqrt(GRAVITY_M_S2 / (self.tank.height_m + self.tank.lz_m))
+
+    def pressure_pa(self, state: FloatArray, target_rad: float = 0.0) -> float:
+        """Linearizing pressure, before blending.
+
+        Parameters
+        ----------
+        state : ndarray, shape (4,)
+            Roll, roll rate, level, level rate.
+        target_rad : float
+            Target of the output.
+        """
+        _, phi_ddot, _, h_ddot = self.model.derivative(state).tolist()  # without the pump
+        output, rate, drift = self._output(state.tolist(), phi_ddot, h_ddot)
+        w = self.frequency_rad_s
+        wanted = -(w**2) * (output - target_rad) - 2 * self.damping_ratio * w * rate
+        return (wanted - drift) / self._grip(float(state[2]))
+
+    def share(self, level_m: float, level_rate_m_s: float) -> float:
+        """Share of the linearizing pressure that the swing of the level leaves, 0 to 1."""
+        swing = math.hypot(level_m, level_rate_m_s / self.zero_dynamics_rad_s)
+        x = (self.hard_level_m - swing) / (self.hard_level_m - self.soft_level_m)
+        x = min(max(x, 0.0), 1.0)
+        return x * x * (3 - 2 * x)
+
+    def controller(self) -> "FeedbackLinearizationController":
+        """A new steppable controller."""
+        return FeedbackLinearizationController(self)
+
+    def _output(
+        self, state: list[float], phi_ddot: float, h_ddot: float
+    ) -> tuple[float, float, float]:
+        """Output s, its rate, and its acceleration under the accelerations given."""
+        phi, phi_dot, h, h_dot = state
+        shift, length = self.shift_rad_m, self.shift_length_m
+        sin, cos = math.sin(h / length), math.cos(h / length)
+        return (
+            phi + shift * length * sin,
+            phi_dot + shift * cos * h_dot,
+            phi_ddot + shift * (cos * h_ddot - sin * h_dot**2 / length),
+        )
+
+    def _grip(self, level_m: float) -> float:
+        """Acceleration of s per pressure: g_phi + kL cos(h / l) g_h."""
+        c = self.model.coefficients
+        roll_inertia = c.inertia + c.inertia_h2 * level_m**2
+        determinant = roll_inertia * c.level_inertia - c.coupling**2
+        shifted = self.shift_rad_m * math.cos(level_m / self.shift_length_m) * roll_inertia
+        return c.area * (shifted - c.coupling) / determinant
+
+
+class FeedbackLinearizationController:
+    """Steps a `FeedbackLinearization`; it has no memory.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+    """
+
+    def __init__(self, law: FeedbackLinearization) -> None:
+        self.sample_time_s = law.sample_time_s
+        self._law = law
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Blended pressure, shape (1,), for the state `y`, shape (4,); target of s: one number."""
+        law = self._law
+        share = law.share(float(y[2]), float(y[3]))
+        if share == 0.0:
+            return np.zeros(1)
+        target = 0.0 if reference is None else float(reference[0])
+        return np.array([share * law.pressure_pa(y, target)])
+
+    def applied(self, u: FloatArray) -> None:
+        """Nothing to remember."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""

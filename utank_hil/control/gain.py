@@ -1,0 +1,70 @@
+"""The plainest linear law: a constant gain on the newest measurement, u = -K (y - reference)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.sampling import LinearModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GainLaw:
+    """Constant feedback of the measured outputs.
+
+    In the loop's timing (`utank_hil.dynamics.sampling`) u(k) = -K y(k-1).
+
+    Attributes
+    ----------
+    gain : ndarray, shape (r, m)
+        K.
+    sample_time_s : float
+    """
+
+    gain: FloatArray
+    sample_time_s: float
+
+    def controller(self) -> "GainController":
+        """A new steppable controller."""
+        return GainController(self)
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """Transfer matrix from y to u at the points `z`, shape (N,); shape (N, r, m)."""
+        response: ComplexArray = -self.gain / np.asarray(z)[:, None, None]
+        return response
+
+    def matrices(self) -> LinearModel:
+        """The law from y to u; its states are the last measurement."""
+        inputs, outputs = self.gain.shape
+        return LinearModel(
+            np.zeros((outputs, outputs)),
+            np.eye(outputs),
+            -self.gain,
+            np.zeros((inputs, outputs)),
+            self.sample_time_s,
+        )
+
+
+class GainController:
+    """Steps a `GainLaw`; it has no memory.
+
+    Parameters
+    ----------
+    law : GainLaw
+    """
+
+    def __init__(self, law: GainLaw) -> None:
+        self.sample_time_s = law.sample_time_s
+        self._gain = -law.gain
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Return -K (y - reference)."""
+        error = y if reference is None else y - reference
+        u: FloatArray = self._gain.dot(error)
+        return u
+
+    def applied(self, u: FloatArray) -> None:
+        """Nothing to remember."""
+
+    def reset(self) -> None:
+        """Nothing to forget."""

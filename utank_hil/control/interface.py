@@ -1,0 +1,56 @@
+"""What every controller is, an object stepped once a sample time, and what every linear law is."""
+
+from typing import Protocol
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.sampling import LinearModel
+
+
+class Controller(Protocol):
+    """Steppable controller.
+
+    Timing: `step` is called with the measurement at t_k and its answer is commanded at once; it
+    acts on the plant from t_k + delay on, until the answer of the next step takes over. A
+    controller that is not in charge is stepped all the same and told through `applied` what was
+    commanded instead; it can then take over without a bump.
+
+    Attributes
+    ----------
+    sample_time_s : float
+        Time between two calls of `step`.
+    """
+
+    sample_time_s: float
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Take the newest measurement `y`, shape (m,), and return the command, shape (r,).
+
+        `reference` is the target of the outputs, zero where it is not given.
+        """
+
+    def applied(self, u: FloatArray) -> None:
+        """Tell the controller the command, shape (r,), that left after limits or another law."""
+
+    def reset(self) -> None:
+        """Forget the past: as newly built."""
+
+
+class LinearLaw(Protocol):
+    """A linear law from outputs y to command u, in the timing of `utank_hil.control.arx`.
+
+    u(k) is made from y(k-1), y(k-2), ...: the transfer matrix is strictly proper. What design
+    functions of linear controllers return, and what `utank_hil.analysis.margins` looks at.
+    """
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between two steps."""
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """Transfer matrix at the points `z`, shape (N,); shape (N, r, m)."""
+
+    def matrices(self) -> LinearModel:
+        """The law from y to u as a discrete state-space model."""
+
+    def controller(self) -> Controller:
+        """A new steppable controller, at rest."""

@@ -1,0 +1,167 @@
+"""What the pump may be asked for: pressure, power, tank level and pressure rate.
+
+The level barrier. Held at a pressure P in a ship at rest, the water swings as an undamped
+oscillator of frequency w0 about h_e = P / (2 rho g). From the level h and its rate it comes to rest
+at the limit h_max when ::
+
+    h_e = (h_max^2 - h^2 - (h' / w0)^2) / (2 (h_max - h))          (rising water; falling: mirrored)
+
+so P_touch = 2 rho g h_e is the pressure that just does not overshoot. As long as P_touch is well
+above the braking pressure -P_b there is time left to brake, and more may be allowed now::
+
+    P <= -P_b + sharpness (P_touch + P_b)
+
+A pressure above P_touch lowers P_touch; both meet at -P_b, where the pump brakes with the share of
+its pressure that was kept for it. The wave's own push is not known; that is what the rest of the
+pump's pressure, beyond P_b, is for.
+"""
+
+import math
+from dataclasses import dataclass
+
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+
+
+@dataclass(frozen=True, slots=True)
+class PumpLimits:
+    """Limits on the pump's command.
+
+    Parameters
+    ----------
+    pressure_pa : float
+        Greatest pressure, either way.
+    rate_pa_s : float
+        Greatest rate of change of the command.
+    level_m : float
+        Greatest level, either way, that the pump may drive the water to.
+    power_w : float
+        Greatest hydraulic power P At h' that the pump may put into the water.
+    brake_share : float
+        Share of `pressure_pa` that the level barrier counts on for braking, 0 to 1.
+    sharpness : float
+        How late and how hard the level barrier acts, 1 or more.
+    lookahead_s : float
+        Time ahead at which the level is judged: delay and lag of the pump.
+
+    Raises
+    ------
+    ValueError
+        If a limit is out of its range.
+    """
+
+    pressure_pa: float = 50e3
+    rate_pa_s: float = 100e3
+    level_m: float = 3.85
+    power_w: float = math.inf
+    brake_share: float = 0.7
+    sharpness: float = 2.2
+    lookahead_s: float = 0.25
+
+    def __post_init__(self) -> None:
+        for name in ("pressure_pa", "rate_pa_s", "level_m", "power_w"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise ValueError(f"pump limit {name} must be positive, got {value}")
+        if not 0 <= self.brake_share <= 1:
+            raise ValueError(f"pump limit brake_share must be 0 to 1, got {self.brake_share}")
+        if not self.sharpness >= 1:
+            raise ValueError(f"pump limit sharpness must be 1 or more, got {self.sharpness}")
+        if not (math.isfinite(self.lookahead_s) and self.lookahead_s >= 0):
+            raise ValueError(f"pump limit lookahead_s must be zero or more, got {self.lookahead_s}")
+
+
+class CommandLimiter:
+    """Brings a desired pressure within `PumpLimits`, once every command period.
+
+    Parameters
+    ----------
+    limits : PumpLimits
+    tank : Tank
+    period_s : float
+        Time between two commands.
+
+    Attributes
+    ----------
+    command_pa : float
+        The last command.
+    limiting : bool
+        Whether the last command fell short of what was desired.
+    """
+
+    def __init__(self, limits: PumpLimits, tank: Tank, period_s: float) -> None:
+        if not (math.isfinite(period_s) and period_s > 0):
+            raise ValueError(f"command period_s must be positive, got {period_s}")
+        self._limits = limits
+        self._step_pa = limits.rate_pa_s * period_s
+        self._stiffness_pa_m = 2 * tank.density_kg_m3 * GRAVITY_M_S2
+        self._frequency_rad_s = tank.natural_frequency_rad_s
+        self._area_m2 = tank.reservoir_area_m2
+        self.command_pa = 0.0
+        self.limiting = False
+        self._sum_pa = 0.0
+        self._count = 0
+
+    def limit(
+        self, desired_pa: float, level_m: float, level_rate_m_s: float, share: float = 1.0
+    ) -> float:
+        """The command nearest to `desired_pa` that keeps within the limits.
+
+        Parameters
+        ----------
+        desired_pa : float
+        level_m, level_rate_m_s : float
+        share : float
+            Part of the greatest pressure that is allowed at present.
+        """
+        limits = self._limits
+        high = limits.pressure_pa * share
+        low = -high
+        if level_rate_m_s > 0:
+            high = min(high, self._barrier_pa(level_m, level_rate_m_s))
+            high = min(high, limits.power_w / (self._area_m2 * level_rate_m_s))
+        elif level_rate_m_s < 0:
+            low = max(low, -self._barrier_pa(-level_m, -level_rate_m_s))
+            low = max(low, limits.power_w / (self._area_m2 * level_rate_m_s))
+        command = self._towards(min(max(desired_pa, low), high))
+        self.limiting = command != desired_pa
+        return command
+
+    def ramp_to_zero(self) -> float:
+        """Let the command fall to zero at its rate limit."""
+        self.limiting = False
+        return self._towards(0.0)
+
+    def cut(self) -> float:
+        """Set the command to zero at once."""
+        self.command_pa = 0.0
+        self.limiting = False
+        self._count += 1
+        return 0.0
+
+    def _towards(self, target_pa: float) -> float:
+        step = self._step_pa
+        command = min(max(target_pa, self.command_pa - step), self.command_pa + step)
+        self.command_pa = command
+        self._sum_pa += command
+        self._count += 1
+        return command
+
+    def mean_since_last_call(self) -> float:
+        """Mean of the commands since the last call: what a controller's `applied` wants to know."""
+        mean = self._sum_pa / self._count if self._count else self.command_pa
+        self._sum_pa = 0.0
+        self._count = 0
+        return mean
+
+    def _barrier_pa(self, level_m: float, rate_m_s: float) -> float:
+        """Greatest pressure for water rising at `rate_m_s` > 0 towards the positive limit."""
+        limits = self._limits
+        level_m += rate_m_s * limits.lookahead_s
+        room_m = limits.level_m - level_m
+        if room_m <= 1e-3:
+            return -limits.pressure_pa
+        swing_m = rate_m_s / self._frequency_rad_s
+        touch_m = (limits.level_m**2 - level_m**2 - swing_m**2) / (2 * room_m)
+        brake_pa = limits.brake_share * limits.pressure_pa
+        allowed = -brake_pa + limits.sharpness * (self._stiffness_pa_m * touch_m + brake_pa)
+        return min(max(allowed, -limits.pressure_pa), limits.pressure_pa)

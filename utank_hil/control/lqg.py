@@ -1,0 +1,263 @@
+"""Linear-quadratic control, thesis section 3.4, and a Kalman filter for what is not measured.
+
+For x(k+1) = A x(k) + B u(k) + w(k), y(k) = C x(k) + D u(k) + v(k):
+
+* `design_lqr`: u = -K x that makes the sum of x'Q x + u'R u + 2 x'N u least;
+* `design_lqg`: the same gain on the state that a Kalman predictor tells from y(k-1), y(k-2), ... ::
+
+      xhat(k+1) = A xhat(k) + B u(k) + L (y(k) - C xhat(k) - D u(k)),    u(k) = -K xhat(k)
+
+With the sampled models of `utank_hil.dynamics.sampling` this is the loop's own timing, delay, lag
+and the newest measurement included.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.arx import discrete_matrices
+from utank_hil.control.gain import GainLaw
+from utank_hil.dynamics.sampling import LinearModel
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+
+def design_lqr(
+    system: "StateSpace | LinearModel",
+    state_weight: npt.ArrayLike,
+    input_weight: npt.ArrayLike = 1.0,
+    cross_weight: npt.ArrayLike | None = None,
+) -> GainLaw:
+    """Linear-quadratic regulator of a discrete model whose whole state is measured.
+
+    Parameters
+    ----------
+    system : control.StateSpace or LinearModel
+        Discrete, n states, r inputs.
+    state_weight : array_like, shape (n, n) or ()
+        Q, symmetric and not negative; a number stands for so many times the unit matrix.
+    input_weight : array_like, shape (r, r) or ()
+        R, symmetric and positive.
+    cross_weight : array_like, shape (n, r), optional
+        N.
+
+    Returns
+    -------
+    GainLaw
+        ``gain`` K, shape (r, n); its controller is stepped with the state.
+
+    Raises
+    ------
+    ValueError
+        If the model is not discrete or a weight does not fit or is not positive.
+    numpy.linalg.LinAlgError
+        If no stabilizing gain exists.
+    """
+    from scipy.linalg import solve_discrete_are
+
+    a, b, _, _, sample_time_s = discrete_matrices(system)
+    states, inputs = b.shape
+    q = _weight("state_weight", state_weight, states)
+    r = _weight("input_weight", input_weight, inputs)
+    if np.linalg.eigvalsh(r).min() <= 0:
+        raise ValueError("input_weight must be positive definite")
+    n = np.zeros((states, inputs)) if cross_weight is None else np.asarray(cross_weight, float)
+    if n.shape != (states, inputs):
+        raise ValueError(f"cross_weight must have shape ({states}, {inputs}), got {n.shape}")
+    value: FloatArray = solve_discrete_are(a, b, q, r, s=n)
+    gain = np.linalg.solve(r + b.T @ value @ b, b.T @ value @ a + n.T)
+    return GainLaw(gain, sample_time_s)
+
+
+def kalman_predictor(
+    system: "StateSpace | LinearModel",
+    process_covariance: npt.ArrayLike,
+    measurement_covariance: npt.ArrayLike,
+) -> tuple[FloatArray, FloatArray]:
+    """Stationary Kalman predictor.
+
+    Parameters
+    ----------
+    system : control.StateSpace or LinearModel
+        Discrete, n states, m outputs.
+    process_covariance : array_like, shape (n, n)
+        Of the white noise w.
+    measurement_covariance : array_like, shape (m, m)
+        Of the white noise v, positive definite.
+
+    Returns
+    -------
+    gain : ndarray, shape (n, m)
+        L.
+    innovation_covariance : ndarray, shape (m, m)
+        Of y(k) - C xhat(k) - D u(k), which is white where model and covariances are true.
+
+    Raises
+    ------
+    ValueError, numpy.linalg.LinAlgError
+        As `design_lqr`.
+    """
+    from scipy.linalg import solve_discrete_are
+
+    a, _, c, _, _ = discrete_matrices(system)
+    process = _weight("process_covariance", process_covariance, len(a))
+    measurement = _weight("measurement_covariance", measurement_covariance, len(c))
+    error: FloatArray = solve_discrete_are(a.T, c.T, process, measurement)
+    innovation = c @ error @ c.T + measurement
+    return np.linalg.solve(innovation, c @ error @ a.T).T, innovation
+
+
+def design_lqg(
+    system: "StateSpace | LinearModel",
+    regulator: GainLaw,
+    process_covariance: npt.ArrayLike,
+    measurement_covariance: npt.ArrayLike,
+) -> "LQGLaw":
+    """A regulator on the state that a Kalman predictor tells from the outputs.
+
+    Parameters
+    ----------
+    system : control.StateSpace or LinearModel
+        Discrete; its outputs are what is measured.
+    regulator : GainLaw
+        From `design_lqr`, of the same states.
+    process_covariance, measurement_covariance : array_like
+        As `kalman_predictor` takes them.
+
+    Raises
+    ------
+    ValueError
+        If model and regulator do not belong together.
+    """
+    a, b, c, d, sample_time_s = discrete_matrices(system)
+    if regulator.gain.shape != b.T.shape or regulator.sample_time_s != sample_time_s:
+        raise ValueError("the regulator was designed for other states or another sample time")
+    gain, innovation = kalman_predictor(system, process_covariance, measurement_covariance)
+    return LQGLaw(LinearModel(a, b, c, d, sample_time_s), regulator.gain, gain, innovation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LQGLaw:
+    """Regulator and Kalman predictor.
+
+    Attributes
+    ----------
+    model : LinearModel
+        Discrete, from inputs to the measured outputs.
+    gain : ndarray, shape (r, n)
+        K.
+    observer_gain : ndarray, shape (n, m)
+        L.
+    innovation_covariance : ndarray, shape (m, m)
+    """
+
+    model: LinearModel
+    gain: FloatArray
+    observer_gain: FloatArray
+    innovation_covariance: FloatArray
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between two steps."""
+        return self.model.dt
+
+    def controller(self) -> "LQGController":
+        """A new steppable controller, at rest."""
+        return LQGController(self)
+
+    def matrices(self) -> LinearModel:
+        """The law from y to u; its states are the predicted ones."""
+        a, b, c, d, dt = self.model
+        closed = a - b @ self.gain - self.observer_gain @ (c - d @ self.gain)
+        inputs, outputs = len(self.gain), len(c)
+        return LinearModel(closed, self.observer_gain, -self.gain, np.zeros((inputs, outputs)), dt)
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """Transfer matrix from y to u at the points `z`, shape (N,); shape (N, r, m)."""
+        a, b, c, _, _ = self.matrices()
+        resolvent = np.asarray(z)[:, None, None] * np.eye(len(a)) - a
+        response: ComplexArray = c @ np.linalg.solve(resolvent, b.astype(np.complex128))
+        return response
+
+    def reference_gain(self) -> FloatArray:
+        """Shape (r, m): turns a constant target of the outputs into a feedforward.
+
+        The steady input that brings the outputs nearest to the target (least squares), and the gain
+        times the state it leads to.
+        """
+        a, b, c, d, _ = self.model
+        steady = np.linalg.solve(np.eye(len(a)) - a, b)
+        feedforward: FloatArray = (np.eye(b.shape[1]) + self.gain @ steady) @ np.linalg.pinv(
+            c @ steady + d
+        )
+        return feedforward
+
+
+class LQGController:
+    """Steps an `LQGLaw`.
+
+    Parameters
+    ----------
+    law : LQGLaw
+
+    Attributes
+    ----------
+    innovation : ndarray, shape (m,)
+        What the newest measurement held beyond its prediction: white while the model is true.
+    """
+
+    def __init__(self, law: LQGLaw) -> None:
+        self.sample_time_s = law.sample_time_s
+        a, b, c, d, _ = law.model
+        self._a, self._b, self._c, self._d = a, b, c, d
+        self._gain, self._observer_gain = -law.gain, law.observer_gain
+        self._reference_gain: FloatArray | None = None
+        self._law = law
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: state and input zero."""
+        self._state = np.zeros(len(self._a))
+        self._input = np.zeros(self._b.shape[1])
+        self.innovation = np.zeros(len(self._c))
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Take the newest measurement, shape (m,), and return the command, shape (r,).
+
+        `reference`, shape (m,), is a constant target of the outputs.
+        """
+        u = self._input
+        self.innovation = y - self._c.dot(self._state) - self._d.dot(u)
+        self._state = (
+            self._a.dot(self._state) + self._b.dot(u) + self._observer_gain.dot(self.innovation)
+        )
+        command: FloatArray = self._gain.dot(self._state)
+        if reference is not None:
+            if self._reference_gain is None:
+                self._reference_gain = self._law.reference_gain()
+            command += self._reference_gain @ reference
+        self._input = command.copy()
+        return command
+
+    def applied(self, u: FloatArray) -> None:
+        """Replace the newest input by what was really commanded: the predictor goes on from it."""
+        self._input = np.array(u, dtype=np.float64)
+
+
+def _weight(name: str, values: npt.ArrayLike, size: int) -> FloatArray:
+    """A symmetric matrix, from itself or from a number."""
+    weight = np.asarray(values, dtype=np.float64)
+    if weight.ndim == 0:
+        weight = weight * np.eye(size)
+    if weight.shape != (size, size):
+        raise ValueError(f"{name} must have shape ({size}, {size}), got {weight.shape}")
+    if not np.allclose(weight, weight.T, rtol=1e-9, atol=1e-12 * np.abs(weight).max()):
+        raise ValueError(f"{name} must be symmetric")
+    if not math.isfinite(weight.sum()) or np.diag(weight).min() < 0:
+        raise ValueError(f"{name} must be finite and not negative")
+    return weight

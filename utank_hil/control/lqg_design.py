@@ -1,0 +1,124 @@
+"""From a ship, a tank and what is known of the sea to an LQG law.
+
+The Kalman filter is that of the predictive designs with unlimited memory: the same model of ship,
+tank, drive lag, delay and wave moment (`ship_design`). The regulator weighs roll, level and their
+rates as they are at the samples, and because the wave moment is part of the model, it answers the
+wave it expects, not only the motion there is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.interface import LinearLaw
+from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
+from utank_hil.control.ship_design import Predictor, _first_order, _noise_covariance
+from utank_hil.control.washout import WashoutLaw
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+
+@dataclass(frozen=True, slots=True)
+class LQGDesign:
+    """An LQG law in parameters: what a configuration file holds.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        What the Kalman filter is told. Its `order` counts for nothing here.
+    state_weight : tuple of float
+        On the squares of `STATES`, per rad^2, (rad/s)^2, m^2, (m/s)^2.
+    input_weight : float
+        On the square of the pressure in Pa.
+    washout_rad_s : float
+        Corner of the washout that keeps the steady list from the law (`WashoutLaw`); 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If a weight is out of its range.
+    """
+
+    predictor: Predictor
+    state_weight: tuple[float, ...]
+    input_weight: float = 1.0
+    washout_rad_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.state_weight) != len(STATES) or not min(self.state_weight) >= 0:
+            raise ValueError(
+                f"state_weight must have {len(STATES)} numbers, none negative, got "
+                f"{self.state_weight}"
+            )
+        if not self.input_weight > 0:
+            raise ValueError(f"input_weight must be positive, got {self.input_weight}")
+
+    def law(
+        self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
+    ) -> LinearLaw:
+        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of its range.
+        """
+        law = self._lqg_law(ship, tank, delay_s, lag_s)
+        return WashoutLaw(law, self.washout_rad_s) if self.washout_rad_s else law
+
+    def _lqg_law(self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float) -> LQGLaw:
+        plant, process = wave_plant(self.predictor, ship, tank, delay_s, lag_s)
+        weight = np.diag(self.state_weight)
+        regulator = design_lqr(
+            plant,
+            plant.C.T @ weight @ plant.C,
+            self.input_weight + plant.D.T @ weight @ plant.D,
+            plant.C.T @ weight @ plant.D,
+        )
+        rows = [STATES.index(name) for name in self.predictor.measured]
+        return design_lqg(
+            plant._replace(C=plant.C[rows], D=plant.D[rows]),
+            regulator,
+            process,
+            np.diag(np.square(self.predictor.measurement_std)),
+        )
+
+
+def wave_plant(
+    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
+) -> tuple[LinearModel, FloatArray]:
+    """Sampled model of ship, tank, drive and wave moment, and its process noise.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    ship : RollShip
+    tank : Tank
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Returns
+    -------
+    plant : LinearModel
+        From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
+    process_covariance : ndarray, shape (n, n)
+    """
+    a_ship, pressure, wave = _first_order(ship, tank)
+    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
+    n = len(STATES)
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n] = a_ship
+    a[:n, n : n + 1] = wave * ship.stiffness_nm_rad * predictor.wave_slope_rad
+    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
+    b = np.vstack([pressure, np.zeros((2, 1))])
+    noise = np.zeros((n + 2, 2))
+    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
+    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
+    model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
+    plant = sample(model, predictor.sample_time_s, delay_s, lag_s)
+    process = np.zeros(plant.A.shape)
+    process[: n + 2, : n + 2] = _noise_covariance(a, noise, predictor.sample_time_s)
+    return plant, process

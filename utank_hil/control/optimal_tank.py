@@ -1,0 +1,124 @@
+"""The best passive tank, thesis 3.2: frequency and damping ratio by min-max of the roll response.
+
+With the tank angle tau = h / (L/2), frequency ratios to the ship's roll frequency w_s (water f,
+wave q), mass ratio mu = m_hh / m_phiphi and coupling ratio G1 = 2 (H + Lz) / (2H + L At/Ap)::
+
+    D = (f^2 - q^2 + 2 i q f xi_h)(1 - q^2 + 2 i q xi_phi) - mu (c - q^2 G1)^2
+    phi / phi_st = (f^2 - q^2 + 2 i q f xi_h) / D,        phi_st = K_wave / k_phiphi
+
+The static coupling c is f^2 for a tank that is built with the frequency ratio f. A pump that
+changes the water's stiffness leaves c at what the tank was built with.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+_WAVES = np.geomspace(0.05, 5.0, 4000)
+
+
+@dataclass(frozen=True, slots=True)
+class ShipTankRatios:
+    """What the roll response depends on, besides frequency and damping of the water.
+
+    Parameters
+    ----------
+    mass_ratio : float
+        mu, between 0 and 1.
+    coupling_ratio : float
+        G1.
+    roll_damping_ratio : float
+        xi_phi of the ship without her tank.
+    static_coupling : float, optional
+        c, for a tank that exists; f^2 when left out.
+
+    Raises
+    ------
+    ValueError
+        If a ratio is out of its range.
+    """
+
+    mass_ratio: float
+    coupling_ratio: float
+    roll_damping_ratio: float = 0.0
+    static_coupling: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.mass_ratio < 1:
+            raise ValueError(f"mass_ratio must lie between 0 and 1, got {self.mass_ratio}")
+        if not math.isfinite(self.coupling_ratio):
+            raise ValueError(f"coupling_ratio must be finite, got {self.coupling_ratio}")
+        if not self.roll_damping_ratio >= 0:
+            raise ValueError(
+                f"roll_damping_ratio must be zero or more, got {self.roll_damping_ratio}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class PassiveOptimum:
+    """Best tank for a ship.
+
+    Attributes
+    ----------
+    frequency_ratio : float
+        Frequency of the water per roll frequency.
+    damping_ratio : float
+        Of the water.
+    peak : float
+        Greatest roll per static roll over all wave frequencies.
+    """
+
+    frequency_ratio: float
+    damping_ratio: float
+    peak: float
+
+
+def ship_ratios(ship: RollShip, tank: Tank) -> tuple[ShipTankRatios, float]:
+    """Ratios of a ship with her tank, and her roll frequency w_s (rad/s) with the water at rest."""
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    frequency = math.sqrt(stiffness[0, 0] / mass[0, 0])
+    ratios = ShipTankRatios(
+        # coupled_matrices has the level, here it is the tank angle
+        mass_ratio=float(mass[1, 1] * (tank.width_m / 2) ** 2 / mass[0, 0]),
+        coupling_ratio=2 * (tank.height_m + tank.lz_m) / tank.effective_length_m,
+        roll_damping_ratio=float(damping[0, 0] / (2 * mass[0, 0] * frequency)),
+        static_coupling=(tank.natural_frequency_rad_s / frequency) ** 2,
+    )
+    return ratios, frequency
+
+
+def roll_magnification(
+    wave_ratio: FloatArray, frequency_ratio: float, damping_ratio: float, ratios: ShipTankRatios
+) -> ComplexArray:
+    """Roll per static roll phi / phi_st at wave frequency ratios q, shape (N,)."""
+    q, f = np.asarray(wave_ratio), frequency_ratio
+    static = f**2 if ratios.static_coupling is None else ratios.static_coupling
+    coupling = static - q**2 * ratios.coupling_ratio
+    tank: ComplexArray = f**2 - q**2 + 2j * q * f * damping_ratio
+    ship = 1 - q**2 + 2j * q * ratios.roll_damping_ratio
+    ratio: ComplexArray = tank / (tank * ship - ratios.mass_ratio * coupling**2)
+    return ratio
+
+
+def passive_optimum(ratios: ShipTankRatios) -> PassiveOptimum:
+    """Frequency and damping ratio of the water with the least greatest roll."""
+    from scipy.optimize import minimize
+
+    def peak(logs: FloatArray) -> float:
+        f, xi = np.exp(logs)
+        return float(np.abs(roll_magnification(_WAVES, f, xi, ratios)).max())
+
+    found = minimize(
+        peak,
+        np.log([1.0, math.sqrt(ratios.mass_ratio / 2)]),
+        method="Nelder-Mead",
+        options={"xatol": 1e-8, "fatol": 1e-10, "maxfev": 2000},
+    )
+    f, xi = np.exp(found.x)
+    return PassiveOptimum(float(f), float(xi), float(found.fun))

@@ -1,0 +1,42 @@
+"""PD control of the level, thesis (3.5): the pump makes the tank the best passive one.
+
+P = -k h - c h', with k and c such that the water in a ship held still has the frequency and damping
+ratio of `passive_optimum`. The pump changes the water's stiffness and loss, not how strongly ship
+and water are coupled.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from utank_hil.control.gain import GainLaw
+from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+PD_MEASURED: Final = ("level_m", "level_rate_m_s")
+
+
+def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLaw:
+    """PD law on `PD_MEASURED` that gives the tank its best frequency and damping.
+
+    The gains suppose no delay, so the sample time must be short against the roll period.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    sample_time_s : float
+
+    Returns
+    -------
+    GainLaw
+    """
+    ratios, ship_frequency = ship_ratios(ship, tank)
+    best = passive_optimum(ratios)
+    mass, damping, stiffness = (matrix[1, 1] for matrix in coupled_matrices(ship, tank))
+    frequency = best.frequency_ratio * ship_frequency
+    spring = mass * frequency**2 - stiffness
+    loss = 2 * best.damping_ratio * frequency * mass - damping
+    return GainLaw(np.array([[spring, loss]]) / tank.reservoir_area_m2, sample_time_s)

@@ -1,0 +1,227 @@
+"""From a ship, a tank and what is known of the sea to a predictive law.
+
+The predictor is made for the plant as the loop sees it: ship and tank, the drive's lag, the delay
+from sensor to pump, and the waves. A wave moment that comes in groups around a peak is modelled as
+white noise through a lightly damped oscillator::
+
+    K'' + 2 zeta wp K' + wp^2 K = noise
+
+and a white disturbance of the pump's pressure stands for all that the model does not know: the more
+of it, the less the predictor trusts its model, and the greater the margins.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.arx import ARX
+from utank_hil.control.finite_memory import finite_memory_arx
+from utank_hil.control.interface import LinearLaw
+from utank_hil.control.law import PredictiveLaw
+from utank_hil.control.predictive import design_dpc, design_gpc
+from utank_hil.control.washout import WashoutLaw
+from utank_hil.dynamics.linear import STATES, coupled_matrices
+from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+
+@dataclass(frozen=True, slots=True)
+class Predictor:
+    """What the predictor is told; with it the ARX model of a ship and tank is determined.
+
+    Parameters
+    ----------
+    measured : tuple of str
+        Outputs, in order: ``"roll_rad"``, ``"roll_rate_rad_s"``, ``"level_m"``,
+        ``"level_rate_m_s"``.
+    measurement_std : tuple of float
+        Standard deviation of the white noise on each, in its unit.
+    order : int
+        Number p of past samples.
+    wave_peak_rad_s : float
+        Frequency wp of the wave moment's peak.
+    wave_damping_ratio : float
+        zeta; small for long groups.
+    wave_slope_rad : float
+        RMS of the effective wave slope, wave moment per roll stiffness of the ship.
+    pressure_noise_pa_rt_s : float
+        Root of the two-sided density of the white pressure disturbance.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    measured: tuple[str, ...]
+    measurement_std: tuple[float, ...]
+    order: int
+    wave_peak_rad_s: float
+    wave_damping_ratio: float
+    wave_slope_rad: float
+    pressure_noise_pa_rt_s: float
+    sample_time_s: float = 0.2
+
+    def __post_init__(self) -> None:
+        unknown = set(self.measured) - set(STATES)
+        if unknown or not self.measured:
+            raise ValueError(f"measured must name outputs among {STATES}, got {self.measured}")
+        if len(self.measurement_std) != len(self.measured):
+            raise ValueError(
+                f"measurement_std must have one value per measured output, {len(self.measured)}"
+            )
+        positive = {
+            "measurement_std": min(self.measurement_std),
+            "order": self.order,
+            "wave_peak_rad_s": self.wave_peak_rad_s,
+            "wave_damping_ratio": self.wave_damping_ratio,
+            "wave_slope_rad": self.wave_slope_rad,
+            "sample_time_s": self.sample_time_s,
+        }
+        for name, value in positive.items():
+            if not value > 0:
+                raise ValueError(f"predictor {name} must be positive, got {value}")
+        if not self.pressure_noise_pa_rt_s >= 0:
+            raise ValueError(
+                "predictor pressure_noise_pa_rt_s must be zero or more, got "
+                f"{self.pressure_noise_pa_rt_s}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class PredictiveDesign:
+    """A predictive law in parameters: what a configuration file holds.
+
+    Parameters
+    ----------
+    kind : {"gpc", "dpc"}
+        Which law.
+    predictor : Predictor
+    control_horizon, prediction_horizon : int
+    output_weight : tuple of float, optional
+        One for each measured output. None, for DPC alone, is the exact deadbeat.
+    first_output : int
+        See `design_gpc`; for GPC alone.
+    washout_rad_s : float
+        Corner of the washout that keeps the steady list from the law (`WashoutLaw`); 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, or DPC has a first output.
+    """
+
+    kind: Literal["gpc", "dpc"]
+    predictor: Predictor
+    control_horizon: int
+    prediction_horizon: int
+    output_weight: tuple[float, ...] | None = None
+    first_output: int = 0
+    washout_rad_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("gpc", "dpc"):
+            raise ValueError(f"kind must be gpc or dpc, got {self.kind}")
+        if self.kind == "dpc" and self.first_output:
+            raise ValueError("first_output belongs to GPC; DPC weighs from control_horizon on")
+
+    def law(
+        self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
+    ) -> LinearLaw:
+        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of its range.
+        """
+        law = self._predictive_law(ship, tank, delay_s, lag_s)
+        return WashoutLaw(law, self.washout_rad_s) if self.washout_rad_s else law
+
+    def _predictive_law(
+        self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
+    ) -> PredictiveLaw:
+        arx = wave_arx(self.predictor, ship, tank, delay_s, lag_s)
+        if self.kind == "dpc":
+            return design_dpc(
+                arx, self.control_horizon, self.prediction_horizon, self.output_weight
+            )
+        if self.output_weight is None:
+            raise ValueError("GPC needs an output_weight for each measured output")
+        return design_gpc(
+            arx,
+            self.control_horizon,
+            self.prediction_horizon,
+            self.output_weight,
+            first_output=self.first_output,
+        )
+
+
+def pump_model(ship: RollShip, tank: Tank, measured: tuple[str, ...]) -> LinearModel:
+    """Continuous model from pump pressure to the `measured` outputs, without python-control."""
+    a, b, _ = _first_order(ship, tank)
+    c = np.eye(len(STATES))[[STATES.index(name) for name in measured]]
+    return LinearModel(a, b, c, np.zeros((len(measured), 1)), 0.0)
+
+
+def wave_arx(
+    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
+) -> ARX:
+    """ARX model of least prediction error for a ship and tank in waves.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    ship : RollShip
+    tank : Tank
+    delay_s, lag_s : float
+        As in `sampled_model`.
+    """
+    pump = pump_model(ship, tank, predictor.measured)
+    wave_input = _first_order(ship, tank)[2]
+    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
+    n = len(STATES)
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n] = pump.A
+    a[:n, n : n + 1] = wave_input * ship.stiffness_nm_rad * predictor.wave_slope_rad
+    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
+    b = np.vstack([pump.B, np.zeros((2, 1))])
+    c = np.hstack([pump.C, np.zeros((len(pump.C), 2))])
+    noise = np.zeros((n + 2, 2))
+    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
+    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
+    plant = sample(LinearModel(a, b, c, pump.D, 0.0), predictor.sample_time_s, delay_s, lag_s)
+    process = np.zeros(plant.A.shape)
+    process[: n + 2, : n + 2] = _noise_covariance(a, noise, predictor.sample_time_s)
+    measurement = np.diag(np.square(predictor.measurement_std))
+    return finite_memory_arx(plant, process, measurement, predictor.order)
+
+
+def _first_order(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """State, pressure and wave-moment matrices of `coupled_model`, states in its order."""
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    inverse = np.linalg.inv(mass)
+    a = np.zeros((4, 4))
+    a[[0, 2], [1, 3]] = 1.0
+    a[np.ix_([1, 3], [0, 2])] = -inverse @ stiffness
+    a[np.ix_([1, 3], [1, 3])] = -inverse @ damping
+    pressure, wave = np.zeros((4, 1)), np.zeros((4, 1))
+    pressure[[1, 3], 0] = inverse @ [0.0, tank.reservoir_area_m2]
+    wave[[1, 3], 0] = inverse @ [1.0, 0.0]
+    return a, pressure, wave
+
+
+def _noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatArray:
+    """Covariance gathered over a time from unit white noise through `noise` (Van Loan 1978)."""
+    from scipy.linalg import expm
+
+    n = len(a)
+    block = np.zeros((2 * n, 2 * n))
+    block[:n, :n], block[:n, n:], block[n:, n:] = -a, noise @ noise.T, a.T
+    whole = expm(block * time_s)
+    covariance: FloatArray = whole[n:, n:].T @ whole[:n, n:]
+    return (covariance + covariance.T) / 2

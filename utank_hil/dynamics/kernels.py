@@ -1,0 +1,355 @@
+"""Compiled fixed-step integration of the nonlinear coupled model. Imports numba: import it late.
+
+Classical Runge-Kutta of order four. The wave moment is a sum of components ``amplitude
+cos(frequency t + phase)``, advanced by rotating one phasor per component and refreshed from the
+cosines every `REFRESH` steps: a step costs no trigonometry of the sea and rounding does not build
+up. Pump pressure and valve loss are held over whole steps.
+
+A step in which the level passes its limit is cut at the strike (the Illinois method finds its
+length), the impulse is applied, and the rest of the step follows.
+"""
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.nonlinear import RollCoefficients
+from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
+
+REFRESH = 256  # a power of two
+STRIKES_PER_STEP = 8  # with more than these in one step the water comes to rest at the stop
+CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE = range(5)  # entries of a ship's summary
+SUMMARY = 5
+# sums may be reordered and fused, for vector instructions; NaN and infinity keep their meaning
+FAST = {"reassoc", "contract", "nsz", "arcp"}
+
+State = tuple[float, float, float, float]
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def sine_cosine(angle: float) -> tuple[float, float]:
+    """Sine and cosine together, to 2e-16 for angles of a few turns.
+
+    The minimax polynomials of fdlibm on -pi/4 to pi/4; half the time of a step went into calls of
+    the library's two functions.
+    """
+    quarter = math.floor(angle * (2 / math.pi) + 0.5)
+    r = angle - quarter * (math.pi / 2)
+    z = r * r
+    sin = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
+    sin = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * sin)
+    sin = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * sin))
+    cos = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
+    cos = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * cos)
+    cos = 4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * cos)
+    cos = 1 - 0.5 * z + z * z * cos
+    if quarter == 0:
+        return sin, cos
+    turn = int(quarter) & 3
+    if turn & 1:
+        sin, cos = cos, -sin
+    return (-sin, -cos) if turn & 2 else (sin, cos)
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def accelerations(
+    c: RollCoefficients,
+    per_piece: float,
+    restoring: FloatArray,
+    phi: float,
+    phi_dot: float,
+    h: float,
+    h_dot: float,
+    moment: float,
+    pump: float,
+    valve: float,
+) -> tuple[float, float]:
+    """Roll and level acceleration; `pump` is area times pressure, `valve` area times valve loss."""
+    sin, cos = sine_cosine(phi)
+    heel = abs(phi)
+    piece = min(int(heel * per_piece), restoring.shape[0] - 1)
+    if piece > 0:
+        heel -= piece / per_piece
+    righting = 0.0
+    for k in range(restoring.shape[1] - 1, -1, -1):
+        righting = righting * heel + restoring[piece, k]
+    if phi < 0:
+        righting = -righting
+    roll_inertia = c.inertia + c.inertia_h2 * h * h
+    roll_moment = (
+        moment
+        + c.wind_moment
+        + (c.offset_moment + c.weight_h * h) * cos
+        - (c.damping + c.quadratic_damping * abs(phi_dot)) * phi_dot
+        - righting
+        - 2 * c.inertia_h2 * h * h_dot * phi_dot
+        - (c.weight_lever - c.weight_h2 * h * h) * sin
+    )
+    level_force = (
+        pump
+        - (c.loss + (c.quadratic_loss + valve) * abs(h_dot)) * h_dot
+        + c.inertia_h2 * h * phi_dot * phi_dot
+        + c.weight_h * sin
+        - 2 * c.weight_h2 * h * cos
+    )
+    scale = 1 / (roll_inertia * c.level_inertia - c.coupling * c.coupling)
+    h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) * scale
+    if abs(h) >= c.level_limit and h * h_dot >= 0 and h * h_ddot > 0:  # pressed against the stop
+        return roll_moment / roll_inertia, 0.0
+    return (c.level_inertia * roll_moment - c.coupling * level_force) * scale, h_ddot
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def rk4(
+    c: RollCoefficients,
+    per_piece: float,
+    restoring: FloatArray,
+    state: State,
+    moments: tuple[float, float, float],
+    pump: float,
+    valve: float,
+    dt: float,
+) -> State:
+    """One step; `moments` are the wave's at its start, middle and end."""
+    x, v1, h, w1 = state
+    start, middle, end = moments
+    half = 0.5 * dt
+    a1, b1 = accelerations(c, per_piece, restoring, x, v1, h, w1, start, pump, valve)
+    v2, w2 = v1 + half * a1, w1 + half * b1
+    x2, h2 = x + half * v1, h + half * w1
+    a2, b2 = accelerations(c, per_piece, restoring, x2, v2, h2, w2, middle, pump, valve)
+    v3, w3 = v1 + half * a2, w1 + half * b2
+    x3, h3 = x + half * v2, h + half * w2
+    a3, b3 = accelerations(c, per_piece, restoring, x3, v3, h3, w3, middle, pump, valve)
+    v4, w4 = v1 + dt * a3, w1 + dt * b3
+    x4, h4 = x + dt * v3, h + dt * w3
+    a4, b4 = accelerations(c, per_piece, restoring, x4, v4, h4, w4, end, pump, valve)
+    sixth = dt / 6
+    return (
+        x + sixth * (v1 + 2 * (v2 + v3) + v4),
+        v1 + sixth * (a1 + 2 * (a2 + a3) + a4),
+        h + sixth * (w1 + 2 * (w2 + w3) + w4),
+        w1 + sixth * (b1 + 2 * (b2 + b3) + b4),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _part(
+    moments: tuple[float, float, float], begin: float, end: float
+) -> tuple[float, float, float]:
+    """Moments at start, middle and end of a part of the step, by the parabola through three."""
+    a, b, c = moments
+    slope, bend = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
+    mid = 0.5 * (begin + end)
+    return (
+        a + begin * (slope + begin * bend),
+        a + mid * (slope + mid * bend),
+        a + end * (slope + end * bend),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def cut_step(
+    c: RollCoefficients,
+    per_piece: float,
+    restoring: FloatArray,
+    state: State,
+    moments: tuple[float, float, float],
+    pump: float,
+    valve: float,
+    dt: float,
+    time: float,
+    impacts: FloatArray,
+    summary: FloatArray,
+) -> State:
+    """One step with strikes at the limits of the level, each written to `impacts` and counted."""
+    done = 0.0
+    limit = c.level_limit
+    for strike in range(STRIKES_PER_STEP + 1):
+        left = 1.0 - done
+        part = _part(moments, done, 1.0)
+        after = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
+        if abs(after[2]) <= limit:
+            return after
+        side = math.copysign(1.0, after[2])
+        low, high = 0.0, left
+        g_low, g_high = side * state[2] - limit, side * after[2] - limit
+        for _ in range(60):
+            if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
+                break
+            s = high - g_high * (high - low) / (g_high - g_low)
+            part = _part(moments, done, done + s)
+            trial = rk4(c, per_piece, restoring, state, part, pump, valve, s * dt)
+            g = side * trial[2] - limit
+            if g > 0:
+                high, g_high, after = s, g, trial
+                g_low *= 0.5
+            else:
+                low, g_low = s, g
+                g_high *= 0.5
+        done += high
+        x, v, _h, w = after
+        roll_inertia = c.inertia + c.inertia_h2 * limit * limit
+        rebound = -c.restitution * w
+        if (c.restitution < 1 and abs(rebound) < REST_M_S) or strike == STRIKES_PER_STEP:
+            rebound = 0.0
+        jump = rebound - w
+        roll_jump = -c.coupling / roll_inertia * jump
+        number = int(summary[STRIKES])
+        if number < impacts.shape[0]:
+            impacts[number, 0] = time + done * dt
+            impacts[number, 1] = side * limit
+            impacts[number, 2] = w
+            impacts[number, 3] = c.ship_inertia * roll_jump
+            impacts[number, 4] = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
+        summary[STRIKES] += 1
+        summary[MAX_IMPULSE] = max(summary[MAX_IMPULSE], abs(c.ship_inertia * roll_jump))
+        # at rest exactly on the limit, where `accelerations` holds it; else a hair inside, so that
+        # the next strike is a change of sign
+        h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
+        state = (x, v + roll_jump, h, rebound)
+    part = _part(moments, done, 1.0)
+    x, v, h, w = rk4(c, per_piece, restoring, state, part, pump, valve, (1.0 - done) * dt)
+    return x, v, math.copysign(min(abs(h), limit), h), w
+
+
+@njit(cache=True, fastmath=FAST, error_model="numpy")
+def advance(
+    row: FloatArray,
+    per_piece: float,
+    restoring: FloatArray,
+    amplitude: FloatArray,
+    frequency: FloatArray,
+    phase: FloatArray,
+    pressure: FloatArray,
+    valve_loss: FloatArray,
+    hold: int,
+    capsize: float,
+    first: int,
+    steps: int,
+    dt: float,
+    state: FloatArray,
+    summary: FloatArray,
+    impacts: FloatArray,
+    out: FloatArray,
+    stride: int,
+) -> None:
+    """Advance one ship from step `first` by `steps`; `state`, `summary`, `impacts`, `out` change.
+
+    `row` holds `RollCoefficients`. Samples of pressure and valve loss last `hold` steps each, the
+    last one for ever. `out` (k, 4) takes the state before every `stride`-th step. A capsized ship
+    stays as it was when it passed the angle `capsize`.
+    """
+    c = RollCoefficients(
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
+        row[10], row[11], row[12], row[13], row[14], row[15], row[16],
+    )  # fmt: skip
+    waves = len(amplitude)
+    re, im = np.empty(waves), np.empty(waves)
+    half_cos, half_sin = np.empty(waves), np.empty(waves)
+    full_cos, full_sin = np.empty(waves), np.empty(waves)
+    for j in range(waves):
+        half_cos[j], half_sin[j] = math.cos(frequency[j] * dt / 2), math.sin(frequency[j] * dt / 2)
+        full_cos[j], full_sin[j] = math.cos(frequency[j] * dt), math.sin(frequency[j] * dt)
+    now = (state[0], state[1], state[2], state[3])
+    alive = summary[CAPSIZED_S] == np.inf
+    max_roll, max_level = summary[MAX_ROLL], summary[MAX_LEVEL]
+    start = 0.0
+    # counters instead of remainders: integer division would cost as much as a sine
+    record, row_out = 0, 0
+    sample, held = first // hold, first % hold
+    pump = c.area * pressure[min(sample, len(pressure) - 1)]
+    valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
+    for i in range(steps):
+        if record == 0:
+            record = stride
+            if row_out < out.shape[0]:
+                for k in range(4):
+                    out[row_out, k] = now[k]
+            row_out += 1
+        record -= 1
+        if not alive:
+            continue
+        step = first + i
+        if i == 0 or step & (REFRESH - 1) == 0:
+            start = 0.0
+            for j in range(waves):
+                angle = frequency[j] * (step * dt) + phase[j]
+                re[j], im[j] = amplitude[j] * math.cos(angle), amplitude[j] * math.sin(angle)
+                start += re[j]
+        middle, end = 0.0, 0.0
+        for j in range(waves):
+            middle += re[j] * half_cos[j] - im[j] * half_sin[j]
+            turned = re[j] * full_cos[j] - im[j] * full_sin[j]
+            im[j] = re[j] * full_sin[j] + im[j] * full_cos[j]
+            re[j] = turned
+            end += turned
+        if held == hold:
+            held = 0
+            sample += 1
+            pump = c.area * pressure[min(sample, len(pressure) - 1)]
+            valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
+        held += 1
+        moments = (start, middle, end)
+        after = rk4(c, per_piece, restoring, now, moments, pump, valve, dt)
+        if abs(after[2]) > c.level_limit:
+            after = cut_step(
+                c, per_piece, restoring, now, moments, pump, valve, dt, step * dt, impacts, summary
+            )
+        now, start = after, end
+        max_roll, max_level = max(max_roll, abs(now[0])), max(max_level, abs(now[2]))
+        if not abs(now[0]) < capsize:
+            summary[CAPSIZED_S] = (step + 1) * dt
+            alive = False
+    summary[MAX_ROLL], summary[MAX_LEVEL] = max_roll, max_level
+    for k in range(4):
+        state[k] = now[k]
+
+
+@njit(cache=True, fastmath=FAST, parallel=True, error_model="numpy")
+def advance_batch(
+    rows: FloatArray,
+    per_piece: FloatArray,
+    restoring: FloatArray,
+    amplitude: FloatArray,
+    frequency: FloatArray,
+    phase: FloatArray,
+    pressure: FloatArray,
+    valve_loss: FloatArray,
+    hold: int,
+    capsize: float,
+    first: int,
+    steps: int,
+    dt: float,
+    state: FloatArray,
+    summary: FloatArray,
+    out: FloatArray,
+    stride: int,
+) -> None:
+    """`advance` for every row of `state` (n, 4), on all cores.
+
+    Every other array has a leading axis of length n, or 1 if all ships share it.
+    """
+    for n in prange(state.shape[0]):
+        advance(
+            rows[n % rows.shape[0]],
+            per_piece[n % per_piece.shape[0]],
+            restoring[n % restoring.shape[0]],
+            amplitude[n % amplitude.shape[0]],
+            frequency[n % frequency.shape[0]],
+            phase[n % phase.shape[0]],
+            pressure[n % pressure.shape[0]],
+            valve_loss[n % valve_loss.shape[0]],
+            hold,
+            capsize,
+            first,
+            steps,
+            dt,
+            state[n],
+            summary[n],
+            np.empty((0, 5)),
+            out[n],
+            stride,
+        )

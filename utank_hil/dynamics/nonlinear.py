@@ -1,0 +1,202 @@
+"""Nonlinear coupled model of roll and tank at any angle, by Lagrange's equations.
+
+With q = (phi, h), kinetic and potential energy::
+
+    T = 1/2 (m0 + m2 h^2) phi'^2 + m_c phi' h' + 1/2 m_h h'^2
+    V = V_ship(phi) - g (S_y sin phi + S_z cos phi)
+
+    m0 = I + water at rest    m2 = 2 rho At (H - lz)     m_c = -rho At L (H + lz)
+    m_h = rho At (2H + L At/Ap)    S_y = rho At L h      S_z = s0 - rho At h^2
+
+the equations of motion are::
+
+    (m0 + m2 h^2) phi'' + m_c h'' = K_wave + K_wind + K_offset cos phi - (b1 + b2 |phi'|) phi'
+        - R(phi) - 2 m2 h h' phi' + g S_y cos phi - g S_z sin phi
+    m_c phi'' + m_h h'' = At P - At (c1 + c2 |h'|) h' + m2 h phi'^2
+        + rho g At L sin phi - 2 rho g At h cos phi
+
+They replace (4.2)-(4.4), whose h phi'^2 and h h' phi' terms conserve no energy as printed.
+
+The level is stopped where one reservoir is full or the other one empty. The stop is an impulse J on
+the level alone: h' changes to -e h', and the roll rate jumps through the coupling,
+d phi' = -m_c / (m0 + m2 h^2) d h'. While the water is pressed against the stop, h'' = 0.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.restoring import Restoring, restoring
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+
+
+class RollCoefficients(NamedTuple):
+    """Numbers in the equations of motion, in the order in which the kernels read them."""
+
+    inertia: float  # m0
+    inertia_h2: float  # m2
+    coupling: float  # m_c
+    level_inertia: float  # m_h
+    weight_lever: float  # g s0
+    weight_h: float  # rho g At L
+    weight_h2: float  # rho g At
+    damping: float  # b1
+    quadratic_damping: float  # b2
+    offset_moment: float
+    wind_moment: float
+    area: float  # At
+    loss: float  # At c1
+    quadratic_loss: float  # At c2
+    level_limit: float
+    restitution: float
+    ship_inertia: float  # I, without water
+
+
+class Impact(NamedTuple):
+    """The water striking a limit of the level.
+
+    Attributes
+    ----------
+    time_s : float
+    level_m : float
+        Limit that was struck; positive if starboard is full.
+    speed_m_s : float
+        dh/dt just before.
+    roll_impulse_nms : float
+        Impulsive roll moment of tank and water on the ship: its inertia times the jump of its
+        roll rate.
+    stop_impulse_ns : float
+        Impulse of the stop on the water along h (pressure times reservoir area, over time).
+    """
+
+    time_s: float
+    level_m: float
+    speed_m_s: float
+    roll_impulse_nms: float
+    stop_impulse_ns: float
+
+
+@dataclass(frozen=True, slots=True)
+class RollModel:
+    """Ship and tank, coupled in roll; states (roll_rad, roll_rate_rad_s, level_m, level_rate_m_s).
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    """
+
+    ship: RollShip
+    tank: Tank
+    coefficients: RollCoefficients = field(init=False, repr=False)
+    restoring: Restoring = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", _coefficients(self.ship, self.tank))
+        object.__setattr__(self, "restoring", restoring(self.ship))
+
+    def derivative(
+        self,
+        state: npt.ArrayLike,
+        pressure_pa: npt.ArrayLike = 0.0,
+        wave_moment_nm: npt.ArrayLike = 0.0,
+        valve_loss_pa_per_m2_s2: npt.ArrayLike = 0.0,
+        *,
+        stopped: bool = False,
+    ) -> FloatArray:
+        """Time derivative of the state, for one state or many.
+
+        Parameters
+        ----------
+        state : array_like, shape (..., 4)
+        pressure_pa, wave_moment_nm, valve_loss_pa_per_m2_s2 : array_like, shape (...)
+            Inputs; the valve loss is what `valves` returns.
+        stopped : bool
+            Hold the level where it is, as while the water is pressed against a limit.
+
+        Returns
+        -------
+        ndarray, shape (..., 4)
+        """
+        c = self.coefficients
+        phi, phi_dot, h, h_dot = np.moveaxis(np.asarray(state, dtype=np.float64), -1, 0)
+        sin, cos = np.sin(phi), np.cos(phi)
+        roll_inertia = c.inertia + c.inertia_h2 * h**2
+        roll_moment = (
+            np.asarray(wave_moment_nm)
+            + c.wind_moment
+            + c.offset_moment * cos
+            - (c.damping + c.quadratic_damping * np.abs(phi_dot)) * phi_dot
+            - self.restoring.moment_nm(phi)
+            - 2 * c.inertia_h2 * h * h_dot * phi_dot
+            + c.weight_h * h * cos
+            - (c.weight_lever - c.weight_h2 * h**2) * sin
+        )
+        loss = c.quadratic_loss + c.area * np.asarray(valve_loss_pa_per_m2_s2)
+        level_force = (
+            c.area * np.asarray(pressure_pa)
+            - (c.loss + loss * np.abs(h_dot)) * h_dot
+            + c.inertia_h2 * h * phi_dot**2
+            + c.weight_h * sin
+            - 2 * c.weight_h2 * h * cos
+        )
+        if stopped:
+            phi_ddot, h_ddot = roll_moment / roll_inertia, np.zeros_like(h)
+        else:
+            determinant = roll_inertia * c.level_inertia - c.coupling**2
+            phi_ddot = (c.level_inertia * roll_moment - c.coupling * level_force) / determinant
+            h_ddot = (roll_inertia * level_force - c.coupling * roll_moment) / determinant
+        return np.stack(np.broadcast_arrays(phi_dot, phi_ddot, h_dot, h_ddot), axis=-1)
+
+    def strike(self, time_s: float, state: FloatArray) -> tuple[FloatArray, Impact]:
+        """State after the water has struck the limit it stands at, and the impact.
+
+        Parameters
+        ----------
+        time_s : float
+        state : ndarray, shape (4,)
+            With the level at its limit and moving outward.
+        """
+        c = self.coefficients
+        phi, phi_dot, h, h_dot = (float(x) for x in state)
+        roll_inertia = c.inertia + c.inertia_h2 * h**2
+        jump = -(1 + c.restitution) * h_dot
+        roll_jump = -c.coupling / roll_inertia * jump
+        after = np.array([phi, phi_dot + roll_jump, h, h_dot + jump])
+        stop_impulse = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
+        return after, Impact(time_s, h, h_dot, c.ship_inertia * roll_jump, stop_impulse)
+
+
+def _coefficients(ship: RollShip, tank: Tank) -> RollCoefficients:
+    rho, g = tank.density_kg_m3, GRAVITY_M_S2
+    at, ap = tank.reservoir_area_m2, tank.duct_area_m2
+    length, height, lz = tank.width_m, tank.height_m, tank.lz_m
+    water = rho * (
+        at * (2 * height**3 - 6 * lz * height**2 + 6 * lz**2 * height) / 3
+        + at * length**2 * height / 2
+        + ap * lz**2 * length
+        + ap * length**3 / 12
+    )
+    return RollCoefficients(
+        inertia=ship.inertia_kg_m2 + water,
+        inertia_h2=2 * rho * at * (height - lz),
+        coupling=-rho * at * length * (height + lz),
+        level_inertia=rho * at * tank.effective_length_m,
+        weight_lever=rho * g * (at * (2 * lz * height - height**2) + ap * lz * length),
+        weight_h=rho * g * at * length,
+        weight_h2=rho * g * at,
+        damping=ship.damping_nms_rad,
+        quadratic_damping=ship.quadratic_damping_nms2_rad2,
+        offset_moment=ship.offset_moment_nm,
+        wind_moment=ship.wind_moment_nm,
+        area=at,
+        loss=at * tank.loss_pa_per_m_s,
+        quadratic_loss=at * tank.quadratic_loss_pa_per_m2_s2,
+        level_limit=tank.level_limit_m,
+        restitution=tank.restitution,
+        ship_inertia=ship.inertia_kg_m2,
+    )

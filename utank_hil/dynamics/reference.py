@@ -1,0 +1,145 @@
+"""Adaptive high-order integration of the nonlinear coupled model, for verification.
+
+Dormand-Prince 8(5,3) between events: every strike of the water at a limit of the level is located
+to rounding, the impulse is applied, and a stop is left when the water is pulled away from it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.nonlinear import Impact, RollModel
+
+REST_M_S = 1e-4  # a rebound slower than this ends at rest, so that bouncing comes to an end
+INSIDE_M = 1e-12  # where the level starts again, so that its next strike is a sign change
+
+
+@dataclass(frozen=True, slots=True)
+class _Event:
+    """Terminal event in the form that scipy looks for."""
+
+    value: Callable[[float, FloatArray], float]
+    direction: int
+    terminal: bool = True
+
+    def __call__(self, t: float, x: FloatArray) -> float:
+        return self.value(t, x)
+
+
+@dataclass(frozen=True, slots=True)
+class RollRun:
+    """Result of a simulation.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+    state : ndarray, shape (n, 4)
+        Roll, roll rate, level, level rate.
+    impacts : tuple of Impact
+        The water striking the limits of the level.
+    capsized_s : float
+        Time at which the roll angle passed the capsize angle, infinite if it never did; the run
+        ends there.
+    """
+
+    time_s: FloatArray
+    state: FloatArray
+    impacts: tuple[Impact, ...]
+    capsized_s: float
+
+
+def simulate_reference(
+    model: RollModel,
+    duration_s: float,
+    initial: tuple[float, float, float, float] | FloatArray,
+    *,
+    pressure_pa: Callable[[float], float] = lambda _: 0.0,
+    wave_moment_nm: Callable[[float], float] = lambda _: 0.0,
+    samples: int = 1001,
+    tolerance: float = 1e-12,
+    capsize_rad: float = np.pi,
+) -> RollRun:
+    """Integrate to near rounding error, events located exactly.
+
+    Parameters
+    ----------
+    model : RollModel
+    duration_s : float
+    initial : array_like, shape (4,)
+    pressure_pa, wave_moment_nm : callable
+        Smooth functions of the time in s.
+    samples : int
+        Number of equally spaced output times, both ends included.
+    tolerance : float
+        Relative; the absolute one is a hundredth of it in SI units.
+    capsize_rad : float
+        The run ends when the roll angle's size passes it.
+
+    Returns
+    -------
+    RollRun
+
+    Raises
+    ------
+    RuntimeError
+        If the integrator gives up.
+    """
+    from scipy.integrate import solve_ivp
+
+    c = model.coefficients
+    times = np.linspace(0.0, duration_s, samples)
+    out = np.full((samples, 4), np.nan)
+    time, state = 0.0, np.array(initial, dtype=np.float64)
+    stopped = bool(abs(state[2]) >= c.level_limit and state[3] == 0)
+    impacts: list[Impact] = []
+    capsized_s = np.inf
+    filled = 0
+
+    def slope(t: float, x: FloatArray) -> FloatArray:
+        return model.derivative(x, pressure_pa(t), wave_moment_nm(t), stopped=stopped)
+
+    def full(_t: float, x: FloatArray) -> float:  # rises through zero at a limit
+        return float(abs(x[2]) - c.level_limit)
+
+    def pressed(t: float, x: FloatArray) -> float:  # falls through zero when the stop lets go
+        free = model.derivative(x, pressure_pa(t), wave_moment_nm(t))
+        return float(free[3] * np.sign(x[2]))
+
+    def capsize(_t: float, x: FloatArray) -> float:
+        return float(abs(x[0]) - capsize_rad)
+
+    strike, release, over = _Event(full, 1), _Event(pressed, -1), _Event(capsize, 1)
+    while time < duration_s and not np.isfinite(capsized_s):
+        if stopped and pressed(time, state) <= 0:
+            stopped = False
+        run = solve_ivp(
+            slope,
+            (time, duration_s),
+            state,
+            "DOP853",
+            dense_output=True,
+            events=[release if stopped else strike, over],
+            rtol=tolerance,
+            atol=tolerance / 100,
+        )
+        if not run.success:
+            raise RuntimeError(f"integration stopped at {run.t[-1]:.3f} s: {run.message}")
+        end = run.t[-1]
+        upto = np.searchsorted(times, end, side="right")
+        if upto > filled:
+            out[filled:upto] = run.sol(times[filled:upto]).T
+            filled = int(upto)
+        time, state = float(end), run.y[:, -1].copy()
+        if run.t_events[1].size:
+            capsized_s = time
+        elif run.t_events[0].size and not stopped:
+            state[2] = np.copysign(c.level_limit - INSIDE_M, state[2])
+            state, impact = model.strike(time, state)
+            impacts.append(impact)
+            if c.restitution < 1 and abs(state[3]) < REST_M_S:
+                state[3], stopped = 0.0, True
+        elif run.t_events[0].size:
+            stopped = False
+    return RollRun(times[:filled], out[:filled], tuple(impacts), capsized_s)

@@ -1,0 +1,103 @@
+"""Restoring moment of a ship as a piecewise polynomial in the heel angle.
+
+One form serves an odd polynomial (a single piece) and a table of righting levers (a quintic spline
+with slope k1 / displacement at zero heel), so that the compiled kernels need no branches. The
+moment is odd: the pieces describe positive heel. The spline has four continuous derivatives,
+because kinks in fewer of them would cost the integrators their order.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.ship import RollShip
+
+
+class Restoring(NamedTuple):
+    """Pieces of the restoring moment.
+
+    Attributes
+    ----------
+    piece_rad : float
+        Width of a piece; infinite for a polynomial. The last piece goes on beyond its end.
+    coefficients_nm : ndarray, shape (pieces, powers)
+        Moment within a piece as a polynomial of the angle since the piece's start, lowest first.
+    """
+
+    piece_rad: float
+    coefficients_nm: FloatArray
+
+    def moment_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:
+        """Restoring moment at the given roll angles."""
+        piece, since = self._locate(roll_rad)
+        return np.sign(roll_rad) * _horner(self.coefficients_nm[piece], since)
+
+    def energy_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:
+        """Work of heeling from upright to the given roll angles."""
+        piece, since = self._locate(roll_rad)
+        powers = self.coefficients_nm.shape[1]
+        integrals = np.zeros((len(self.coefficients_nm), powers + 1))
+        integrals[:, 1:] = self.coefficients_nm / np.arange(1, powers + 1)
+        for i in range(1, len(integrals)):
+            integrals[i, 0] = _horner(integrals[i - 1], np.asarray(self.piece_rad))
+        return _horner(integrals[piece], since)
+
+    def vanishing_rad(self) -> float:
+        """Angle of vanishing stability: the least positive zero, infinite if there is none."""
+        for i, row in enumerate(self.coefficients_nm):
+            roots = np.roots(row[::-1])
+            real = roots.real[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))]
+            last = i == len(self.coefficients_nm) - 1
+            inside = real[(real > (1e-9 if i == 0 else -1e-9)) & (last | (real <= self.piece_rad))]
+            if inside.size:
+                start = i * self.piece_rad if i else 0.0
+                return float(start + inside.min())
+        return math.inf
+
+    def _locate(self, roll_rad: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """Piece of each angle, and the angle since that piece's start."""
+        heel = np.abs(np.asarray(roll_rad, dtype=np.float64))
+        if math.isinf(self.piece_rad):
+            return np.zeros(heel.shape, dtype=np.intp), heel
+        piece = np.minimum(heel / self.piece_rad, len(self.coefficients_nm) - 1).astype(np.intp)
+        return piece, heel - piece * self.piece_rad
+
+
+def restoring(ship: RollShip) -> Restoring:
+    """Restoring moment of the ship without its tank water.
+
+    Parameters
+    ----------
+    ship : RollShip
+
+    Returns
+    -------
+    Restoring
+    """
+    if not ship.gz_m:
+        odd = (ship.stiffness_nm_rad, *ship.restoring_odd_nm)
+        coefficients = np.zeros((1, 2 * len(odd)))
+        coefficients[0, 1::2] = odd
+        return Restoring(math.inf, coefficients)
+    from scipy.interpolate import make_interp_spline
+
+    levers = np.array(ship.gz_m)
+    heel = ship.gz_step_rad * np.arange(len(levers))
+    slope = ship.stiffness_nm_rad / ship.displacement_n
+    # even derivatives vanish at zero heel, so that the odd continuation is as smooth as the rest;
+    # at the far end one knot less makes up for the third condition
+    knots = np.concatenate([np.zeros(6), heel[1:-2], np.full(6, heel[-1])])
+    conditions = [(1, slope), (2, 0.0), (4, 0.0)]
+    spline = make_interp_spline(heel, levers, k=5, t=knots, bc_type=(conditions, None))
+    taylor = [spline(heel[:-1], nu=k) / math.factorial(k) for k in range(6)]
+    return Restoring(ship.gz_step_rad, ship.displacement_n * np.stack(taylor, axis=1))
+
+
+def _horner(coefficients: FloatArray, x: FloatArray) -> FloatArray:
+    value = np.zeros_like(x)
+    for k in range(coefficients.shape[-1] - 1, -1, -1):
+        value = value * x + coefficients[..., k]
+    return value

@@ -1,0 +1,146 @@
+"""Exact sampling of a continuous model behind a first-order lag and a delay of any length.
+
+Timing of the loop. At t_k = k Ts the controller measures y(t_k) and at once computes a command. The
+command takes effect at t_k + d (sensor delay, bus, controller tick, drive), is held for Ts, and
+reaches the plant through the actuator's lag, T u_a' + u_a = command. The sampled model's input is
+counted one ahead::
+
+    v(k + 1) = command computed at t_k, acts over [t_k + d, t_k + d + Ts)
+
+so y(k) depends on v(k) at once when d < Ts (D is not zero), and a law that makes v(k + 1) from
+y(k), y(k - 1), ... uses the newest measurement.
+
+With d = (n + f) Ts, n whole and 0 <= f < 1, x the continuous state (lag included), Phi = exp(A Ts),
+Gamma(t) the response of x after a time t to a unit step of the command::
+
+    x(t_k) = Phi x(t_{k-1}) + G1 v(k - 1 - n) + G0 v(k - n)
+    G0 = Gamma((1 - f) Ts),    G1 = exp(A (1 - f) Ts) Gamma(f Ts)
+
+The states of the sampled model are xi(k) = x(t_k) - G0 v(k - n), then v(k - 1), ..., v(k - n).
+"""
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+
+class LinearModel(NamedTuple):
+    """Matrices of a linear model, named as in control.StateSpace and taken wherever one is.
+
+    For code that must not import python-control, which brings plotting into the process.
+
+    Attributes
+    ----------
+    A, B, C, D : ndarray
+    dt : float
+        Sample time in seconds, 0 if continuous.
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    dt: float
+
+
+def sampled_model(
+    system: "StateSpace", sample_time_s: float, delay_s: float = 0.0, lag_s: float = 0.0
+) -> "StateSpace":
+    """Discrete model from command to sampled outputs; see the module's text for its timing.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Continuous, without feed-through; all its inputs come from the pump. Pick signals by name:
+        ``coupled_model(ship, tank)[["roll_rad"], ["pressure_pa"]]``.
+    sample_time_s : float
+    delay_s : float
+        From measurement to effect at the drive; may be a fraction of the sample time or exceed it.
+    lag_s : float
+        Time constant of the drive's inner pressure loop.
+
+    Returns
+    -------
+    control.StateSpace
+        States: those of `system`, the lags of its inputs (if `lag_s` > 0), past commands.
+
+    Raises
+    ------
+    ValueError
+        If a time is out of range, or the model is discrete or has a feed-through.
+    """
+    from control import ss  # here, because importing it brings plotting into the process
+
+    model = sample(system, sample_time_s, delay_s, lag_s)
+    return ss(*model, inputs=system.input_labels, outputs=system.output_labels)
+
+
+def sample(
+    system: "StateSpace | LinearModel", sample_time_s: float, delay_s: float, lag_s: float
+) -> LinearModel:
+    """As `sampled_model`, without python-control."""
+    for name, time in (("delay_s", delay_s), ("lag_s", lag_s)):
+        if not (math.isfinite(time) and time >= 0):
+            raise ValueError(f"{name} must be zero or more and finite, got {time}")
+    if not (math.isfinite(sample_time_s) and sample_time_s > 0):
+        raise ValueError(f"sample_time_s must be positive and finite, got {sample_time_s}")
+    if system.dt != 0:
+        raise ValueError(f"the model to be sampled must be continuous, its dt is {system.dt}")
+    if np.any(system.D):
+        raise ValueError("the model to be sampled must have no feed-through (D = 0)")
+    a, b, c = _with_lag(system.A, system.B, system.C, lag_s)
+    whole = math.floor(delay_s / sample_time_s)
+    early_s = delay_s - whole * sample_time_s
+    late_transition, late_step = transition_and_step(a, b, sample_time_s - early_s)
+    early_transition, early_step = transition_and_step(a, b, early_s)
+    transition = late_transition @ early_transition
+    effect = transition @ late_step + late_transition @ early_step
+    return LinearModel(*_shifted(transition, effect, c, c @ late_step, whole), sample_time_s)
+
+
+def transition_and_step(
+    a: FloatArray, b: FloatArray, time_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Free transition exp(A t), and the state after a unit step of each input lasting t."""
+    from scipy.linalg import expm
+
+    states = a.shape[0]
+    block = np.zeros((states + b.shape[1],) * 2)
+    block[:states, :states] = a
+    block[:states, states:] = b
+    whole: FloatArray = expm(block * time_s)
+    return whole[:states, :states], whole[:states, states:]
+
+
+def _with_lag(
+    a: FloatArray, b: FloatArray, c: FloatArray, lag_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The continuous model with a first-order lag of time constant `lag_s` at each input."""
+    if lag_s == 0:
+        return a, b, c
+    states, inputs = b.shape
+    rate = np.eye(inputs) / lag_s
+    return (
+        np.block([[a, b], [np.zeros((inputs, states)), -rate]]),
+        np.vstack([np.zeros((states, inputs)), rate]),
+        np.hstack([c, np.zeros((c.shape[0], inputs))]),
+    )
+
+
+def _shifted(
+    a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, samples: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The discrete model with its input delayed by whole samples."""
+    for _ in range(samples):  # the newest past command joins as a state and feeds what was direct
+        states, inputs = b.shape
+        a = np.block([[a, b], [np.zeros((inputs, states + inputs))]])
+        c = np.hstack([c, d])
+        b = np.vstack([np.zeros((states, inputs)), np.eye(inputs)])
+        d = np.zeros((c.shape[0], inputs))
+    return a, b, c, d

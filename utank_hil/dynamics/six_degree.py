@@ -1,0 +1,268 @@
+"""A ship in six degrees of freedom that carries the tank, in Fossen's vector form.
+
+With eta the earth position of the centre of gravity and the Euler angles, nu = (u, v, w, p, q, r)::
+
+    eta' = J(eta) nu
+    M nu' + C(nu) nu + D nu + g(eta) = tau + tank(nu', h'')
+    rho residual(nu', h'') = P - (c1 + c2 |h'|) h'
+
+M is the rigid ship and its added mass, C follows from M (nu' C nu = 0), g from a potential::
+
+    V = 1/2 k_z z^2 + k_zt z theta + 1/2 k_t theta^2 + V_roll(phi)
+
+and from the buoyancy that carries the tank water, upward at the tank's station, so that upright and
+level is an equilibrium. Tank force, moment and residual are linear in (nu', h''): seven linear
+equations a step. Water level limits are those of the roll model and are not applied here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.kinematics import body_to_earth, euler_rates
+from utank_hil.dynamics.restoring import Restoring, restoring
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.water import water_moments
+from utank_hil.dynamics.wrench import gravity_body, tank_wrench
+
+Matrix6 = tuple[tuple[float, ...], ...]
+ZERO6: Matrix6 = ((0.0,) * 6,) * 6
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True, slots=True)
+class SixDegreeShip:
+    """A rigid ship with linear hydrodynamics, without its tank water.
+
+    Parameters
+    ----------
+    roll : RollShip
+        Roll: its inertia is the dry one plus ``added_mass[3][3]``.
+    mass_kg : float
+    pitch_inertia_kg_m2, yaw_inertia_kg_m2 : float
+        Dry, about the centre of gravity.
+    product_xz_kg_m2 : float
+        Product of inertia, the integral of x z dm.
+    added_mass : 6 x 6 nested tuple of float
+        Symmetric, about the centre of gravity, SI units.
+    damping : 6 x 6 nested tuple of float
+        Linear; ``[3][3]`` must be zero because roll damping belongs to `roll`.
+    heave_stiffness_n_m, heave_pitch_n, pitch_stiffness_nm_rad : float
+        Hydrostatics k_z, k_zt, k_t.
+
+    Raises
+    ------
+    ValueError
+        If a matrix has the wrong shape or symmetry, or the mass matrix is not positive definite.
+    """
+
+    roll: RollShip
+    mass_kg: float
+    pitch_inertia_kg_m2: float
+    yaw_inertia_kg_m2: float
+    product_xz_kg_m2: float = 0.0
+    added_mass: Matrix6 = ZERO6
+    damping: Matrix6 = ZERO6
+    heave_stiffness_n_m: float = 0.0
+    heave_pitch_n: float = 0.0
+    pitch_stiffness_nm_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("added_mass", "damping"):
+            matrix = np.array(getattr(self, name), dtype=np.float64)
+            if matrix.shape != (6, 6) or not np.all(np.isfinite(matrix)):
+                raise ValueError(f"ship {name} must hold 6 x 6 finite numbers")
+        if not np.array_equal(np.array(self.added_mass), np.transpose(self.added_mass)):
+            raise ValueError("ship added_mass must be symmetric")
+        if self.damping[3][3] != 0:
+            raise ValueError("ship damping[3][3] must be zero: give roll damping in `roll`")
+        if not np.linalg.eigvalsh(self.mass_matrix()).min() > 0:
+            raise ValueError("ship mass matrix, added mass included, must be positive definite")
+
+    def mass_matrix(self) -> FloatArray:
+        """Rigid and added mass about the centre of gravity, shape (6, 6)."""
+        matrix = np.array(self.added_mass, dtype=np.float64)
+        matrix[:3, :3] += self.mass_kg * np.eye(3)
+        matrix[3, 3] = self.roll.inertia_kg_m2
+        matrix[4, 4] += self.pitch_inertia_kg_m2
+        matrix[5, 5] += self.yaw_inertia_kg_m2
+        matrix[3, 5] -= self.product_xz_kg_m2
+        matrix[5, 3] -= self.product_xz_kg_m2
+        return matrix
+
+
+@dataclass(frozen=True, slots=True)
+class SixDegreeModel:
+    """Ship and tank in six degrees of freedom.
+
+    The state, shape (14,), is the earth position (x, y, z), the Euler angles (roll, pitch, yaw),
+    the body velocities (u, v, w, p, q, r), the level and its rate.
+
+    Parameters
+    ----------
+    ship : SixDegreeShip
+    tank : Tank
+    free : tuple of str
+        Motions that are free, out of `MOTIONS`; the others are held, with whatever force it takes.
+
+    Raises
+    ------
+    ValueError
+        If a motion's name is unknown.
+    """
+
+    ship: SixDegreeShip
+    tank: Tank
+    free: tuple[str, ...] = MOTIONS
+    _mass: FloatArray = field(init=False, repr=False, compare=False)
+    _damping: FloatArray = field(init=False, repr=False, compare=False)
+    _restoring: Restoring = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        unknown = set(self.free) - set(MOTIONS)
+        if unknown:
+            raise ValueError(f"unknown motions {sorted(unknown)}; known are {MOTIONS}")
+        object.__setattr__(self, "_mass", self.ship.mass_matrix())
+        object.__setattr__(self, "_damping", np.array(self.ship.damping, dtype=np.float64))
+        object.__setattr__(self, "_restoring", restoring(self.ship.roll))
+
+    def derivative(
+        self, state: FloatArray, pressure_pa: float = 0.0, force: FloatArray | None = None
+    ) -> FloatArray:
+        """Time derivative of the state.
+
+        Parameters
+        ----------
+        state : ndarray, shape (14,)
+        pressure_pa : float
+        force : ndarray, shape (6,), optional
+            External force and moment in body axes, as from waves.
+
+        Returns
+        -------
+        ndarray, shape (14,)
+        """
+        angles, nu, level, speed = state[3:6], state[6:12], state[12], state[13]
+        tank = self.tank
+        water = water_moments(tank, level)
+        zero = np.zeros(3)
+        tank_force, tank_moment, residual = tank_wrench(
+            tank, level, speed, 0.0, nu[:3], nu[3:], zero, zero, angles[0], angles[1]
+        )
+        loads = self._hull_loads(state)
+        loads[:3] += tank_force
+        loads[3:] += tank_moment
+        if force is not None:
+            loads += force
+        area = tank.reservoir_area_m2
+        loss = tank.loss_pa_per_m_s + tank.quadratic_loss_pa_per_m2_s2 * abs(speed)
+        level_force = area * (pressure_pa - loss * speed - tank.density_kg_m3 * float(residual))
+
+        matrix = np.zeros((7, 7))
+        matrix[:6, :6] = self._mass
+        matrix[:3, :3] += water.mass_kg * np.eye(3)
+        matrix[:3, 3:6] -= _skew(water.first_kgm)
+        matrix[3:6, :3] += _skew(water.first_kgm)
+        matrix[3:6, 3:6] += water.inertia_kgm2
+        matrix[:3, 6] = matrix[6, :3] = water.first_slope_kg
+        matrix[3:6, 6] = matrix[6, 3:6] = water.swirl_kgm
+        matrix[6, 6] = tank.density_kg_m3 * area * tank.effective_length_m
+        moving = [*(MOTIONS.index(name) for name in self.free), 6]
+        solved = np.zeros(7)
+        solved[moving] = np.linalg.solve(
+            matrix[np.ix_(moving, moving)], np.append(loads, level_force)[moving]
+        )
+        out = np.empty(14)
+        out[:3] = body_to_earth(*angles) @ nu[:3]
+        out[3:6] = euler_rates(angles[0], angles[1]) @ nu[3:]
+        out[6:12] = solved[:6]
+        out[12], out[13] = speed, solved[6]
+        return out
+
+    def _hull_loads(self, state: FloatArray) -> FloatArray:
+        """Forces and moments on the hull in body axes, but those of inertia and of the tank."""
+        ship, roll = self.ship, self.ship.roll
+        z, angles, nu = state[2], state[3:6], state[6:12]
+        turn = body_to_earth(*angles)
+        momentum = self._mass @ nu
+        damping = self._damping @ nu
+        damping[3] += (roll.damping_nms_rad + roll.quadratic_damping_nms2_rad2 * abs(nu[3])) * nu[3]
+        # minus the gradient of the potential, as generalized forces on the Euler angles
+        heeling = roll.offset_moment_nm * np.cos(angles[0]) + roll.wind_moment_nm
+        generalized = np.array(
+            [
+                heeling - float(self._restoring.moment_nm(angles[0])),
+                -ship.pitch_stiffness_nm_rad * angles[1] - ship.heave_pitch_n * z,
+                0.0,
+            ]
+        )
+        heave = -ship.heave_stiffness_n_m * z - ship.heave_pitch_n * angles[1]
+        carrying = -water_moments(self.tank, 0.0).mass_kg * gravity_body(angles[0], angles[1])
+        loads = np.empty(6)
+        loads[:3] = turn.T @ np.array([0.0, 0.0, heave]) + carrying
+        loads[3:] = euler_rates(angles[0], angles[1]).T @ generalized
+        loads[3:] += np.cross([self.tank.lx_m, 0.0, 0.0], carrying)
+        # Coriolis and centripetal forces, C(nu) nu
+        loads[:3] -= np.cross(nu[3:], momentum[:3])
+        loads[3:] -= np.cross(nu[:3], momentum[:3]) + np.cross(nu[3:], momentum[3:])
+        return loads - damping
+
+
+def simulate_six_degree(
+    model: SixDegreeModel,
+    duration_s: float,
+    initial: FloatArray,
+    *,
+    pressure_pa: Callable[[float], float] = lambda _: 0.0,
+    force: Callable[[float], FloatArray] = lambda _: np.zeros(6),
+    samples: int = 1001,
+    tolerance: float = 1e-10,
+) -> tuple[FloatArray, FloatArray]:
+    """Integrate with Dormand-Prince 8(5,3).
+
+    Parameters
+    ----------
+    model : SixDegreeModel
+    duration_s : float
+    initial : ndarray, shape (14,)
+    pressure_pa, force : callable
+        Functions of the time in s; `force` gives body axes, shape (6,).
+    samples : int
+        Number of equally spaced output times, both ends included.
+    tolerance : float
+        Relative; the absolute one is a hundredth of it in SI units.
+
+    Returns
+    -------
+    time_s : ndarray, shape (samples,)
+    state : ndarray, shape (samples, 14)
+
+    Raises
+    ------
+    RuntimeError
+        If the integrator gives up.
+    """
+    from scipy.integrate import solve_ivp
+
+    time = np.linspace(0.0, duration_s, samples)
+    run = solve_ivp(
+        lambda t, x: model.derivative(x, pressure_pa(t), force(t)),
+        (0.0, duration_s),
+        initial,
+        "DOP853",
+        t_eval=time,
+        rtol=tolerance,
+        atol=tolerance / 100,
+    )
+    if not run.success:
+        raise RuntimeError(f"integration stopped at {run.t[-1]:.3f} s: {run.message}")
+    return time, np.asarray(run.y.T, dtype=np.float64)
+
+
+def _skew(vector: FloatArray) -> FloatArray:
+    """Matrix of the cross product from the left."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

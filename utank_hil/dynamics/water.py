@@ -1,0 +1,103 @@
+"""Mass, centre and inertia of the tank water, exact in the level.
+
+The water fills a line of three straight pieces (port reservoir, duct, starboard reservoir); every
+integral over its mass is a polynomial in the level h.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.tank import Tank
+
+
+class WaterMoments(NamedTuple):
+    """Integrals over the mass of the water, and their derivatives with respect to the level.
+
+    Attributes
+    ----------
+    mass_kg : float
+    first_kgm : ndarray, shape (..., 3)
+        Integral of r dm about the ship's centre of gravity.
+    first_slope_kg : ndarray, shape (..., 3)
+        d first / dh; times dh/dt it is the momentum of the flow relative to the ship.
+    first_curvature_kg_m : ndarray, shape (3,)
+        d2 first / dh2.
+    inertia_kgm2 : ndarray, shape (..., 3, 3)
+        Inertia tensor about the ship's centre of gravity.
+    inertia_slope_kgm : ndarray, shape (..., 3, 3)
+        d inertia / dh.
+    swirl_kgm : ndarray, shape (..., 3)
+        Angular momentum of the flow relative to the ship per dh/dt.
+    swirl_slope_kg : ndarray, shape (3,)
+        d swirl / dh.
+    """
+
+    mass_kg: float
+    first_kgm: FloatArray
+    first_slope_kg: FloatArray
+    first_curvature_kg_m: FloatArray
+    inertia_kgm2: FloatArray
+    inertia_slope_kgm: FloatArray
+    swirl_kgm: FloatArray
+    swirl_slope_kg: FloatArray
+
+
+def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
+    """Moments of the tank water at the given levels.
+
+    Parameters
+    ----------
+    tank : Tank
+    level_m : array_like, shape (...)
+
+    Returns
+    -------
+    WaterMoments
+    """
+    h = np.asarray(level_m, dtype=np.float64)
+    rho, at, ap = tank.density_kg_m3, tank.reservoir_area_m2, tank.duct_area_m2
+    length, height, lx, lz = tank.width_m, tank.height_m, tank.lx_m, tank.lz_m
+    zero = np.zeros_like(h)
+    mass = rho * (2 * at * height + ap * length)
+
+    # integrals of y, z, y^2, z^2, y z over the mass; those of x follow from x = lx
+    first_y = rho * at * length * h
+    first_z = rho * (at * (2 * lz * height - height**2 - h**2) + ap * length * lz)
+    square_y = rho * (at * length**2 * height / 2 + ap * length**3 / 12)
+    square_z = rho * (
+        at
+        * (2 * height**3 / 3 - 2 * lz * height**2 + 2 * lz**2 * height + 2 * (height - lz) * h**2)
+        + ap * length * lz**2
+    )
+    product_yz = rho * at * length * (lz - height) * h
+    slope_y, slope_z = rho * at * length, -2 * rho * at * h
+    slope_zz, slope_yz = 4 * rho * at * (height - lz) * h, rho * at * length * (lz - height)
+
+    inertia = np.empty((*h.shape, 3, 3))
+    inertia[..., 0, 0] = square_y + square_z
+    inertia[..., 1, 1] = mass * lx**2 + square_z
+    inertia[..., 2, 2] = mass * lx**2 + square_y
+    inertia[..., 0, 1] = inertia[..., 1, 0] = -lx * first_y
+    inertia[..., 0, 2] = inertia[..., 2, 0] = -lx * first_z
+    inertia[..., 1, 2] = inertia[..., 2, 1] = -product_yz
+    inertia_slope = np.zeros((*h.shape, 3, 3))
+    inertia_slope[..., 0, 0] = inertia_slope[..., 1, 1] = slope_zz
+    inertia_slope[..., 0, 1] = inertia_slope[..., 1, 0] = -lx * slope_y
+    inertia_slope[..., 0, 2] = inertia_slope[..., 2, 0] = -lx * slope_z
+    inertia_slope[..., 1, 2] = inertia_slope[..., 2, 1] = -slope_yz
+
+    flow = rho * at  # the same mass flow per dh/dt along the whole streamline
+    return WaterMoments(
+        mass_kg=mass,
+        first_kgm=np.stack([zero + mass * lx, first_y, zero + first_z], axis=-1),
+        first_slope_kg=np.stack([zero, zero + slope_y, zero + slope_z], axis=-1),
+        first_curvature_kg_m=np.array([0.0, 0.0, -2 * flow]),
+        inertia_kgm2=inertia,
+        inertia_slope_kgm=inertia_slope,
+        swirl_kgm=flow
+        * np.stack([zero - length * (height + lz), 2 * lx * h, zero + length * lx], axis=-1),
+        swirl_slope_kg=np.array([0.0, 2 * flow * lx, 0.0]),
+    )

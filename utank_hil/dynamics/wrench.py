@@ -1,0 +1,139 @@
+"""Force and moment of the tank water on a ship in arbitrary motion, thesis (2.11), (2.14), (2.16).
+
+The printed expressions contain many slips (docs/errata.md), so these follow from the water's linear
+and angular momentum. With m, S, J the mass, first moment and inertia tensor of the water about the
+centre of gravity, and s the angular momentum of the flow relative to the ship per dh/dt::
+
+    P = m v + W x S + S' h'                       momentum
+    H = S x v + J W + s h'                        angular momentum about the CG
+    F = m g - dP/dt,    M = S x g - dH/dt - v x P
+
+(dash: d/dh for S, J, s and d/dt for h). Differentiating S' h' brings -2 rho At h'^2 in heave, the
+momentum flux of the water turning at the two corners; an integral of the particles' accelerations
+alone misses it.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
+
+
+def tank_wrench(
+    tank: Tank,
+    h: npt.ArrayLike,
+    h_dot: npt.ArrayLike,
+    h_ddot: npt.ArrayLike,
+    velocity: npt.ArrayLike,
+    rate: npt.ArrayLike,
+    acceleration: npt.ArrayLike,
+    rate_dot: npt.ArrayLike,
+    roll: npt.ArrayLike,
+    pitch: npt.ArrayLike,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Force and moment of the water on the ship, and the residual of the water's own equation.
+
+    Exact in the level; leading shapes broadcast. Body axes at the ship's centre of gravity.
+
+    Parameters
+    ----------
+    tank : Tank
+    h, h_dot, h_ddot : array_like, shape (...)
+        Level in m and its derivatives in m/s and m/s^2.
+    velocity : array_like, shape (..., 3)
+        (u, v, w) of the centre of gravity in m/s.
+    rate : array_like, shape (..., 3)
+        (p, q, r) in rad/s.
+    acceleration : array_like, shape (..., 3)
+        (u_dot, v_dot, w_dot) in m/s^2, the derivatives of the body components as in (2.6): without
+        rate x velocity.
+    rate_dot : array_like, shape (..., 3)
+        (p_dot, q_dot, r_dot) in rad/s^2.
+    roll, pitch : array_like, shape (...)
+        Euler angles in rad.
+
+    Returns
+    -------
+    force : ndarray, shape (..., 3)
+        N, weight and corner momentum flux included.
+    moment : ndarray, shape (..., 3)
+        N m about the centre of gravity.
+    residual : ndarray, shape (...)
+        Line integral of (particle acceleration - g) from the port to the starboard surface in
+        m^2/s^2. The water moves so that density times residual equals pump pressure minus losses.
+
+    Raises
+    ------
+    ValueError
+        If a vector argument does not end in an axis of length 3.
+    """
+    v0, omega, v0_dot, omega_dot = (
+        _vector(name, value)
+        for name, value in (
+            ("velocity", velocity),
+            ("rate", rate),
+            ("acceleration", acceleration),
+            ("rate_dot", rate_dot),
+        )
+    )
+    level, speed, level_acceleration = (
+        np.asarray(value, dtype=np.float64) for value in (h, h_dot, h_ddot)
+    )
+    speed_, level_acceleration_ = speed[..., None], level_acceleration[..., None]
+    water = water_moments(tank, level)
+    mass, first = water.mass_kg, water.first_kgm
+
+    felt = v0_dot + np.cross(omega, v0) - gravity_body(roll, pitch)
+    flow = water.first_slope_kg * speed_
+    flow_dot = water.first_slope_kg * level_acceleration_ + water.first_curvature_kg_m * speed_**2
+    force = -(
+        mass * felt
+        + np.cross(omega_dot, first)
+        + np.cross(omega, np.cross(omega, first) + 2 * flow)
+        + flow_dot
+    )
+    relative = np.einsum("...ij,...j->...i", water.inertia_kgm2, omega) + water.swirl_kgm * speed_
+    relative_dot = (
+        np.einsum("...ij,...j->...i", water.inertia_kgm2, omega_dot)
+        + np.einsum("...ij,...j->...i", water.inertia_slope_kgm, omega) * speed_
+        + water.swirl_kgm * level_acceleration_
+        + water.swirl_slope_kg * speed_**2
+    )
+    moment = -(np.cross(first, felt) + relative_dot + np.cross(omega, relative))
+
+    # along the streamline the Coriolis acceleration does no work, and the centrifugal one is the
+    # gradient of -|rate x r|^2 / 2, so that only the two surfaces count
+    flow_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
+    zero = np.zeros_like(level)
+    across = np.stack([zero, zero + tank.width_m, -2 * level], axis=-1)  # port to starboard surface
+    middle = np.array([tank.lx_m, 0.0, tank.lz_m - tank.height_m])
+    residual = (
+        tank.effective_length_m * level_acceleration
+        + _dot(felt, across)
+        + _dot(omega_dot, water.swirl_kgm) / flow_kg_m
+        - _dot(np.cross(omega, across), np.cross(omega, middle))
+    )
+    return force, moment, residual
+
+
+def gravity_body(roll: npt.ArrayLike, pitch: npt.ArrayLike) -> FloatArray:
+    """Gravity in body axes, shape (..., 3), in m/s^2, for Euler angles in rad."""
+    phi, theta = np.broadcast_arrays(
+        np.asarray(roll, dtype=np.float64), np.asarray(pitch, dtype=np.float64)
+    )
+    return GRAVITY_M_S2 * np.stack(
+        [-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)], axis=-1
+    )
+
+
+def _vector(name: str, value: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape[-1:] != (3,):
+        raise ValueError(f"{name} must have shape (..., 3), got {array.shape}")
+    return array
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.sum(a * b, axis=-1), dtype=np.float64)

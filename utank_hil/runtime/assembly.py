@@ -1,0 +1,79 @@
+"""The controller's side put together from its configuration."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import load_catalogue
+from utank_hil.config import ControllerConfig, PassiveLaw
+from utank_hil.control import CommandLimiter, Controller, PassiveController
+from utank_hil.control.level_observer import LevelObserver
+from utank_hil.runtime.controller_node import (
+    NANOSECONDS,
+    TICK_NS,
+    ControllerNode,
+    ControllerSettings,
+    Measure,
+)
+from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.statistics import LoopStatistics
+from utank_hil.runtime.supervisor import Supervisor
+
+TANK_PERIOD_S = 0.02
+"""Cycle of SENSOR_TANK."""
+
+_MEASUREMENTS: dict[str, Callable[[Inbox, LevelObserver], float]] = {
+    "roll_rad": lambda inbox, level: inbox.roll_rad,  # noqa: ARG005
+    "roll_rate_rad_s": lambda inbox, level: inbox.roll_rate_rad_s,  # noqa: ARG005
+    "level_m": lambda inbox, level: inbox.level_m,  # noqa: ARG005
+    "level_rate_m_s": lambda inbox, level: level.rate_m_s,  # noqa: ARG005
+}
+
+
+def measure_of(names: tuple[str, ...]) -> Measure:
+    """Function that picks the named signals as a measurement vector, shape (m,)."""
+    pick = [_MEASUREMENTS[name] for name in names]
+
+    def measure(inbox: Inbox, level: LevelObserver) -> FloatArray:
+        return np.array([one(inbox, level) for one in pick])
+
+    return measure
+
+
+def build_controller_node(
+    config: ControllerConfig,
+    *,
+    statistics: LoopStatistics | None = None,
+    sink: Callable[[FloatArray], None] | None = None,
+) -> ControllerNode:
+    """Design the law and build the controller node around it.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+    statistics, sink
+        As `ControllerNode` takes them.
+    """
+    ship, tank, pump = config.vessel.ship, config.vessel.tank, config.vessel.pump
+    if isinstance(config.law, PassiveLaw):
+        controller: Controller = PassiveController()
+        measured: tuple[str, ...] = ("roll_rad",)
+    else:
+        controller = config.law.law(ship, tank, config.delay_s, pump.lag_s).controller()
+        measured = config.law.predictor.measured
+    return ControllerNode(
+        controller,
+        measure_of(measured),
+        LevelObserver(tank, TANK_PERIOD_S),
+        CommandLimiter(config.limits, tank, TICK_NS * NANOSECONDS),
+        Supervisor(config.safety),
+        ControllerSettings(
+            configuration_version=config.vessel.version,
+            command_timeout_s=config.command_timeout_ms * 1e-3,
+            bit_rate=config.bit_rate,
+        ),
+        load_catalogue(),
+        statistics=statistics,
+        sink=sink,
+    )

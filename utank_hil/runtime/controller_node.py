@@ -1,0 +1,331 @@
+"""The controller on the bus: from the frames that come in to the pump command that goes out."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import (
+    Address,
+    Catalogue,
+    ControllerStatus,
+    ControlWord,
+    DriveFault,
+    DriveState,
+    Fault,
+    Frame,
+    Mode,
+    NodeState,
+    PumpCommand,
+)
+from utank_hil.control.interface import Controller
+from utank_hil.control.level_observer import LevelObserver
+from utank_hil.control.limits import CommandLimiter
+from utank_hil.runtime.drive_sequence import DriveSequence
+from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.statistics import LoopStatistics
+from utank_hil.runtime.supervisor import Demand, Observations, Supervisor
+
+NANOSECONDS: Final = 1e-9
+TICK_NS: Final = 10_000_000
+COMMAND_TICKS: Final = 2
+STATUS_TICKS: Final = 10
+LOAD_WINDOW_TICKS: Final = 100
+# an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
+MEAN_FRAME_BITS: Final = 143
+HEEL_TIME_CONSTANT_S: Final = 60.0
+DEGRADED_SHARE: Final = 0.5
+
+Measure = Callable[[Inbox, LevelObserver], FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerSettings:
+    """What the controller node needs beside its law and its limits.
+
+    Attributes
+    ----------
+    configuration_version : int
+        Hash of the ship's data, to be equal on all nodes before arming.
+    command_timeout_s : float
+        Sent with every command: the drive stops on its own after so long a silence.
+    bit_rate : int
+        Of the bus, to judge its load.
+    """
+
+    configuration_version: int
+    command_timeout_s: float = 0.05
+    bit_rate: int = 250_000
+
+
+class ControllerNode:
+    """The controller node.
+
+    Parameters
+    ----------
+    controller : Controller
+        The law in charge while active. Its sample time must be a whole number of ticks.
+    measure : callable
+        Picks the law's measurement vector from what was heard.
+    level : LevelObserver
+        For the limiter, and for laws that want the level's rate.
+    limiter : CommandLimiter
+    supervisor : Supervisor
+    settings : ControllerSettings
+    catalogue : Catalogue
+    statistics : LoopStatistics, optional
+        Of the loop that drives this node, to be shown in the telemetry.
+    sink : callable, optional
+        Takes one telemetry row (columns `SIGNALS`) every tick; must copy it and not wait.
+
+    Attributes
+    ----------
+    start_ns : int
+        Time of the first tick.
+
+    Raises
+    ------
+    ValueError
+        If the controller's sample time is not a whole number of ticks.
+    """
+
+    name = "controller"
+    period_ns = TICK_NS
+
+    def __init__(
+        self,
+        controller: Controller,
+        measure: Measure,
+        level: LevelObserver,
+        limiter: CommandLimiter,
+        supervisor: Supervisor,
+        settings: ControllerSettings,
+        catalogue: Catalogue,
+        *,
+        statistics: LoopStatistics | None = None,
+        sink: Callable[[FloatArray], None] | None = None,
+    ) -> None:
+        sample_ticks = controller.sample_time_s / (TICK_NS * NANOSECONDS)
+        self._sample_ticks = round(sample_ticks)
+        if self._sample_ticks < 1 or abs(sample_ticks - self._sample_ticks) > 1e-6:
+            raise ValueError(
+                f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
+                f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
+            )
+        self._controller = controller
+        self._measure = measure
+        self._limiter = limiter
+        self._supervisor = supervisor
+        self._settings = settings
+        self._statistics = statistics
+        self._sink = sink
+        self._inbox = Inbox(catalogue, settings.configuration_version)
+        self._catalogue_version = catalogue.version
+        self._level = level
+        self._drive_sequence = DriveSequence()
+        self._housekeeping = Housekeeping(
+            Address.CONTROLLER, catalogue, settings.configuration_version
+        )
+        self._commands = catalogue.transmitter(PumpCommand)
+        self._status = catalogue.transmitter(ControllerStatus)
+        self._seen = Observations()
+        self._row = np.zeros(len(SIGNALS))
+        self._applied = np.zeros(1)
+        self._ticks = 0
+        self.start_ns = 0
+        self._last_ns = 0
+        self._late_history = 0
+        self._link_lost_ns: int | None = None
+        self._observed_ns = 0
+        self._heel_rad = 0.0
+        self._arm_bit = self._reset_bit = True  # a bit that is set before we look is no edge
+        self._frames_sent = 0
+        self._frames_counted = 0
+        self._bus_load = 0.0
+        self._law_pa = 0.0
+        self._command_pa = 0.0
+
+    @property
+    def mode(self) -> Mode:
+        """Mode of the supervisor."""
+        return self._supervisor.mode
+
+    @property
+    def fault(self) -> Fault:
+        """Fault of the supervisor, see there."""
+        return self._supervisor.fault
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take one frame from the bus."""
+        self._inbox.receive(frame, now_ns)
+
+    def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
+        """Take note that the bus could not be read or written."""
+        self._link_lost_ns = now_ns
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
+        if self._ticks == 0:
+            self.start_ns = self._last_ns = now_ns
+        self._estimate()
+        self._observe(now_ns)
+        self._supervisor.update(self._seen, now_ns)
+        self._control()
+        self._limit()
+        frames = self._encode(now_ns)
+        self._show(now_ns)
+        self._last_ns = now_ns
+        self._ticks += 1
+        self._frames_sent += len(frames)
+        return frames
+
+    def stop(self, now_ns: int) -> Iterable[Frame]:  # noqa: ARG002
+        """Leave the pump at zero: the last command before the node goes."""
+        self._command_pa = 0.0
+        return [self._command_frame(ControlWord.QUICK_STOP)]
+
+    def _estimate(self) -> None:
+        """Level and its rate, and the mean heel, from what was measured."""
+        inbox = self._inbox
+        if inbox.tank_ns != self._observed_ns:
+            self._level.update(inbox.level_m, inbox.pressure_pa)
+            self._observed_ns = inbox.tank_ns
+        share = TICK_NS * NANOSECONDS / HEEL_TIME_CONSTANT_S
+        self._heel_rad += share * (inbox.roll_rad - self._heel_rad)
+
+    def _observe(self, now_ns: int) -> None:
+        """Ages, states and operator's edges, for the supervisor."""
+        inbox, seen = self._inbox, self._seen
+        late_ns = max(0, now_ns - self._last_ns - TICK_NS)
+        self._late_history = (self._late_history << 1 | (late_ns > 0)) & 0x3FF
+        seen.tick_late_ns = late_ns
+        seen.overruns_in_ten = self._late_history.bit_count()
+        seen.motion_age_ns = now_ns - inbox.motion_ns
+        seen.tank_age_ns = now_ns - inbox.tank_ns
+        seen.pump_age_ns = now_ns - inbox.pump_ns
+        seen.drive_age_ns = now_ns - inbox.drive_ns
+        seen.echo_age_ns = now_ns - inbox.echo_ns
+        seen.panel_age_ns = now_ns - inbox.panel_ns
+        seen.drive_enabled = inbox.drive_state is DriveState.OPERATION_ENABLED
+        seen.drive_fault = (
+            inbox.drive_fault is not DriveFault.NONE or inbox.drive_state is DriveState.FAULT
+        )
+        # an error heals when a whole command cycle passed without one
+        seen.link_lost = (
+            self._link_lost_ns is not None and now_ns - self._link_lost_ns <= 2 * TICK_NS
+        )
+        seen.address_conflict = inbox.address_conflict
+        seen.versions_match = inbox.versions_match
+        seen.protection_valid = inbox.protection_valid
+        seen.high_level = inbox.high_level
+        seen.roll_rad = inbox.roll_rad
+        seen.heel_rad = self._heel_rad
+        if self._ticks % LOAD_WINDOW_TICKS == 0:
+            heard = inbox.frames + self._frames_sent
+            window_s = LOAD_WINDOW_TICKS * TICK_NS * NANOSECONDS
+            bits = (heard - self._frames_counted) * MEAN_FRAME_BITS
+            self._bus_load = bits / (self._settings.bit_rate * window_s)
+            self._frames_counted = heard
+        seen.bus_load = self._bus_load
+        order = inbox.operator
+        seen.requested_mode = inbox.requested_mode()
+        seen.armed = order is not None and order.arm
+        seen.stop = order is not None and order.stop
+        seen.arm_edge = seen.armed and not self._arm_bit
+        reset = order is not None and order.reset
+        seen.reset_edge = reset and not self._reset_bit
+        if order is not None:
+            self._arm_bit, self._reset_bit = seen.armed, reset
+        if seen.reset_edge:
+            self._drive_sequence.request_reset()
+
+    def _control(self) -> None:
+        """Let the law answer when a sample is due, in charge or not."""
+        if self._ticks % self._sample_ticks:
+            return
+        # the law hears what really left since its last answer: anti-windup and bumpless take-over
+        if self._ticks:
+            self._applied[0] = self._limiter.mean_since_last_call()
+            self._controller.applied(self._applied)
+        answer = self._controller.step(self._measure(self._inbox, self._level))
+        self._law_pa = float(answer[0])
+
+    def _limit(self) -> None:
+        """Turn the law's pressure, or zero, into a permitted one."""
+        demand, limiter, level = self._supervisor.demand, self._limiter, self._level
+        if demand is Demand.CONTROL:
+            share = DEGRADED_SHARE if self._supervisor.degraded else 1.0
+            self._command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
+        elif demand is Demand.RAMP:
+            self._command_pa = limiter.ramp_to_zero()
+        else:
+            self._command_pa = limiter.cut()
+
+    def _encode(self, now_ns: int) -> list[Frame]:
+        """Protected frames for what is due."""
+        frames: list[Frame] = []
+        supervisor = self._supervisor
+        if self._ticks % COMMAND_TICKS == 0:
+            word = self._drive_sequence.next_word(
+                self._inbox.drive_state, wanted=supervisor.drive_wanted
+            )
+            frames.append(self._command_frame(word))
+        if self._ticks % STATUS_TICKS == 0:
+            frames.append(
+                self._status.frame(
+                    ControllerStatus(
+                        mode=supervisor.mode,
+                        fault=supervisor.fault,
+                        armed=supervisor.mode is Mode.ACTIVE,
+                        alarm=supervisor.mode is Mode.FAULT,
+                        degraded=supervisor.degraded,
+                        saturated=self._limiter.limiting,
+                        not_realtime=False,
+                        bus_load=self._bus_load,
+                        catalogue_version=self._catalogue_version,
+                        configuration_version=self._settings.configuration_version,
+                    )
+                )
+            )
+        faulted = supervisor.mode is Mode.FAULT
+        frames += self._housekeeping.frames(
+            now_ns, NodeState.FAULT if faulted else NodeState.OPERATIONAL
+        )
+        return frames
+
+    def _command_frame(self, word: ControlWord) -> Frame:
+        return self._commands.frame(
+            PumpCommand(self._command_pa, word, self._settings.command_timeout_s)
+        )
+
+    def _show(self, now_ns: int) -> None:
+        """Hand one telemetry row to the sink."""
+        if self._sink is None:
+            return
+        inbox, statistics = self._inbox, self._statistics
+        lateness_s = duration_s = overruns = 0.0
+        if statistics is not None:
+            lateness_s = statistics.lateness.last_ns * NANOSECONDS
+            duration_s = statistics.duration.last_ns * NANOSECONDS
+            overruns = statistics.overruns
+        self._row[:] = (
+            (now_ns - self.start_ns) * NANOSECONDS,
+            inbox.roll_rad,
+            inbox.roll_rate_rad_s,
+            inbox.port_level_m,
+            inbox.starboard_level_m,
+            self._command_pa,
+            inbox.pressure_pa,
+            inbox.power_w,
+            self._supervisor.mode,
+            self._supervisor.fault,
+            self._bus_load,
+            lateness_s,
+            duration_s,
+            overruns,
+        )
+        self._sink(self._row)

@@ -1,0 +1,40 @@
+"""Leads the pump drive through its CiA 402 states to where the supervisor wants it."""
+
+from utank_hil.canbus import ControlWord, DriveState
+
+_TOWARDS_ENABLED = {
+    DriveState.SWITCH_ON_DISABLED: ControlWord.SHUTDOWN,
+    DriveState.READY_TO_SWITCH_ON: ControlWord.SWITCH_ON,
+    DriveState.SWITCHED_ON: ControlWord.ENABLE_OPERATION,
+    DriveState.OPERATION_ENABLED: ControlWord.ENABLE_OPERATION,
+}
+
+
+class DriveSequence:
+    """Chooses the control word of each pump command."""
+
+    def __init__(self) -> None:
+        self._resetting = False
+
+    def request_reset(self) -> None:
+        """Reset the drive's fault with the next commands; only ever on an operator's order."""
+        self._resetting = True
+
+    def next_word(self, state: DriveState | None, *, wanted: bool) -> ControlWord:
+        """Return the control word that leads from `state` towards operation enabled, or off.
+
+        Parameters
+        ----------
+        state : DriveState or None
+            State the drive last reported, None if unknown.
+        wanted : bool
+            Whether the supervisor wants the drive in operation enabled.
+        """
+        if state is DriveState.FAULT and self._resetting:
+            return ControlWord.FAULT_RESET
+        self._resetting = False
+        if wanted and state is not None:
+            return _TOWARDS_ENABLED.get(state, ControlWord.DISABLE_VOLTAGE)
+        if state is DriveState.OPERATION_ENABLED:
+            return ControlWord.QUICK_STOP
+        return ControlWord.DISABLE_VOLTAGE

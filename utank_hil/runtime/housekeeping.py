@@ -1,0 +1,63 @@
+"""What every node sends of itself: address claim at boot, then heartbeats."""
+
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    Catalogue,
+    Frame,
+    Heartbeat,
+    NodeState,
+    ResetCause,
+)
+
+HEARTBEAT_PERIOD_NS = 100_000_000
+NANOSECONDS = 1e-9
+
+
+class Housekeeping:
+    """Address claim and heartbeat of one node.
+
+    Parameters
+    ----------
+    address : Address
+        Whose.
+    catalogue : Catalogue
+    configuration_version : int
+        Hash of the configuration, to be equal on all nodes before arming.
+    """
+
+    def __init__(self, address: Address, catalogue: Catalogue, configuration_version: int) -> None:
+        self._claim = catalogue.transmitter(AddressClaim, address)
+        self._heartbeat = catalogue.transmitter(Heartbeat, address)
+        self._address = address
+        self._catalogue_version = catalogue.version
+        self._configuration_version = configuration_version
+        self._boot_ns: int | None = None
+        self._next_ns = 0
+
+    def frames(self, now_ns: int, state: NodeState = NodeState.OPERATIONAL) -> list[Frame]:
+        """Return what is due at `now_ns`, mostly nothing."""
+        if self._boot_ns is None:
+            self._boot_ns = now_ns
+            self._next_ns = now_ns
+            # arbitrary address capable 0, function and identity by address: unique on this bus
+            return [self._claim.frame(AddressClaim(int(self._address))), self._beat(now_ns, state)]
+        if now_ns < self._next_ns:
+            return []
+        return [self._beat(now_ns, state)]
+
+    def _beat(self, now_ns: int, state: NodeState) -> Frame:
+        assert self._boot_ns is not None
+        while self._next_ns <= now_ns:
+            self._next_ns += HEARTBEAT_PERIOD_NS
+        return self._heartbeat.frame(
+            Heartbeat(
+                state=state,
+                reset_cause=ResetCause.POWER_ON,
+                uptime_s=(now_ns - self._boot_ns) * NANOSECONDS,
+                catalogue_version=self._catalogue_version,
+                configuration_version=self._configuration_version,
+                transmit_error_count=float("nan"),
+                receive_error_count=float("nan"),
+            )
+        )

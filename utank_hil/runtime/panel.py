@@ -1,0 +1,123 @@
+"""The operator panel: requests modes, arms and disarms."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from utank_hil.canbus import (
+    Address,
+    Catalogue,
+    ControllerStatus,
+    Frame,
+    Mode,
+    OperatorCommand,
+)
+from utank_hil.runtime.housekeeping import Housekeeping
+
+EDGE_NS = 500_000_000
+"""How long a button that works by its edge stays pressed: longer than two lost messages."""
+
+
+class Action(Enum):
+    """A button of the panel."""
+
+    STANDBY = "standby"
+    PASSIVE = "passive"
+    ARM = "arm"
+    DISARM = "disarm"
+    STOP = "stop"
+    RESET = "reset"
+
+
+@dataclass(frozen=True, slots=True)
+class TimedAction:
+    """A button pressed at a time after the panel's start."""
+
+    time_s: float
+    action: Action
+
+
+class OperatorPanel:
+    """Sends OPERATOR_CMD every 200 ms and on change.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    configuration_version : int
+        Sent in the heartbeat.
+    script : iterable of TimedAction
+        Buttons to press by themselves, for benches.
+
+    Attributes
+    ----------
+    status : ControllerStatus or None
+        What the controller last said of itself.
+    """
+
+    name = "panel"
+    period_ns = 100_000_000
+
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        *,
+        configuration_version: int,
+        script: Iterable[TimedAction] = (),
+    ) -> None:
+        self._sender = catalogue.transmitter(OperatorCommand)
+        self._listener = catalogue.receiver(ControllerStatus)
+        self._housekeeping = Housekeeping(Address.OPERATOR, catalogue, configuration_version)
+        self._script = sorted(script, key=lambda timed: timed.time_s, reverse=True)
+        self._start_ns: int | None = None
+        self._mode = Mode.STANDBY
+        self._armed = False
+        self._stop_until_ns = 0
+        self._reset_until_ns = 0
+        self._pressed: list[Action] = []
+        self._sent: OperatorCommand | None = None
+        self._ticks = 0
+        self.status: ControllerStatus | None = None
+
+    def press(self, action: Action) -> None:
+        """Press a button; it takes effect with the next tick."""
+        self._pressed.append(action)
+
+    def receive(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+        """Listen to the controller's status."""
+        if frame.can_id == self._listener.can_id:
+            self.status = self._listener.accept(frame) or self.status
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Send the state of the buttons when it is due or has changed."""
+        if self._start_ns is None:
+            self._start_ns = now_ns
+        while self._script and self._script[-1].time_s * 1e9 <= now_ns - self._start_ns:
+            self._pressed.append(self._script.pop().action)
+        for action in self._pressed:
+            self._take(action, now_ns)
+        self._pressed.clear()
+        command = OperatorCommand(
+            mode_request=self._mode,
+            arm=self._armed,
+            stop=now_ns < self._stop_until_ns,
+            reset=now_ns < self._reset_until_ns,
+            acknowledge=False,
+        )
+        frames = []
+        if command != self._sent or self._ticks % 2 == 0:
+            frames.append(self._sender.frame(command))
+            self._sent = command
+        frames.extend(self._housekeeping.frames(now_ns))
+        self._ticks += 1
+        return frames
+
+    def _take(self, action: Action, now_ns: int) -> None:
+        if action is Action.ARM:
+            self._mode, self._armed = Mode.ACTIVE, True
+        elif action is Action.RESET:
+            self._reset_until_ns = now_ns + EDGE_NS
+        else:
+            self._armed = False
+            self._mode = Mode.PASSIVE if action in (Action.PASSIVE, Action.DISARM) else Mode.STANDBY
+            if action is Action.STOP:
+                self._stop_until_ns = now_ns + EDGE_NS
