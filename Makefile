@@ -34,6 +34,8 @@ check: setup
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
+	$(VENV)/bin/mypy $(wildcard tools/*.py)
 	$(PYTHON) tools/document_catalogue.py --check
 
 test: check
