@@ -1,0 +1,100 @@
+"""ERA on exact Markov parameters, and on those that noise has touched."""
+
+import control
+import numpy as np
+import pytest
+from roll_plant import noisy, plant, pulses, response_error
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification import (
+    IdentificationError,
+    era,
+    era_dc,
+    era_with_observer,
+    hankel_singular_values,
+    okid,
+    order_from_singular_values,
+)
+
+
+def _noisy_markov(seed: int, order: int = 60) -> FloatArray:
+    u, truth = pulses(seed), plant()
+    return okid(u, noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed), order).markov
+
+
+@pytest.mark.parametrize("realize", [era, era_dc])
+def test_exact_markov_parameters_give_the_system_back(realize) -> None:  # type: ignore[no-untyped-def]
+    truth = plant()
+    assert response_error(realize(truth.markov(401), 4), truth).max() < 1e-9
+    assert response_error(realize(truth.markov(150)), truth).max() < 1e-9
+
+
+def test_feed_through_and_any_shape_come_through() -> None:
+    rng = np.random.default_rng(4)
+    system = control.ss(
+        np.diag([0.9, -0.5, 0.3]),
+        rng.standard_normal((3, 2)),
+        rng.standard_normal((3, 3)),
+        rng.standard_normal((3, 2)),
+        0.5,
+    )
+    markov = np.array(
+        [system.D]
+        + [
+            system.C @ np.diag([0.9, -0.5, 0.3]) ** k @ system.B
+            if k == 0
+            else system.C @ np.diag(np.array([0.9, -0.5, 0.3]) ** k) @ system.B
+            for k in range(40)
+        ]
+    )
+    markov[1] = system.C @ system.B
+    found = era(markov, 3, 0.5)
+    assert found.dt == 0.5
+    np.testing.assert_allclose(np.sort(found.poles().real), [-0.5, 0.3, 0.9], atol=1e-10)
+    np.testing.assert_allclose(found.dcgain(), system.dcgain(), atol=1e-9)
+
+
+def test_singular_values_tell_the_order() -> None:
+    exact = hankel_singular_values(plant().markov(401))
+    assert np.all(exact[4:] < 1e-12 * exact[0])
+    assert order_from_singular_values(exact) == 4
+    assert order_from_singular_values(hankel_singular_values(_noisy_markov(1))) == 4
+
+
+def test_window_shorter_than_a_roll_period_is_worse() -> None:
+    markov = _noisy_markov(1)
+    wide = response_error(era(markov, 4), plant()).max()
+    narrow = response_error(era(markov[:31], 4), plant()).max()
+    assert narrow > 5 * wide
+
+
+def test_scaling_of_outputs_and_inputs_does_not_matter() -> None:
+    markov = _noisy_markov(1)
+    factors = np.array([[1e6], [1e-3]])
+    one, other = era(markov, 4), era(markov * factors, 4)
+    np.testing.assert_allclose(np.sort_complex(one.poles()), np.sort_complex(other.poles()))
+
+
+def test_data_correlations_average_over_lags() -> None:
+    truth = plant()
+    error = np.mean([response_error(era_dc(_noisy_markov(s), 4), truth) for s in range(3)])
+    assert error < 0.01
+
+
+def test_bad_requests_are_refused() -> None:
+    markov = plant().markov(101)
+    with pytest.raises(ValueError, match="from 1 to 4"):
+        era(markov, 5)
+    with pytest.raises(ValueError, match="from 1 to 4"):
+        era(markov, 0)
+    with pytest.raises(ValueError, match=r"shape \(K, m, r\)"):
+        era(markov[:, :, 0])
+    with pytest.raises(ValueError, match="finite"):
+        era(markov * np.nan)
+    with pytest.raises(ValueError, match="9 Markov parameters leave no"):
+        era_dc(markov[:9], 2)
+    assert era_dc(markov[:10], 4).nstates == 4
+    with pytest.raises(ValueError, match="observer_gain must have shape"):
+        era_with_observer(markov, np.zeros((50, 2, 2)))
+    with pytest.raises(IdentificationError, match="moves no output"):
+        era(np.zeros((10, 1, 1)), 1)

@@ -1,0 +1,114 @@
+"""Modes, their confidence, and what the best estimator could do."""
+
+import numpy as np
+import pytest
+from cramer_rao import cramer_rao
+from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control import ARX
+from utank_hil.control.limits import PumpLimits
+from utank_hil.identification import (
+    era,
+    markov_parameters,
+    modal_assurance,
+    mode_confidence,
+    modes,
+    okid,
+)
+
+NOISE = 0.02
+
+
+def _true_modes(truth: Plant) -> FloatArray:
+    poles = truth.poles_rad_s()
+    return np.concatenate([np.abs(poles), -poles.real / np.abs(poles)])
+
+
+def test_modes_of_the_true_model() -> None:
+    truth = plant()
+    found = modes(truth.state_space())
+    np.testing.assert_allclose(
+        np.concatenate([found.frequency_rad_s, found.damping_ratio]), _true_modes(truth), rtol=1e-9
+    )
+    # free oscillation of a mode keeps its shape
+    values, vectors = np.linalg.eig(truth.a)
+    free = truth.c @ vectors[:, np.argmin(np.abs(values - found.poles[0]))]
+    assert modal_assurance(found.shapes[:1], free[None])[0, 0] == pytest.approx(1)
+    assert np.abs(found.shapes).max(axis=1) == pytest.approx([1, 1])
+
+
+def test_modes_ask_for_a_discrete_model() -> None:
+    system = plant().state_space()
+    system.dt = 0
+    with pytest.raises(ValueError, match="discrete"):
+        modes(system)
+
+
+def test_orthogonal_shapes_have_no_assurance() -> None:
+    first, second = np.array([[1.0, 1j]]), np.array([[1.0, -1j], [2.0, 2j]])
+    np.testing.assert_allclose(modal_assurance(first, second), [[0, 1]], atol=1e-15)
+
+
+@pytest.mark.parametrize("limits", [FAST_PUMP, SLOW_PUMP])
+def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) -> None:
+    # draws from the coefficients' own distribution, each through recursion and ERA
+    u, truth = pulses(1, limits), plant()
+    result = okid(u, noisy(truth.respond(u, 0 * u), NOISE, 1), 25)
+    stated = mode_confidence(result, 4)
+    p, m = 25, 2
+    gram = np.triu(result.gram) + np.triu(result.gram, 1).T
+    inputs = np.arange(p + 1) * 3
+    draws = []
+    rng = np.random.default_rng(0)
+    sigma = np.sqrt(np.diag(result.residual_covariance))  # nearly uncorrelated
+    roots = []
+    for j in range(m):
+        information = gram.copy()
+        information[inputs, inputs] += result.penalty[j]
+        roots.append(np.linalg.inv(np.linalg.cholesky(information)).T)
+    for _ in range(150):
+        shift = np.column_stack(
+            [sigma[j] * roots[j] @ rng.standard_normal(len(gram)) for j in range(m)]
+        )
+        shift /= result.column_scale[:, None]
+        by_lag = np.vstack([np.zeros((m, m)), shift]).reshape(p + 1, 3, m).transpose(0, 2, 1)
+        moved = ARX(result.arx.alpha + by_lag[1:, :, :m], result.arx.beta + by_lag[:, :, m:], 0.2)
+        found = modes(era(markov_parameters(moved, len(result.markov))[0], 4))
+        draws.append(np.concatenate([found.frequency_rad_s, found.damping_ratio]))
+    spread = np.std(draws, axis=0)
+    expected = np.concatenate([stated.frequency_std_rad_s, stated.damping_ratio_std])
+    np.testing.assert_allclose(expected, spread, rtol=0.3)
+
+
+def test_data_without_noise_leave_no_doubt() -> None:
+    u = pulses(1)
+    stated = mode_confidence(okid(u, plant().respond(u, 0 * u), 60), 4)
+    assert stated.frequency_std_rad_s.max() < 1e-10
+    low, high = stated.intervals()[0].T
+    assert np.all(low <= stated.modes.frequency_rad_s)
+    assert np.all(stated.modes.frequency_rad_s <= high)
+
+
+@pytest.mark.slow
+def test_bias_variance_and_coverage_against_the_cramer_rao_bound() -> None:
+    runs, truth, u = 120, plant(), pulses(1)
+    clean = truth.respond(u, 0 * u)
+    right = _true_modes(truth)
+    found, stated = np.empty((runs, 4)), np.empty((runs, 4))
+    for run in range(runs):
+        confidence = mode_confidence(okid(u, noisy(clean, NOISE, run), 120), 4)
+        found[run] = np.concatenate(
+            [confidence.modes.frequency_rad_s, confidence.modes.damping_ratio]
+        )
+        stated[run] = np.concatenate([confidence.frequency_std_rad_s, confidence.damping_ratio_std])
+    spread = np.std(found, axis=0)
+    ratio = spread / cramer_rao(truth, u, NOISE * np.std(clean, axis=0))
+    bias = np.abs(np.mean(found, axis=0) - right)
+    coverage = np.mean(np.abs(found - right) < 1.96 * stated, axis=0)
+    print(f"\nspread / Cramer-Rao {ratio.round(2)}, bias / spread {(bias / spread).round(2)}")
+    print(f"stated / spread {(stated.mean(axis=0) / spread).round(2)}, coverage {coverage}")
+    assert np.all(ratio > 0.85)  # 120 runs know the spread to 6 %
+    assert np.all(ratio < 2.8)
+    assert np.all(bias < 0.8 * spread)
+    assert np.all(coverage > 0.89)

@@ -1,0 +1,249 @@
+"""OKID: exact on exact data, right under waves, clear when it cannot be."""
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from roll_plant import (
+    BAND_RAD_S,
+    SAMPLE_TIME_S,
+    frequency_response,
+    noisy,
+    plant,
+    pulses,
+    response_error,
+)
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification import (
+    IdentificationError,
+    OkidResult,
+    era,
+    era_with_observer,
+    find_disturbance_frequencies,
+    okid,
+)
+
+WAVE_RAD_S = 0.6
+
+
+def _wave(samples: int, phase: float = 1.0, omega: float = WAVE_RAD_S) -> FloatArray:
+    return 2e7 * np.cos(omega * np.arange(samples) * SAMPLE_TIME_S + phase)
+
+
+def _relative(found: FloatArray, true: FloatArray) -> float:
+    return float(np.max(np.abs(found - true).max(axis=(0, 2)) / np.abs(true).max(axis=(0, 2))))
+
+
+@pytest.mark.parametrize(("order", "outputs"), [(2, 2), (30, 2), (120, 2), (200, 1)])
+def test_exact_data_give_markov_parameters_poles_and_zeros(order: int, outputs: int) -> None:
+    u, truth = pulses(1), plant()
+    y = truth.respond(u, np.zeros_like(u))[:, :outputs]
+    result = okid(u, y, order)
+    assert _relative(result.markov, truth.markov(len(result.markov))[:, :outputs]) < 1e-8
+    system = era(result.markov, 4)
+    expected = truth.state_space()[:outputs, 0]
+    order_of = np.argsort
+    poles, right = system.poles(), expected.poles()
+    np.testing.assert_allclose(
+        poles[order_of(poles.imag)], right[order_of(right.imag)], atol=1e-8, rtol=0
+    )
+    for i in range(outputs):
+        zeros, wanted = control.zeros(system[i, 0]), control.zeros(expected[i, 0])
+        # the realized system has one zero far out, where the true one has none
+        near = zeros[np.abs(zeros) < 1e3]
+        np.testing.assert_allclose(
+            near[order_of(near.imag)], wanted[order_of(wanted.imag)], atol=1e-8, rtol=0
+        )
+
+
+@pytest.mark.parametrize("order", [30, 120])
+def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order: int) -> None:
+    u, truth = pulses(1), plant()
+    y = truth.respond(u, _wave(len(u)))
+    result = okid(u, y, order, disturbance_frequencies_rad_s=[WAVE_RAD_S])
+    assert _relative(result.markov, truth.markov(len(result.markov))) < 1e-8
+    assert response_error(era(result.markov, 4), truth).max() < 1e-8
+
+
+def test_wave_of_unknown_frequency_and_phase_gives_the_same_model() -> None:
+    u, truth = pulses(1), plant()
+    calm = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
+    y = calm + truth.respond(np.zeros_like(u), _wave(len(u), 2.0, 0.6173))
+    frequencies = find_disturbance_frequencies(u, y)
+    assert frequencies == pytest.approx([0.6173], abs=2e-4)
+    quiet = era(okid(u, calm, 120).markov, 4)
+    rough = era(okid(u, y, 120, disturbance_frequencies_rad_s=frequencies).markov, 4)
+    assert response_error(quiet, truth).max() < 0.005
+    assert response_error(rough, truth).max() < 0.005
+
+
+def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not() -> None:
+    u, truth = pulses(1), plant()
+    y = noisy(truth.respond(u, _wave(len(u))), 0.01, 2)
+    error = {p: response_error(era(okid(u, y, p).markov, 4), truth).max() for p in (30, 120)}
+    assert error[30] > 0.05
+    assert error[120] < 0.01
+
+
+def test_offset_drift_and_decaying_transient_are_taken_out_by_their_bases() -> None:
+    u, truth = pulses(1), plant()
+    time_s = np.arange(len(u)) * SAMPLE_TIME_S
+    still = truth.respond(u, np.zeros_like(u))
+    heel = still + np.outer(0.02 + 1e-5 * time_s, [1.0, 5.0])
+    decay = still + np.outer(np.exp(-0.02 * time_s), [0.1, 0.3])
+    markov = truth.markov(401)
+    found = okid(u, heel, 8, disturbance_polynomial_degree=1)
+    assert _relative(found.markov, markov) < 1e-8
+    found = okid(u, decay, 8, disturbance_decay_rates_1_s=[0.02])
+    assert _relative(found.markov, markov) < 1e-8
+    assert found.disturbance.shape == (1, 2)
+
+
+def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() -> None:
+    u = pulses(1)
+    y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
+    result = okid(u, y, 20)
+    errors = (y - result.arx.predict(u[:, None], y))[20:]
+    covariance = errors.T @ errors / (result.rows - result.rank)
+    np.testing.assert_allclose(result.residual_covariance, covariance, rtol=1e-8)
+    pulse = np.zeros((300, 1))
+    pulse[0] = 1.0
+    np.testing.assert_allclose(
+        result.markov[:300, :, 0], result.arx.simulate(pulse), atol=1e-12 * result.markov.max()
+    )
+
+
+def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
+    u, truth = pulses(1), plant()
+    y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
+    result = okid(u, y, 40)
+    system, gain = era_with_observer(result.markov, result.observer_gain, 4)
+    a, b, c = (np.asarray(part) for part in (system.A, system.B, system.C))
+    d = np.asarray(system.D)[:, 0]
+    state, errors = np.zeros(4), np.empty_like(y)
+    for k in range(len(u)):
+        errors[k] = y[k] - c @ state - d * u[k]
+        state = a @ state + b[:, 0] * u[k] + gain @ errors[k]
+    assert np.all(np.std(errors[200:], axis=0) < 1.1 * np.sqrt(np.diag(result.residual_covariance)))
+    assert response_error(system, truth).max() < 0.01
+
+
+def test_two_inputs_are_told_apart() -> None:
+    u, moment = pulses(1), 4e2 * pulses(2)
+    y = plant().respond(u, moment)
+    result = okid(np.column_stack([u, moment]), y, 10)
+    truth = plant()
+    both = control.ss(truth.a, truth.b, truth.c, np.zeros((2, 2)), SAMPLE_TIME_S)
+    found = frequency_response(era(result.markov, 4))
+    np.testing.assert_allclose(found, frequency_response(both), rtol=1e-8)
+
+
+def test_units_of_the_record_do_not_matter() -> None:
+    u = pulses(1)
+    y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
+    pascals = okid(u, y, 20).markov
+    other = okid(u * 1e-5, y * [57.3, 100.0], 20).markov
+    np.testing.assert_allclose(other / [[57.3e5], [100e5]], pascals, rtol=1e-6, atol=1e-20)
+
+
+def test_gaps_are_left_out_and_time_goes_on_through_them() -> None:
+    u, truth = pulses(1), plant()
+    y = truth.respond(u, _wave(len(u)))
+    y[500:530] = np.nan
+    u[1500] = np.nan
+    y[1800, 1] = np.inf
+    result = okid(u, y, 30, disturbance_frequencies_rad_s=[WAVE_RAD_S])
+    assert _relative(result.markov, truth.markov(len(result.markov))) < 1e-8
+    assert result.rows == 2500 - 30 - (30 + 30) - (1 + 30) - (1 + 30)
+
+
+def test_excitation_order_is_reported() -> None:
+    time_s = np.arange(2500) * SAMPLE_TIME_S
+    u = 1e4 * (np.sin(0.5 * time_s) + np.sin(2.0 * time_s) + np.sin(5.0 * time_s))
+    assert okid(u, plant().respond(u, 0 * u), 20).excitation_order == 6
+    assert okid(pulses(1), plant().respond(pulses(1), 0 * u), 20).excitation_order == 21
+
+
+def _refused(reason: str, u: FloatArray, y: FloatArray, order: int = 20) -> None:
+    with pytest.raises(IdentificationError, match=reason):
+        okid(u, y, order)
+
+
+def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
+    u = pulses(1)
+    y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
+    time_s = np.arange(len(u)) * SAMPLE_TIME_S
+    _refused("input 0 does not move", np.full_like(u, 3e4), y)
+    _refused("output 1 does not move", u, y * [1, 0])
+    _refused("persistently exciting of order 2 only", np.sin(0.5 * time_s), y)
+    _refused("usable rows cannot determine", u[:70], y[:70])
+    _refused("no row without a gap", u * np.nan, y)
+    holed = y.copy()
+    holed[::15] = np.nan
+    _refused("no stretch of the record", u, holed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"order": 0}, "order must be a positive integer"),
+        ({"order": 2.5}, "order must be a positive integer"),
+        ({"sample_time_s": 0.0}, "sample_time_s must be positive"),
+        ({"disturbance_frequencies_rad_s": [0.0]}, "must be positive"),
+        ({"disturbance_frequencies_rad_s": [0.5, 0.5]}, "distinct"),
+        ({"disturbance_decay_rates_1_s": [0.0]}, "must not be zero"),
+        ({"disturbance_polynomial_degree": -1}, "0 or more"),
+    ],
+)
+def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        okid(pulses(1), plant().respond(pulses(1), pulses(2)), **arguments)  # type: ignore[arg-type]
+
+
+def test_records_of_the_wrong_shape_are_refused() -> None:
+    with pytest.raises(ValueError, match="y has 10 samples and u has 9"):
+        okid(np.zeros(9), np.zeros(10))
+    with pytest.raises(ValueError, match="u must have shape"):
+        okid(np.zeros((10, 2, 2)), np.zeros(10))
+
+
+def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
+    """A record with everything that happens to records: stuck, clipped, holed, huge, tiny."""
+    rng = np.random.default_rng(seed)
+    samples = int(rng.integers(1, 400))
+    u = pulses(int(rng.integers(100)))[:samples] * 10.0 ** rng.integers(-150, 150)
+    y = plant().respond(u / np.abs(u).max(initial=1e-300), 0 * u)[:, : rng.integers(1, 3)]
+    y = y + rng.choice([0.0, 1e-9, 1e-3, 1.0]) * rng.standard_normal(y.shape)
+    y = y * 10.0 ** rng.integers(-150, 150)
+    if rng.random() < 0.3:
+        u = np.clip(u, -0.3 * np.abs(u).max(), 0.1 * np.abs(u).max())
+    if rng.random() < 0.3:
+        y = np.clip(y, -0.2 * np.abs(y).max(), 0.2 * np.abs(y).max())
+    if rng.random() < 0.2:
+        y[samples // 3 :] = y[samples // 3]
+    if rng.random() < 0.2:
+        u[:] = u[0]
+    if rng.random() < 0.3:
+        y[rng.integers(0, samples, rng.integers(1, 9))] = rng.choice([np.nan, np.inf])
+    return u, y, int(rng.integers(1, 30))
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**31))
+def test_any_record_ends_in_a_finite_model_or_a_refusal(seed: int) -> None:
+    u, y, order = _broken(seed)
+    try:
+        result: OkidResult = okid(u, y, order)
+    except IdentificationError:
+        return
+    assert np.isfinite(result.markov).all()
+    assert np.isfinite(result.observer_gain).all()
+    assert np.isfinite(result.residual_covariance).all()
+
+
+def test_fast_sample_of_the_band_holds_the_resonance() -> None:
+    # the tests above measure errors over this band: it must hold both modes
+    frequencies = np.abs(plant().poles_rad_s())
+    assert BAND_RAD_S[0] < frequencies.min() < frequencies.max() < BAND_RAD_S[-1]

@@ -1,0 +1,115 @@
+"""Validation tells a good model from each kind of bad one."""
+
+import numpy as np
+import pytest
+from roll_plant import SAMPLE_TIME_S, noisy, plant, pulses
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control import ARX
+from utank_hil.identification import IdentificationError, okid, stabilization, validate
+
+
+def _arx_record(seed: int, samples: int = 4000) -> tuple[ARX, FloatArray, FloatArray]:
+    """A record whose one-step errors are white by construction."""
+    rng = np.random.default_rng(seed)
+    model = ARX(
+        np.array([[[1.6, 0.1], [0.0, 1.2]], [[-0.8, 0.0], [0.1, -0.5]]]),
+        np.array([[[0.0], [0.0]], [[1.0], [0.5]], [[0.2], [-0.4]]]),
+        0.2,
+    )
+    u = np.repeat(rng.standard_normal(samples // 5), 5)
+    y = np.zeros((samples, 2))
+    for k in range(2, samples):
+        y[k] = (
+            model.alpha[0] @ y[k - 1]
+            + model.alpha[1] @ y[k - 2]
+            + model.beta[1] @ u[k - 1 : k]
+            + model.beta[2] @ u[k - 2 : k - 1]
+            + 0.1 * rng.standard_normal(2)
+        )
+    return model, u, y
+
+
+def test_true_model_has_white_errors_apart_from_the_input() -> None:
+    result = validate(*_arx_record(1))
+    assert np.all(result.whiteness_probability > 0.01)
+    assert np.all(result.independence_probability > 0.01)
+    bound = 4 / np.sqrt(result.rows)
+    assert np.abs(result.residual_correlation).max() < bound
+    assert np.abs(result.input_correlation).max() < bound
+    assert result.residual_correlation.shape == (25, 2)
+    assert result.input_correlation.shape == (26, 2, 1)
+
+
+def test_probabilities_of_the_true_model_are_uniform() -> None:
+    results = [validate(*_arx_record(seed, 1000), lags=10) for seed in range(60)]
+    for values in (
+        np.array([r.whiteness_probability for r in results]).ravel(),
+        np.array([r.independence_probability for r in results]).ravel(),
+    ):
+        assert 0.4 < np.mean(values) < 0.6
+        assert np.mean(values < 0.1) < 0.2
+
+
+def test_fit_is_that_of_the_prediction_by_the_model_itself() -> None:
+    model, u, y = _arx_record(1)
+    result = validate(model, u, y)
+    errors = (y - model.predict(u[:, None], y))[25:]
+    expected = 1 - np.sqrt(np.mean(errors**2, axis=0)) / np.std(y[25:], axis=0)
+    np.testing.assert_allclose(result.one_step_fit, expected, rtol=1e-9)
+    free = (y - model.simulate(u[:, None]))[300:]
+    assert result.simulation_fit == pytest.approx(
+        1 - np.sqrt(np.mean(free**2, axis=0)) / np.std(y[300:], axis=0), abs=0.01
+    )
+
+
+def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white() -> None:
+    model, u, y = _arx_record(1)
+    wrong = validate(ARX(model.alpha, model.beta * 1.2, 0.2), u, y)
+    assert np.all(wrong.independence_probability < 1e-6)
+    low = validate(okid(u, y, 1).arx, u, y)
+    assert low.whiteness_probability.min() < 1e-6
+
+
+def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves() -> None:
+    truth, u = plant(), pulses(1)
+    wave = 2e7 * np.cos(0.6 * np.arange(len(u)) * SAMPLE_TIME_S)
+    y = truth.respond(u, wave)
+    y[1000] = np.nan
+    model = ARX.from_state_space(truth.state_space(), 4)
+    known = validate(model, u, y, disturbance_frequencies_rad_s=[0.6])
+    assert known.one_step_fit.min() > 1 - 1e-9
+    assert known.simulation_fit.min() > 1 - 1e-6
+    assert validate(model, u, y).simulation_fit.max() < 0.9
+
+
+def test_held_out_record_of_the_ship_is_predicted() -> None:
+    truth, u, v = plant(), pulses(1), pulses(2)
+    model = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60).arx
+    result = validate(model, v, noisy(truth.respond(v, 0 * v), 0.01, 2))
+    assert result.one_step_fit.min() > 0.985
+    assert result.simulation_fit.min() > 0.985
+
+
+def test_record_that_does_not_fit_is_refused() -> None:
+    model, u, y = _arx_record(1)
+    with pytest.raises(ValueError, match="2 outputs and 1 inputs, the record 1 and 1"):
+        validate(model, u, y[:, 0])
+    with pytest.raises(IdentificationError, match="does not move"):
+        validate(model, 0 * u, y)
+    with pytest.raises(IdentificationError, match="longer than the order"):
+        validate(model, u[:20], y[:20])
+
+
+def test_true_modes_stay_and_spurious_ones_wander_in_the_stabilization_diagram() -> None:
+    truth, u = plant(), pulses(1)
+    result = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60)
+    points = stabilization(result.markov, [4, 6, 8, 10])
+    right = np.abs(truth.poles_rad_s())
+    assert not any(p.frequency_stable for p in points if p.order == 4)
+    for order in (6, 8, 10):
+        kept = [p for p in points if p.order == order and p.frequency_stable]
+        kept = [p for p in kept if p.damping_stable and p.shape_stable]
+        for frequency in right:
+            assert min(abs(p.frequency_rad_s / frequency - 1) for p in kept) < 0.002
+    assert sum(not p.damping_stable for p in points if p.order > 4) >= 3

@@ -1,0 +1,77 @@
+"""Functions of time that a disturbance is made of, thesis (3.12), after Goodzeit and Phan (2000).
+
+A known basis in the regression takes the wave out of the data: only its shape in time must be
+known, amplitude and phase are fitted with the model.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class DisturbanceBasis:
+    """Sine and cosine, polynomial and exponential functions of time.
+
+    Parameters
+    ----------
+    frequencies_rad_s : sequence of float
+        A sine and a cosine each.
+    polynomial_degree : int or None
+        Legendre polynomials over the record up to this degree: 0 is an offset (a steady heel, a
+        sensor's bias), 1 a drift; None leaves the offset out.
+    decay_rates_1_s : sequence of float
+        exp(-rate t) each; a negative rate grows.
+
+    Raises
+    ------
+    ValueError
+        If a frequency is not positive, a rate is zero, one is repeated, or the degree is negative.
+    """
+
+    frequencies_rad_s: Sequence[float] = ()
+    polynomial_degree: int | None = None
+    decay_rates_1_s: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        for name, values in (
+            ("frequencies_rad_s", self.frequencies_rad_s),
+            ("decay_rates_1_s", self.decay_rates_1_s),
+        ):
+            if not all(math.isfinite(v) for v in values) or len(set(values)) != len(values):
+                raise ValueError(f"disturbance {name} must be finite and distinct, got {values}")
+        if not all(w > 0 for w in self.frequencies_rad_s):
+            raise ValueError(
+                f"disturbance frequencies must be positive, got {self.frequencies_rad_s}; "
+                "an offset is polynomial_degree=0"
+            )
+        if 0 in self.decay_rates_1_s:
+            raise ValueError("disturbance decay rates must not be zero; use polynomial_degree=0")
+        if self.polynomial_degree is not None and self.polynomial_degree < 0:
+            raise ValueError(
+                f"disturbance polynomial_degree must be 0 or more, got {self.polynomial_degree}"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number d of functions."""
+        degree = -1 if self.polynomial_degree is None else self.polynomial_degree
+        return 2 * len(self.frequencies_rad_s) + degree + 1 + len(self.decay_rates_1_s)
+
+    def evaluate(self, samples: int, sample_time_s: float) -> FloatArray:
+        """The functions at t = 0, dt, ..., shape (d, samples); none exceeds 1 in magnitude."""
+        time_s = np.arange(samples) * sample_time_s
+        rows: list[FloatArray] = []
+        for frequency in self.frequencies_rad_s:
+            rows += [np.sin(frequency * time_s), np.cos(frequency * time_s)]
+        if self.polynomial_degree is not None:
+            span = np.linspace(-1.0, 1.0, samples)
+            rows += list(np.polynomial.legendre.legvander(span, self.polynomial_degree).T)
+        for rate in self.decay_rates_1_s:
+            # from 1 down in the direction of decay, so that none overflows
+            rows.append(np.exp(-abs(rate) * (time_s if rate > 0 else time_s[::-1])))
+        return np.array(rows).reshape(len(rows), samples)

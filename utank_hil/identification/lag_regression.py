@@ -1,0 +1,174 @@
+"""The least-squares problem of an ARX model, held as its data and never as its matrix.
+
+::
+
+    y(k) = sum_{i=1..p} alpha_i y(k-i) + sum_{i=0..p} beta_i u(k-i) + c psi(k) + e(k)
+
+With z = (y, u) of q = m + r channels, the N - p rows of the regression are windows sliding over z,
+so its Gram matrix is block Toeplitz but for the windows' two ends (displacement structure, the
+covariance method of linear prediction)::
+
+    G[i+1, j+1] = G[i, j] + z(p-1-i) z(p-1-j)^T - z(N-1-i) z(N-1-j)^T
+
+One block row of correlations and this recursion give all of it in O(N p q^2 + p^2 q^2) operations,
+and products with the matrix are convolutions. Rows with a NaN split a record into segments; the
+sums run over the segments, so a window never spans a gap.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification.errors import IdentificationError
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """An unbroken stretch of the record.
+
+    Parameters
+    ----------
+    channels : ndarray, shape (q, N)
+        Outputs, then inputs; each channel contiguous.
+    basis : ndarray, shape (d, N - p)
+        Known disturbance functions at the rows' times.
+    """
+
+    channels: FloatArray
+    basis: FloatArray
+
+
+class LagRegression:
+    """Regression of the outputs on their past, the inputs and a disturbance basis.
+
+    Coefficients are arrays of shape (n, m), n = r + p q + d: the rows are beta_0 transposed, then
+    for each lag i = 1..p alpha_i and beta_i transposed, then those of the basis.
+
+    Parameters
+    ----------
+    z : ndarray, shape (N, q)
+        Outputs and inputs; rows that are not finite throughout are gaps.
+    outputs : int
+        m, the number of leading channels that are outputs.
+    order : int
+        p.
+    basis : ndarray, shape (d, N)
+        Disturbance functions at every sample.
+
+    Raises
+    ------
+    IdentificationError
+        If no unbroken stretch is longer than the order.
+    """
+
+    def __init__(self, z: FloatArray, outputs: int, order: int, basis: FloatArray) -> None:
+        self.outputs = outputs
+        self.order = order
+        self.channels = z.shape[1]
+        self.segments = [
+            Segment(np.ascontiguousarray(z[start:stop].T), basis[:, start + order : stop])
+            for start, stop in unbroken(z)
+            if stop - start > order
+        ]
+        if not self.segments:
+            raise IdentificationError(
+                f"no stretch of the record without gaps is longer than the order {order}; "
+                "record longer, mend the gaps or lower the order"
+            )
+        self.basis_size = len(basis)
+        self.rows = sum(s.channels.shape[1] - order for s in self.segments)
+        self.columns = (order + 1) * self.channels - outputs + self.basis_size
+
+    @property
+    def input_rows(self) -> np.ndarray:
+        """Rows of the coefficients that belong to the inputs, beta_0 first."""
+        q, m = self.channels, self.outputs
+        index: np.ndarray = np.arange(self.order + 1)[:, None] * q + np.arange(q - m)
+        return index.ravel()
+
+    def target_squares(self) -> FloatArray:
+        """Sum of squares of each output over the rows, shape (m,)."""
+        squares: FloatArray = np.sum(
+            [np.sum(s.channels[: self.outputs, self.order :] ** 2, axis=1) for s in self.segments],
+            axis=0,
+        )
+        return squares
+
+    def gram(self) -> tuple[FloatArray, FloatArray]:
+        """Normal equations of the regression.
+
+        Returns
+        -------
+        gram : ndarray, shape (n, n)
+            Only its upper triangle is filled in.
+        right : ndarray, shape (n, m)
+        """
+        p, q, m = self.order, self.channels, self.outputs
+        lags = (p + 1) * q
+        size = lags + self.basis_size
+        gram = np.zeros((size, size))
+        # window ends of all segments side by side: the displacement is one matrix product
+        head = np.hstack([s.channels[:, :p][:, ::-1].T.reshape(-1, 1) for s in self.segments])
+        tail = np.hstack([s.channels[:, -p:][:, ::-1].T.reshape(-1, 1) for s in self.segments])
+        np.matmul(np.hstack([head, tail]), np.hstack([head, -tail]).T, out=gram[q:lags, q:lags])
+        gram[:q, :lags] = self._correlate([s.channels[:, p:] for s in self.segments]).T
+        for start in range(0, lags - q, q):
+            here, below = slice(start, start + q), slice(start + q, start + 2 * q)
+            gram[below, start + q : lags] += gram[here, start : lags - q]
+        if self.basis_size:
+            gram[:lags, lags:] = self._correlate([s.basis for s in self.segments])
+            gram[lags:, lags:] = sum(s.basis @ s.basis.T for s in self.segments)
+        right = gram[:m, m:].T.copy()
+        return gram[m:, m:], right
+
+    def residuals(self, coefficients: FloatArray) -> list[FloatArray]:
+        """Errors y - prediction by segment, each of shape (m, N - p)."""
+        p, q, m = self.order, self.channels, self.outputs
+        split = (p + 1) * q - m
+        filters = np.zeros(((p + 1) * q, m))
+        filters[m:] = coefficients[:split]
+        filters = np.ascontiguousarray(filters.reshape(p + 1, q, m).transpose(1, 2, 0))
+        left = []
+        for segment in self.segments:
+            error = segment.channels[:m, p:] - coefficients[split:].T @ segment.basis
+            for channel, taps in zip(segment.channels, filters, strict=True):
+                for row, tap in zip(error, taps, strict=True):
+                    row -= np.convolve(channel, tap, "valid")
+            left.append(error)
+        return left
+
+    def transposed(self, errors: list[FloatArray]) -> FloatArray:
+        """Product of the transposed regression matrix with errors by segment; shape (n, j)."""
+        split = self.channels * (self.order + 1)
+        product = np.empty((split + self.basis_size, len(errors[0])))
+        product[:split] = self._correlate(errors)
+        product[split:] = sum(s.basis @ e.T for s, e in zip(self.segments, errors, strict=True))
+        return product[self.outputs :]
+
+    def matrix(self) -> tuple[FloatArray, FloatArray]:
+        """The regression matrix (rows, n) and targets (rows, m) written out, for small problems."""
+        p, m = self.order, self.outputs
+        blocks, targets = [], []
+        for segment in self.segments:
+            windows = np.lib.stride_tricks.sliding_window_view(segment.channels, p + 1, axis=1)
+            lagged = windows[:, :, ::-1].transpose(1, 2, 0).reshape(windows.shape[1], -1)
+            blocks.append(np.hstack([lagged[:, m:], segment.basis.T]))
+            targets.append(lagged[:, :m])
+        return np.vstack(blocks), np.vstack(targets)
+
+    def _correlate(self, errors: list[FloatArray]) -> FloatArray:
+        """sum_k z_c(k-i) e_j(k) for all lags and channels; shape ((p + 1) q, j)."""
+        out = np.zeros((self.order + 1, self.channels, len(errors[0])))
+        for segment, error in zip(self.segments, errors, strict=True):
+            for c, channel in enumerate(segment.channels):
+                for j, row in enumerate(error):
+                    out[:, c, j] += np.correlate(channel, row, "valid")[::-1]
+        return out.reshape(-1, out.shape[2])
+
+
+def unbroken(z: FloatArray) -> list[tuple[int, int]]:
+    """Start and end of each run of rows that are finite throughout."""
+    good = np.isfinite(z).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.view(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,157 @@
+"""Least squares of a `LagRegression` from its Gram matrix, as exact as from the matrix itself.
+
+Normal equations alone square the condition number. Here the Cholesky factor of the Gram matrix only
+preconditions: the residual is computed from the data and the correction solved for, until it no
+longer matters (corrected seminormal equations; Bjoerck, Numerical Methods for Least Squares
+Problems, 6.6.5). Data that fit a model of lower order exactly leave coefficients open: a pivoted
+factor reveals the rank, and of all solutions the least in norm is taken, whose surplus poles lie
+inside the unit circle. Noisy data with an input that hardly excites some directions go to
+`shrinkage`, and what that cannot do to the singular value decomposition, as slow as it is.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack, solve_triangular
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification.errors import IdentificationError
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.persistence import lagged_inputs
+from utank_hil.identification.shrinkage import shrunk
+
+_RANK = 1e-12  # pivots of the Gram matrix below this part of the first are rounding
+_EXACT = 1e-10  # relative residual of data without noise
+_SETTLED = 1e-9  # the next correction is the square of this, far below rounding
+_CORRECTIONS = 6
+_INFLATION = 100.0  # above, noise in the weak directions of the input outweighs shrinkage's bias
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Solution of a regression.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n, m)
+    residual_covariance : ndarray, shape (m, m)
+        Of the equation errors, with the rank taken off the degrees of freedom.
+    gram : ndarray, shape (n, n)
+        Upper triangle of the normal equations' matrix.
+    penalty : ndarray, shape (m,)
+        What shrinkage added to the diagonal of the inputs' part; zero without.
+    rank : int
+    excitation_order : int
+        As `persistence.excitation_order`, of p + 1 lags.
+    """
+
+    coefficients: FloatArray
+    residual_covariance: FloatArray
+    gram: FloatArray
+    penalty: FloatArray
+    rank: int
+    excitation_order: int
+
+
+def fit(regression: LagRegression) -> Fit:
+    """Least-squares solution, of minimum norm where there are many.
+
+    Raises
+    ------
+    IdentificationError
+        If there are not more rows than columns.
+    """
+    if regression.rows <= regression.columns:
+        raise IdentificationError(
+            f"{regression.rows} usable rows cannot determine {regression.columns} coefficients "
+            "an output; record longer or lower the order"
+        )
+    gram, right = regression.gram()
+    excitation_order, inflation = lagged_inputs(regression, gram)
+    penalty = np.zeros(regression.outputs)
+    solver = _Cholesky(gram)
+    coefficients, squares, settled = _corrected(regression, solver, right)
+    rank = solver.rank
+    exact = np.trace(squares) <= _EXACT**2 * regression.target_squares().sum()
+    if not (settled and exact) and (
+        inflation > _INFLATION or not settled or rank < regression.columns
+    ):
+        try:
+            coefficients, penalty = shrunk(regression, gram, right)
+            rank = regression.columns
+        except np.linalg.LinAlgError:  # outputs that tell the same, or next to no noise
+            matrix, wanted = regression.matrix()
+            solution = np.linalg.lstsq(matrix, wanted, rcond=None)
+            coefficients = solution[0].astype(np.float64)
+            rank = int(solution[2])
+        squares = _squares(regression.residuals(coefficients))
+    covariance = squares / (regression.rows - rank)
+    return Fit(coefficients, covariance, gram, penalty, rank, excitation_order)
+
+
+def _squares(errors: list[FloatArray]) -> FloatArray:
+    """Sum of e e^T over the rows, shape (m, m)."""
+    squares: FloatArray = np.sum([e @ e.T for e in errors], axis=0)
+    return squares
+
+
+def _corrected(
+    regression: LagRegression, solver: "_Cholesky", right: FloatArray
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Solution after corrections, its residual squares (m, m), and whether it has settled."""
+    coefficients = solver.solve(right)
+    previous = np.inf
+    settled = False
+    for _ in range(_CORRECTIONS):
+        errors = regression.residuals(coefficients)
+        gradient = regression.transposed(errors)
+        correction = solver.solve(gradient)
+        coefficients += correction
+        change = float(np.linalg.norm(correction)) / max(
+            float(np.linalg.norm(coefficients)), 1e-300
+        )
+        settled = change < _SETTLED
+        if settled or not change < 0.5 * previous:
+            break
+        previous = change
+    # the correction's effect on the squares is known without the residuals of the new solution
+    squares = _squares(errors) - correction.T @ gradient
+    return coefficients, squares, settled
+
+
+class _Cholesky:
+    """P G P^T = L L^T of rank k, and the minimum-norm solution of G x = b from it."""
+
+    def __init__(self, gram: FloatArray) -> None:
+        size = len(gram)
+        threshold = _RANK * gram.diagonal().max()
+        self.rank = size
+        self._pivots = np.arange(size)
+        self._null: FloatArray | None = None
+        # LAPACK's lower triangle in column order is the upper one in row order
+        factor, failed = lapack.dpotrf(np.array(gram.T, order="F"), lower=1, overwrite_a=1, clean=0)
+        if failed or factor.diagonal().min() ** 2 < threshold:
+            factor, pivots, rank, _ = lapack.dpstrf(gram.T, lower=1, tol=threshold)
+            self.rank = int(rank)
+            self._pivots = pivots - 1
+        self._factor = factor[: self.rank, : self.rank]
+        if self.rank < size:
+            # with P G P^T = [L; M][L; M]^T the dependent columns are T = L^-T M^T of the chosen
+            self._null = solve_triangular(
+                self._factor, factor[self.rank :, : self.rank].T, lower=True, trans=1
+            )
+            self._weight = np.linalg.inv(np.eye(self.rank) + self._null @ self._null.T)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        chosen = right[self._pivots[: self.rank]]
+        for trans in (0, 1):
+            chosen = solve_triangular(
+                self._factor, chosen, lower=True, trans=trans, check_finite=False
+            )
+        solution = np.empty_like(right)
+        if self._null is None:
+            solution[self._pivots] = chosen
+        else:
+            chosen = self._weight @ chosen
+            solution[self._pivots] = np.vstack([chosen, self._null.T @ chosen])
+        return solution

@@ -1,0 +1,214 @@
+"""Observer/Kalman filter identification (OKID) of ship and tank, thesis 3.7, (3.10)-(3.13).
+
+The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
+A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
+by least squares, with a disturbance basis beside them, and the system's own Markov parameters
+follow from them by recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two
+roll periods.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.arx import ARX
+from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.errors import IdentificationError
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.least_squares import Fit, fit
+from utank_hil.identification.markov import markov_parameters
+
+_MARKOV_COUNT = 401  # at 0.2 s a Hankel matrix of 40 s: more than the longest roll period
+_LEAST_EXCITATION = 4  # what one oscillation takes (twice its order)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OkidResult:
+    """What OKID found.
+
+    Parameters
+    ----------
+    arx : ARX
+        Observer Markov parameters as a model.
+    markov : ndarray, shape (K, m, r)
+        System Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
+    observer_gain : ndarray, shape (K - 1, m, m)
+        Observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
+    basis : DisturbanceBasis
+    disturbance : ndarray, shape (d, m)
+        Coefficients of the disturbance basis in the ARX equation.
+    residual_covariance : ndarray, shape (m, m)
+        Of the one-step prediction errors.
+    gram : ndarray, shape (n, n)
+        Upper triangle of the regression's Gram matrix with each column over `column_scale`, in the
+        order of `LagRegression`.
+    column_scale : ndarray, shape (n,)
+    penalty : ndarray, shape (m,)
+        What shrinkage added to the diagonal of the inputs' part of the Gram matrix; zero when the
+        input excites well and least squares stand as they are.
+    rank : int
+        Of the regression; below n when the data fit exactly or the input does not excite.
+    excitation_order : int
+        Order to which the input is persistently exciting, at most p + 1. A system of order n takes
+        2 n or more.
+    rows : int
+        Equations used, after gaps.
+    """
+
+    arx: ARX
+    markov: FloatArray
+    observer_gain: FloatArray
+    basis: DisturbanceBasis
+    disturbance: FloatArray
+    residual_covariance: FloatArray
+    gram: FloatArray
+    column_scale: FloatArray
+    penalty: FloatArray
+    rank: int
+    excitation_order: int
+    rows: int
+
+
+def okid(
+    u: FloatArray,
+    y: FloatArray,
+    order: int = 120,
+    sample_time_s: float = 0.2,
+    disturbance_frequencies_rad_s: Sequence[float] = (),
+    disturbance_polynomial_degree: int | None = None,
+    disturbance_decay_rates_1_s: Sequence[float] = (),
+) -> OkidResult:
+    """Identify a model from a record of inputs and outputs.
+
+    Parameters
+    ----------
+    u : array_like, shape (N, r) or (N,)
+        Inputs as they acted (after limits).
+    y : array_like, shape (N, m) or (N,)
+        Outputs. Rows in which anything is not finite are gaps; a gap keeps its rows, so that time
+        goes on. Separate records are joined with such a row between them.
+    order : int
+        p.
+    sample_time_s : float
+    disturbance_frequencies_rad_s : sequence of float
+        Of regular waves; see `find_disturbance_frequencies`.
+    disturbance_polynomial_degree : int or None
+        0 fits an offset, 1 a drift too.
+    disturbance_decay_rates_1_s : sequence of float
+        Of exponential disturbances.
+
+    Returns
+    -------
+    OkidResult
+
+    Raises
+    ------
+    ValueError
+        If an argument has the wrong shape or value.
+    IdentificationError
+        If the record does not determine a model: too short, too many gaps, an input that hardly
+        excites, an output that does not move.
+    """
+    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
+        raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
+    basis = DisturbanceBasis(
+        tuple(disturbance_frequencies_rad_s),
+        disturbance_polynomial_degree,
+        tuple(disturbance_decay_rates_1_s),
+    )
+    z, m = stacked_record(u, y)
+    scale = channel_scale(z, m)
+    functions = basis.evaluate(len(z), sample_time_s)
+    regression = LagRegression(z / scale, m, checked_order(order), functions)
+    solution = fit(regression)
+    if solution.excitation_order < min(_LEAST_EXCITATION, order + 1):
+        raise IdentificationError(
+            f"the input is persistently exciting of order {solution.excitation_order} only, "
+            f"one oscillation takes {_LEAST_EXCITATION}; use random pulses or a PRBS"
+        )
+    return _in_units(solution, regression, scale, sample_time_s, basis)
+
+
+def _in_units(
+    solution: Fit,
+    regression: LagRegression,
+    scale: FloatArray,
+    sample_time_s: float,
+    basis: DisturbanceBasis,
+) -> OkidResult:
+    """Undo the scaling and name the parts."""
+    p, m = regression.order, regression.outputs
+    y_scale = scale[:m]
+    column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])
+    coefficients = solution.coefficients * y_scale / column_scale[:, None]
+    if not np.isfinite(coefficients).all():
+        raise IdentificationError("the least-squares problem overflowed; check the record's units")
+    split = len(coefficients) - regression.basis_size
+    by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
+    by_lag = by_lag.transpose(0, 2, 1)
+    arx = ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s)
+    with np.errstate(over="ignore", invalid="ignore"):
+        markov, observer_gain = markov_parameters(arx, max(_MARKOV_COUNT, 2 * p + 1))
+    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
+        raise IdentificationError(
+            "the fitted model is violently unstable, so the record does not determine it; "
+            "record longer, excite more or raise the order"
+        )
+    return OkidResult(
+        arx,
+        markov,
+        observer_gain,
+        basis,
+        coefficients[split:],
+        solution.residual_covariance * np.outer(y_scale, y_scale),
+        solution.gram,
+        column_scale,
+        solution.penalty,
+        solution.rank,
+        solution.excitation_order,
+        regression.rows,
+    )
+
+
+def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
+    """Outputs and inputs side by side, shape (N, m + r), and m; gaps marked by NaN throughout."""
+    columns = []
+    for name, part in (("y", y), ("u", u)):
+        array = np.asarray(part, dtype=np.float64)
+        array = array[:, None] if array.ndim == 1 else array
+        if array.ndim != 2 or array.shape[1] == 0:
+            raise ValueError(f"{name} must have shape (N, channels), got {np.shape(part)}")
+        columns.append(array)
+    if len(columns[0]) != len(columns[1]):
+        raise ValueError(f"y has {len(columns[0])} samples and u has {len(columns[1])}")
+    z = np.hstack(columns)
+    z[~np.isfinite(z).all(axis=1)] = np.nan
+    return z, columns[0].shape[1]
+
+
+def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
+    """Root mean square of each channel, shape (q,), so that pascals and radians weigh the same.
+
+    Raises
+    ------
+    IdentificationError
+        If a channel is constant or the record holds no finite row.
+    """
+    good = z[np.isfinite(z[:, 0])]
+    if len(good) == 0:
+        raise IdentificationError("the record has no row without a gap")
+    for c in np.flatnonzero(np.ptp(good, axis=0) == 0):
+        name = f"output {c}" if c < outputs else f"input {c - outputs}"
+        raise IdentificationError(f"{name} does not move in the whole record")
+    magnitude = np.abs(good).max(axis=0)  # first, so that the squares neither over- nor underflow
+    scale: FloatArray = magnitude * np.sqrt(np.mean((good / magnitude) ** 2, axis=0))
+    return scale
+
+
+def checked_order(order: int) -> int:
+    """`order`, refused if it is not a positive integer."""
+    if int(order) != order or order < 1:
+        raise ValueError(f"order must be a positive integer, got {order}")
+    return int(order)

@@ -1,0 +1,294 @@
+"""Last step of an identification: the model of low order that is most likely, given the record.
+
+OKID finds what colours the prediction errors, a sea above all, as part of a model of high order,
+and ERA then reduces that model without regard to how well each part of it is known. Here the
+reduced model starts a search for the one whose whitened output error is least::
+
+    e(k) = A(q) (y(k) - yhat(k)) - c psi(k),    A(q) = I - alpha_1 q^-1 - ... - alpha_p q^-p
+
+with A(q) and the errors' covariance from OKID: maximum likelihood for a noise model of high order
+(Box-Jenkins structure; Ljung, System Identification, 7.4). The model is in modal form, yhat = D u +
+sum over poles of c_l b_l u / (q - lambda_l), so that slopes are exact; free oscillations at the
+start of each stretch and the disturbance basis enter linearly and are projected out (Golub and
+Pereyra 1973). Damped Gauss-Newton steps; a step that does not help is not taken.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.modes import ModeConfidence, Modes, frequency_and_damping_std
+from utank_hil.identification.okid import OkidResult, channel_scale, stacked_record
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+_STEPS = 15
+_DAMPINGS = (1e-8, 1e-6, 1e-4, 1e-2, 1.0)  # tried in turn until a step helps
+_SETTLED = 1e-7  # relative gain of a step that is not worth another
+_ROUNDING = 1e-15  # of an output's root mean square
+_NULL = 1e-8  # singular values of the slopes below this part are free scaling of c_l against b_l
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Refinement:
+    """A refined model and how well its modes are known.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+    confidence : ModeConfidence
+    gain : float
+        Part by which the whitened squared error fell; 0 when the model was the best already.
+    """
+
+    system: "StateSpace"
+    confidence: ModeConfidence
+    gain: float
+
+
+def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArray) -> Refinement:
+    """Refine a realized model on the record it was identified from.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        As `era` made it from ``result.markov``; its poles must be distinct.
+    result : OkidResult
+        Noise model and disturbance basis.
+    u : array_like, shape (N, r) or (N,)
+    y : array_like, shape (N, m) or (N,)
+
+    Returns
+    -------
+    Refinement
+
+    Raises
+    ------
+    ValueError
+        If model, result and record do not belong together.
+    IdentificationError
+        If the record has no stretch longer than the order.
+    """
+    z, m = stacked_record(u, y)
+    if np.shape(system.D) != (m, z.shape[1] - m) or result.arx.outputs != m:
+        raise ValueError(
+            f"a model of shape {np.shape(system.D)} and a result of {result.arx.outputs} outputs "
+            f"do not belong to a record of {m} outputs and {z.shape[1] - m} inputs"
+        )
+    scale = channel_scale(z, m)
+    problem = _Problem(z, scale, m, result)
+    model = _modal(system, scale[:m], scale[m:])
+    largest = max(np.abs(model.poles).max(), np.exp(3.0 / len(z)))
+    first = squares = problem.squares(model)
+    for _ in range(_STEPS):
+        errors, slopes = problem.linearized(model)
+        size = np.linalg.norm(slopes, axis=0)
+        left, values, right = np.linalg.svd(slopes / size, full_matrices=False)
+        kept = values > _NULL * values[0]
+        along = left[:, kept].T @ errors
+        before = squares
+        for damping in _DAMPINGS:
+            factor = values[kept] / (values[kept] ** 2 + damping * values[0] ** 2)
+            trial = model.moved(right[kept].T @ (factor * along) / size)
+            if np.abs(trial.poles).max() <= largest:
+                reached = problem.squares(trial)
+                if reached < squares:
+                    model, squares = trial, reached
+                    break
+        if before - squares <= _SETTLED * before:
+            break
+    return Refinement(
+        model.state_space(scale[:m], scale[m:], result.arx.sample_time_s),
+        _confidence(model, problem, scale[:m], result.arx.sample_time_s),
+        1 - squares / first if first > 0 else 0.0,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Modal:
+    """One of each conjugate pair of poles, with its output and input vectors; and D."""
+
+    poles: ComplexArray  # (k,)
+    c: ComplexArray  # (k, m)
+    b: ComplexArray  # (k, r)
+    d: FloatArray  # (m, r)
+
+    @property
+    def real(self) -> np.ndarray:
+        flags: np.ndarray = self.poles.imag == 0
+        return flags
+
+    def signals(self, u: FloatArray) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
+        """Response (m, N) to inputs (r, N); its slopes; free oscillations."""
+        response = self.d @ u
+        slopes: list[FloatArray] = []
+        free: list[FloatArray] = []
+        outputs = len(self.d)
+        decay = np.arange(u.shape[1])
+        for pole, c, b, real in zip(self.poles, self.c, self.b, self.real, strict=True):
+            inputs = _filtered(pole, u.astype(np.complex128))
+            state = b @ inputs
+            twice = _filtered(pole, state[None])[0]
+            moves = [np.outer(c, twice)]
+            moves += [np.outer(unit, state) for unit in np.eye(outputs)]
+            moves += [np.outer(c, part) for part in inputs]
+            response = response + _both(np.outer(c, state), real)[0]
+            for move in moves:
+                slopes += _both(move, real)
+            free += _both(np.outer(c, pole**decay), real)
+        slopes += [np.outer(unit, part) for unit in np.eye(outputs) for part in u]
+        return response, slopes, free
+
+    def moved(self, step: FloatArray) -> "_Modal":
+        """The model a step away, in the order of the slopes."""
+        m, r = self.d.shape
+        poles, c, b = self.poles.copy(), self.c.copy(), self.b.copy()
+        start = 0
+        for k, real in enumerate(self.real):
+            if real:
+                change = step[start : start + 1 + m + r].astype(np.complex128)
+                start += 1 + m + r
+            else:
+                pairs = step[start : start + 2 * (1 + m + r)].reshape(-1, 2)
+                change = pairs[:, 0] + 1j * pairs[:, 1]
+                start += 2 * (1 + m + r)
+            poles[k] += change[0]
+            c[k] += change[1 : 1 + m]
+            b[k] += change[1 + m :]
+        return _Modal(poles, c, b, self.d + step[start:].reshape(m, r))
+
+    def state_space(
+        self, y_scale: FloatArray, u_scale: FloatArray, sample_time_s: float
+    ) -> "StateSpace":
+        """Real block-diagonal form, scaling undone."""
+        from control import ss  # here, because importing it brings plotting into the process
+
+        blocks, rows, columns = [], [], []
+        for pole, c, b, real in zip(self.poles, self.c, self.b, self.real, strict=True):
+            if real:
+                blocks.append(np.array([[pole.real]]))
+                rows.append(b.real[None])
+                columns.append(c.real[:, None])
+            else:
+                blocks.append(np.array([[pole.real, -pole.imag], [pole.imag, pole.real]]))
+                rows.append(np.array([b.real, b.imag]))
+                columns.append(2 * np.column_stack([c.real, -c.imag]))
+        a = np.zeros((sum(map(len, blocks)),) * 2)
+        start = 0
+        for block in blocks:
+            a[start : start + len(block), start : start + len(block)] = block
+            start += len(block)
+        b_all, c_all = np.vstack(rows) / u_scale, np.hstack(columns) * y_scale[:, None]
+        return ss(a, b_all, c_all, self.d * y_scale[:, None] / u_scale, sample_time_s)
+
+
+class _Problem:
+    """Whitened errors of a model on a record, with the linear part projected out."""
+
+    def __init__(self, z: FloatArray, scale: FloatArray, m: int, result: OkidResult) -> None:
+        arx, y_scale = result.arx, scale[:m]
+        functions = result.basis.evaluate(len(z), arx.sample_time_s)
+        self._m = m
+        self._segments = LagRegression(z / scale, m, arx.order, functions).segments
+        covariance = result.residual_covariance / np.outer(y_scale, y_scale)
+        # data without noise may leave no errors, or the same ones in two outputs
+        covariance = covariance + (1e-12 * np.trace(covariance) + _ROUNDING**2) * np.eye(m)
+        self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+        alpha = arx.alpha * y_scale / y_scale[:, None]
+        self._taps = self._whiten @ np.concatenate([np.eye(m)[None], -alpha])
+
+    def squares(self, model: _Modal) -> float:
+        """Squared errors."""
+        errors, _ = self._projected(model, with_slopes=False)
+        return float(errors @ errors)
+
+    def linearized(self, model: _Modal) -> tuple[FloatArray, FloatArray]:
+        """Errors (rows,) and slopes of the model's output (rows, parameters), both projected."""
+        return self._projected(model, with_slopes=True)
+
+    def _projected(self, model: _Modal, with_slopes: bool) -> tuple[FloatArray, FloatArray]:
+        columns, linear = [], []
+        for i, segment in enumerate(self._segments):
+            response, slopes, free = model.signals(segment.channels[self._m :])
+            signals = [segment.channels[: self._m] - response, *(slopes if with_slopes else [])]
+            white = self._filtered(np.array(signals + free))
+            columns.append(white[:, : len(signals)])
+            waves = np.einsum("ao,fk->akof", self._whiten, segment.basis)
+            waves = waves.reshape(len(white), -1)
+            # each stretch oscillates freely by itself; the disturbance is one for all
+            own = np.zeros((len(white), len(free) * len(self._segments)))
+            own[:, i * len(free) : (i + 1) * len(free)] = white[:, len(signals) :]
+            linear.append(np.hstack([own, waves]))
+        basis = np.vstack(linear)
+        basis, _ = np.linalg.qr(basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300))
+        stacked = np.vstack(columns)
+        stacked = stacked - basis @ (basis.T @ stacked)
+        return stacked[:, 0], stacked[:, 1:]
+
+    def _filtered(self, signals: FloatArray) -> FloatArray:
+        """A(q) over signals (s, m, N), whitened; shape (m (N - p), s)."""
+        order, samples = len(self._taps) - 1, signals.shape[2]
+        size = 1 << (samples + order).bit_length()
+        spectrum = np.fft.rfft(self._taps, size, axis=0)
+        spectra = np.fft.rfft(signals, size, axis=2)
+        white = np.fft.irfft(np.einsum("fac,scf->saf", spectrum, spectra), size, axis=2)
+        return white[:, :, order:samples].reshape(len(signals), -1).T
+
+
+def _filtered(pole: complex, signals: ComplexArray) -> ComplexArray:
+    """Signals through 1 / (q - pole), along the last axis."""
+    from scipy.signal import lfilter  # here: slow to import
+
+    filtered: ComplexArray = lfilter([0.0, 1.0], [1.0, -pole], signals, axis=-1)
+    return filtered
+
+
+def _both(signal: ComplexArray, real: bool) -> list[FloatArray]:
+    """Sum of a term and its conjugate: as it is, and for a step in its imaginary part."""
+    return [signal.real] if real else [2 * signal.real, -2 * signal.imag]
+
+
+def _modal(system: "StateSpace", y_scale: FloatArray, u_scale: FloatArray) -> _Modal:
+    a, b, c, d = (np.asarray(part) for part in (system.A, system.B, system.C, system.D))
+    values, vectors = np.linalg.eig(a)
+    values, vectors = values.astype(np.complex128), vectors.astype(np.complex128)
+    kept = values.imag >= 0
+    outputs = (c @ vectors / y_scale[:, None]).T[kept]
+    inputs = (np.linalg.inv(vectors) @ b * u_scale)[kept]
+    size = np.linalg.norm(outputs, axis=1)[:, None]
+    return _Modal(values[kept], outputs / size, inputs * size, d / y_scale[:, None] * u_scale)
+
+
+def _confidence(
+    model: _Modal, problem: _Problem, y_scale: FloatArray, sample_time_s: float
+) -> ModeConfidence:
+    """Modes with standard deviations from the slopes (the Cramer-Rao bound at the estimate)."""
+    errors, slopes = problem.linearized(model)
+    size = np.linalg.norm(slopes, axis=0)
+    _, values, right = np.linalg.svd(slopes / size, full_matrices=False)
+    kept = values > _NULL * values[0]
+    root = right[kept].T / values[kept] / size[:, None]
+    root *= np.sqrt(errors @ errors / (len(errors) - np.count_nonzero(kept)))
+    width = 1 + model.c.shape[1] + model.b.shape[1]
+    starts = np.concatenate([[0], np.cumsum(np.where(model.real, width, 2 * width))[:-1]])
+    s = np.log(model.poles) / sample_time_s
+    order = np.argsort(np.abs(s))
+    frequency_std, damping_std = np.zeros(len(s)), np.zeros(len(s))
+    for position, k in enumerate(order):
+        per_pole = 1 / (model.poles[k] * sample_time_s)
+        moves = np.array([per_pole]) if model.real[k] else np.array([per_pole, 1j * per_pole])
+        spread = moves @ root[starts[k] : starts[k] + len(moves)]
+        block = np.array([spread.real, spread.imag])
+        frequency_std[position], damping_std[position] = frequency_and_damping_std(
+            s[k], block @ block.T
+        )
+    shapes = model.c[order] * y_scale
+    peak = np.take_along_axis(shapes, np.argmax(np.abs(shapes), axis=1)[:, None], axis=1)
+    modes = Modes(
+        model.poles[order], np.abs(s[order]), -s[order].real / np.abs(s[order]), shapes / peak
+    )
+    return ModeConfidence(modes, frequency_std, damping_std)

@@ -1,0 +1,196 @@
+"""How an identified model does on data it has not seen.
+
+Fit, whiteness of the prediction errors, and their correlation with the input. Errors that are not
+white say that there is more to predict (a wave, a higher order); errors that go with past inputs
+say that the way from input to output is wrong. Ljung, System Identification, 16.6.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.arx import ARX
+from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.okid import channel_scale, stacked_record
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Validation:
+    """How a model does on a record.
+
+    Parameters
+    ----------
+    one_step_fit : ndarray, shape (m,)
+        1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
+    simulation_fit : ndarray, shape (m,)
+        The same for the free response to input and disturbance basis, begun with the first p
+        samples of each stretch. What no model of the pump can know, an irregular sea, is in it.
+    residual_correlation : ndarray, shape (lags, m)
+        Autocorrelation of the prediction errors at lags 1, 2, ...
+    whiteness_probability : ndarray, shape (m,)
+        Of a larger Ljung-Box statistic if the errors were white.
+    input_correlation : ndarray, shape (lags + 1, m, r)
+        Correlation of the errors with the input 0, 1, ... samples before.
+    independence_probability : ndarray, shape (m, r)
+        Of a larger correlation statistic if the errors were white and apart from the input.
+    rows : int
+        Predictions compared.
+    """
+
+    one_step_fit: FloatArray
+    simulation_fit: FloatArray
+    residual_correlation: FloatArray
+    whiteness_probability: FloatArray
+    input_correlation: FloatArray
+    independence_probability: FloatArray
+    rows: int
+
+
+def validate(
+    arx: ARX,
+    u: FloatArray,
+    y: FloatArray,
+    disturbance_frequencies_rad_s: Sequence[float] = (),
+    lags: int = 25,
+) -> Validation:
+    """Compare a model with a record, best one it was not identified from.
+
+    Parameters
+    ----------
+    arx : ARX
+    u : array_like, shape (N, r) or (N,)
+    y : array_like, shape (N, m) or (N,)
+        NaN rows are gaps, as in `okid`.
+    disturbance_frequencies_rad_s : sequence of float
+        Known regular waves; amplitude and phase are fitted to this record.
+    lags : int
+
+    Returns
+    -------
+    Validation
+
+    Raises
+    ------
+    ValueError
+        If the record does not fit the model.
+    IdentificationError
+        If no unbroken stretch is longer than the model's order and lags, or a channel does not
+        move.
+    """
+    z, m = stacked_record(u, y)
+    if (m, z.shape[1] - m) != (arx.outputs, arx.inputs):
+        raise ValueError(
+            f"the model has {arx.outputs} outputs and {arx.inputs} inputs, the record {m} and "
+            f"{z.shape[1] - m}"
+        )
+    channel_scale(z, m)  # refuses channels that do not move
+    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s))
+    regression = LagRegression(
+        z, m, max(arx.order, lags), basis.evaluate(len(z), arx.sample_time_s)
+    )
+    coefficients = _coefficients(arx, regression)
+    errors = regression.residuals(coefficients)
+    if basis.size:
+        waves = np.hstack([s.basis for s in regression.segments])
+        coefficients[-basis.size :] = np.linalg.lstsq(waves.T, np.hstack(errors).T, rcond=None)[0]
+        errors = regression.residuals(coefficients)
+    simulated = [
+        s.channels[:m, regression.order :] - free
+        for s, free in zip(regression.segments, _simulated(regression, coefficients), strict=True)
+    ]
+    targets = np.hstack([s.channels[:m, regression.order :] for s in regression.segments])
+    spread = np.std(targets, axis=1)
+    whiteness, correlation = _whiteness(errors, lags)
+    independence, crossed = _independence(errors, regression, lags)
+    return Validation(
+        1 - _rms(errors) / spread,
+        1 - _rms(simulated) / spread,
+        correlation,
+        whiteness,
+        crossed,
+        independence,
+        regression.rows,
+    )
+
+
+def _coefficients(arx: ARX, regression: LagRegression) -> FloatArray:
+    """The model as a regression's coefficients, zero beyond its order and for the basis."""
+    m = arx.outputs
+    by_lag = np.zeros((regression.order + 1, m, regression.channels))
+    by_lag[1 : arx.order + 1, :, :m] = arx.alpha
+    by_lag[: arx.order + 1, :, m:] = arx.beta
+    lagged = by_lag.transpose(0, 2, 1).reshape(-1, m)[m:]
+    return np.vstack([lagged, np.zeros((regression.basis_size, m))])
+
+
+def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
+    """Free response of each segment, (m, N - p), begun with its first p samples."""
+    p, q, m = regression.order, regression.channels, regression.outputs
+    split = (p + 1) * q - m
+    past = coefficients[q - m : split].reshape(p, q, m)[:, :m]
+    newest_first = past.transpose(2, 0, 1).reshape(m, p * m)
+    inputs_only = coefficients.copy()
+    inputs_only[q - m : split].reshape(p, q, m)[:, :m] = 0
+    responses = []
+    for segment, left in zip(regression.segments, regression.residuals(inputs_only), strict=True):
+        forced = segment.channels[:m, p:] - left
+        samples = segment.channels.shape[1]
+        history = np.zeros((samples, m))  # backwards in time, so that the newest comes first
+        history[samples - p :] = segment.channels[:m, :p].T[::-1]
+        for k in range(samples - p):
+            now = samples - p - 1 - k
+            history[now] = newest_first @ history[now + 1 : now + 1 + p].ravel() + forced[:, k]
+        responses.append(history[: samples - p][::-1].T)
+    return responses
+
+
+def _rms(errors: list[FloatArray]) -> FloatArray:
+    rms: FloatArray = np.sqrt(np.mean(np.hstack(errors) ** 2, axis=1))
+    return rms
+
+
+def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatArray]:
+    """Ljung-Box probability and autocorrelation of each output's errors."""
+    total = sum(np.sum(e**2, axis=1) for e in errors)
+    correlation = np.array(
+        [
+            sum(np.sum(e[:, lag:] * e[:, :-lag], axis=1) for e in errors)
+            for lag in range(1, lags + 1)
+        ]
+    ) / np.maximum(total, 1e-300)
+    rows = sum(e.shape[1] for e in errors)
+    weights = rows * (rows + 2) / (rows - np.arange(1, lags + 1))
+    return chdtrc(lags, weights @ correlation**2), correlation
+
+
+def _independence(
+    errors: list[FloatArray], regression: LagRegression, lags: int
+) -> tuple[FloatArray, FloatArray]:
+    """Probability that errors and past inputs are unrelated, and their correlation."""
+    p, m = regression.order, regression.outputs
+    inputs = regression.channels - m
+    probability = np.empty((m, inputs))
+    correlation = np.empty((lags + 1, m, inputs))
+    size = np.sqrt(np.maximum(sum(np.sum(e**2, axis=1) for e in errors), 1e-300))
+    rows = regression.rows
+    for j in range(inputs):
+        lagged = [
+            np.array(
+                [s.channels[m + j, p - lag : s.channels.shape[1] - lag] for lag in range(lags + 1)]
+            )
+            for s in regression.segments
+        ]
+        power = sum(window @ window.T for window in lagged)
+        scale = np.sqrt(power.diagonal())
+        crossed = sum(w @ e.T for w, e in zip(lagged, errors, strict=True))
+        correlation[:, :, j] = crossed / scale[:, None] / size
+        # inputs are correlated among themselves, and a slow one is so nearly completely
+        values, vectors = np.linalg.eigh(power / np.outer(scale, scale))
+        kept = values > 1e-6 * values[-1]
+        along = vectors[:, kept].T @ correlation[:, :, j] / np.sqrt(values[kept])[:, None]
+        probability[:, j] = chdtrc(np.count_nonzero(kept), rows * np.sum(along**2, axis=0))
+    return probability, correlation

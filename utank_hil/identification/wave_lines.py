@@ -1,0 +1,125 @@
+"""Frequencies of regular waves, found in the same data that the model is identified from.
+
+For each trial frequency the regression is solved with and without its sine and cosine; the drop in
+squared prediction error is the evidence for a line there (variable projection; the coefficients are
+never formed)::
+
+    drop(w) = e^T Psi (Psi^T P Psi)^-1 Psi^T e,   P = I - Phi (Phi^T Phi + mu I)^-1 Phi^T,   e = P y
+
+A high-order ARX predicts any sine wave from its own past and would leave nothing to see; so the
+order is low here, and the small ridge mu stands for measurement noise where the data have none.
+"""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize_scalar
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.okid import channel_scale, stacked_record
+
+_ORDER = 12
+_RIDGE = 1e-4  # squared relative noise: 1 %
+_STEPS_A_CYCLE = 4  # trial frequencies for each cycle more over the record
+_EVIDENCE = 30.0  # drop over error variance, a coefficient: noise stays below 6, a sea below 20
+
+
+def find_disturbance_frequencies(
+    u: FloatArray,
+    y: FloatArray,
+    sample_time_s: float = 0.2,
+    most: int = 1,
+    band_rad_s: tuple[float, float] = (0.2, 2.0),
+) -> tuple[float, ...]:
+    """Frequencies of sinusoidal disturbances, to hand to `okid`.
+
+    Parameters
+    ----------
+    u : array_like, shape (N, r) or (N,)
+    y : array_like, shape (N, m) or (N,)
+        NaN rows are gaps, as in `okid`.
+    sample_time_s : float
+    most : int
+        Largest number of lines looked for.
+    band_rad_s : tuple of float
+        Where to look.
+
+    Returns
+    -------
+    tuple of float
+        rad/s, the strongest first; empty when no line stands out of the prediction errors.
+
+    Raises
+    ------
+    ValueError
+        If the band does not lie between zero and the Nyquist frequency.
+    IdentificationError
+        If the record is too short or a channel does not move.
+    """
+    low, high = band_rad_s
+    if not 0 < low < high < np.pi / sample_time_s:
+        raise ValueError(
+            f"band_rad_s must rise and lie between 0 and {np.pi / sample_time_s:.3g}, "
+            f"got {band_rad_s}"
+        )
+    z, m = stacked_record(u, y)
+    z = z / channel_scale(z, m)
+    step = 2 * np.pi / (len(z) * sample_time_s) / _STEPS_A_CYCLE
+    grid = np.arange(low, high + step, step)
+    lines: list[float] = []
+    while len(lines) < most:
+        search = _Search(z, m, lines, sample_time_s)
+        # no second line within a cycle of one that was found
+        fresh = [w for w in grid if all(abs(w - old) > _STEPS_A_CYCLE * step for old in lines)]
+        if not fresh:
+            break
+        line = search.refined(max(fresh, key=search.drop), step)
+        if search.drop(line) < _EVIDENCE * 2 * m:
+            break
+        lines.append(line)
+        if len(lines) > 1:  # the lines pull at each other: each once more beside the others
+            for i, old in enumerate(lines):
+                others = lines[:i] + lines[i + 1 :]
+                lines[i] = _Search(z, m, others, sample_time_s).refined(old, step)
+    return tuple(lines)
+
+
+class _Search:
+    """Evidence for one more line beside those already found."""
+
+    def __init__(self, z: FloatArray, m: int, lines: list[float], sample_time_s: float) -> None:
+        time_s = np.arange(len(z), dtype=np.float64) * sample_time_s
+        known = DisturbanceBasis(lines).evaluate(len(z), sample_time_s)
+        self._regression = LagRegression(z, m, _ORDER, known)
+        gram, right = self._regression.gram()
+        ridge = np.full(len(gram), _RIDGE * self._regression.rows)
+        self._factor = cho_factor(gram + np.diag(ridge))
+        self._errors = self._regression.residuals(cho_solve(self._factor, right))
+        squares = sum(np.sum(e**2, axis=1) for e in self._errors)
+        self._variance = squares / self._regression.rows + _RIDGE
+        # e = P y belongs to the rows of the regression; their times tell the basis
+        marks = LagRegression(z, m, _ORDER, time_s[None])
+        self._times = [segment.basis[0] for segment in marks.segments]
+
+    def drop(self, frequency_rad_s: float) -> float:
+        """Squared error that a line takes away, over the error variance; summed over outputs."""
+        waves = [
+            np.array([np.sin(frequency_rad_s * t), np.cos(frequency_rad_s * t)])
+            for t in self._times
+        ]
+        shared = self._regression.transposed(waves)
+        inner = sum(w @ w.T for w in waves) - shared.T @ cho_solve(self._factor, shared)
+        seen = sum(w @ e.T for w, e in zip(waves, self._errors, strict=True))
+        gain = np.sum(seen * np.linalg.solve(inner, seen), axis=0)
+        return float(np.sum(gain / self._variance))
+
+    def refined(self, frequency_rad_s: float, step: float) -> float:
+        """Frequency of the most evidence within a step of a trial."""
+        found = minimize_scalar(
+            lambda w: -self.drop(w),
+            bounds=(max(frequency_rad_s - step, step / 2), frequency_rad_s + step),
+            method="bounded",
+            options={"xatol": 1e-3 * step},
+        )
+        return float(found.x)
