@@ -19,6 +19,7 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -35,29 +36,22 @@ def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray
     mass, damping, stiffness : ndarray, shape (2, 2)
         SI units; all three symmetric.
     """
-    rho, g = tank.density_kg_m3, GRAVITY_M_S2
-    at, ap = tank.reservoir_area_m2, tank.duct_area_m2
-    length, height, lz = tank.width_m, tank.height_m, tank.lz_m
-    roll_inertia = ship.inertia_kg_m2 + rho * (
-        at * (2 * height**3 - 6 * lz * height**2 + 6 * lz**2 * height) / 3
-        + at * length**2 * height / 2
-        + ap * lz**2 * length
-        + ap * length**3 / 12
-    )
-    roll_stiffness = ship.stiffness_nm_rad + rho * g * (
-        at * (2 * lz * height - height**2) + ap * lz * length
-    )
-    coupling_inertia = -rho * at * length * (height + lz)
-    coupling_stiffness = -rho * g * at * length
+    g, at = GRAVITY_M_S2, tank.reservoir_area_m2
+    water = water_moments(tank, 0.0)
+    coupling_inertia = water.swirl_kgm[0]
+    coupling_stiffness = -g * water.first_slope_kg[1]
     mass = np.array(
         [
-            [roll_inertia, coupling_inertia],
-            [coupling_inertia, rho * at * tank.effective_length_m],
+            [ship.inertia_kg_m2 + water.inertia_kgm2[0, 0], coupling_inertia],
+            [coupling_inertia, tank.density_kg_m3 * at * tank.effective_length_m],
         ]
     )
     damping = np.diag([ship.damping_nms_rad, at * tank.loss_pa_per_m_s])
     stiffness = np.array(
-        [[roll_stiffness, coupling_stiffness], [coupling_stiffness, 2 * rho * g * at]]
+        [
+            [ship.stiffness_nm_rad + g * water.first_kgm[2], coupling_stiffness],
+            [coupling_stiffness, 2 * tank.density_kg_m3 * g * at],
+        ]
     )
     return mass, damping, stiffness
 

@@ -32,6 +32,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
 
 
 class RollCoefficients(NamedTuple):
@@ -172,23 +173,16 @@ class RollModel:
 
 
 def _coefficients(ship: RollShip, tank: Tank) -> RollCoefficients:
-    rho, g = tank.density_kg_m3, GRAVITY_M_S2
-    at, ap = tank.reservoir_area_m2, tank.duct_area_m2
-    length, height, lz = tank.width_m, tank.height_m, tank.lz_m
-    water = rho * (
-        at * (2 * height**3 - 6 * lz * height**2 + 6 * lz**2 * height) / 3
-        + at * length**2 * height / 2
-        + ap * lz**2 * length
-        + ap * length**3 / 12
-    )
+    flow, at = tank.density_kg_m3 * tank.reservoir_area_m2, tank.reservoir_area_m2
+    water = water_moments(tank, 0.0)
     return RollCoefficients(
-        inertia=ship.inertia_kg_m2 + water,
-        inertia_h2=2 * rho * at * (height - lz),
-        coupling=-rho * at * length * (height + lz),
-        level_inertia=rho * at * tank.effective_length_m,
-        weight_lever=rho * g * (at * (2 * lz * height - height**2) + ap * lz * length),
-        weight_h=rho * g * at * length,
-        weight_h2=rho * g * at,
+        inertia=ship.inertia_kg_m2 + float(water.inertia_kgm2[0, 0]),
+        inertia_h2=2 * flow * (tank.height_m - tank.lz_m),
+        coupling=float(water.swirl_kgm[0]),
+        level_inertia=flow * tank.effective_length_m,
+        weight_lever=GRAVITY_M_S2 * float(water.first_kgm[2]),
+        weight_h=GRAVITY_M_S2 * float(water.first_slope_kg[1]),
+        weight_h2=GRAVITY_M_S2 * flow,
         damping=ship.damping_nms_rad,
         quadratic_damping=ship.quadratic_damping_nms2_rad2,
         offset_moment=ship.offset_moment_nm,

@@ -96,6 +96,8 @@ def simulate(
 ) -> RollRun:
     """Simulate one ship with classical Runge-Kutta steps.
 
+    The first 10,000 strikes at the level limits are reported one by one.
+
     Parameters
     ----------
     model : RollModel
