@@ -1,0 +1,109 @@
+"""The whole slice in lockstep: ship seconds per second, and what one controller tick costs.
+
+Every node, the whole catalogue, codec and protection at both ends, the controller armed. Processor
+time of this process, so that other work on the machine counts less.
+
+Example: .venv/bin/python tools/benchmark_slice.py --seconds 120
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from statistics import median
+
+from rich.console import Console
+from rich.table import Table
+
+from firmware_sim.assembly import build_ship_side
+from firmware_sim.scenario import Scenario
+from utank_hil.canbus import Frame
+from utank_hil.config_files import load_config
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.runtime.controller_node import ControllerNode
+
+STORM = Path(__file__).resolve().parents[1] / "configs" / "scenarios" / "storm.yaml"
+WARM_UP_S = 10
+
+
+class Timed:
+    """The controller node with its work measured."""
+
+    def __init__(self, node: ControllerNode) -> None:
+        self.name, self.period_ns = node.name, node.period_ns
+        self._node = node
+        self._heard_ns = 0
+        self.ticks_ns: list[int] = []
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame, on the next tick's account."""
+        begin = time.perf_counter_ns()
+        self._node.receive(frame, now_ns)
+        self._heard_ns += time.perf_counter_ns() - begin
+
+    def tick(self, now_ns: int) -> list[Frame]:
+        """Tick and note what this and the frames before it cost."""
+        begin = time.perf_counter_ns()
+        frames = list(self._node.tick(now_ns))
+        self.ticks_ns.append(time.perf_counter_ns() - begin + self._heard_ns)
+        self._heard_ns = 0
+        return frames
+
+
+def slice_speed(scenario: Scenario, seconds: int) -> float:
+    """Ship seconds per processor second of the whole slice."""
+    ship = build_ship_side(scenario, scenario.seed, scenario.operator)
+    controller = build_controller_node(next(iter(scenario.controllers.values())))
+    lockstep = Lockstep([*ship.nodes, controller])
+    lockstep.run_until(WARM_UP_S * 10**9)
+    begin = time.process_time()
+    lockstep.run_until((WARM_UP_S + seconds) * 10**9)
+    return seconds / (time.process_time() - begin)
+
+
+def tick_costs_us(scenario: Scenario, seconds: int) -> list[float]:
+    """Cost of each controller tick, the frames it heard before included."""
+    ship = build_ship_side(scenario, scenario.seed, scenario.operator)
+    timed = Timed(build_controller_node(next(iter(scenario.controllers.values()))))
+    lockstep = Lockstep([*ship.nodes, timed])
+    lockstep.run_until((WARM_UP_S + seconds) * 10**9)
+    return sorted(cost / 1e3 for cost in timed.ticks_ns[WARM_UP_S * 100 :])
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--seconds", type=int, default=120, help="of ship time in each round")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    scenario = load_config(STORM, Scenario)
+    speeds = [slice_speed(scenario, arguments.seconds) for _ in range(arguments.rounds)]
+    costs = tick_costs_us(scenario, arguments.seconds)
+    result = {
+        "ship_seconds_per_cpu_second": median(speeds),
+        "tick_p50_us": costs[len(costs) // 2],
+        "tick_p99_us": costs[len(costs) * 99 // 100],
+        "tick_p99_share_of_period": costs[len(costs) * 99 // 100] / 10e3,
+    }
+    if arguments.json:
+        sys.stdout.write(json.dumps(result) + "\n")
+        return
+    table = Table(title="The whole slice in lockstep")
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_row("ship seconds per processor second (aim 300)", f"{median(speeds):.0f}")
+    table.add_row("controller tick, p50", f"{result['tick_p50_us']:.0f} µs")
+    table.add_row("controller tick, p99", f"{result['tick_p99_us']:.0f} µs")
+    table.add_row(
+        "  p99 as a share of the 10 ms period", f"{result['tick_p99_share_of_period']:.2%}"
+    )
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
