@@ -3,6 +3,9 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
+# the matrices here are small: threads of the linear-algebra library only get in each other's way
+export OPENBLAS_NUM_THREADS := 1
+
 .PHONY: help setup bench test test-fast check format benchmark docs lock clean
 
 help:

@@ -24,6 +24,23 @@ def test_pressure_and_rate_hold_for_any_wish_and_motion(sequence):
     assert np.abs(np.diff(commands)).max() <= 100e3 * PERIOD_S * (1 + 1e-12)
 
 
+@given(numbers, st.floats(-6, 6), st.floats(-4, 4), st.floats(0, 1))
+def test_share_of_the_pressure_holds_for_braking_too(desired, level, rate, share):
+    limiter = CommandLimiter(PumpLimits(pressure_pa=50e3, rate_pa_s=1e9), TANK, PERIOD_S)
+    assert abs(limiter.limit(desired, level, rate, share)) <= 50e3 * share
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_no_number_sends_the_command_to_zero(place, value):
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9), TANK, PERIOD_S)
+    sample = [30e3, 0.5, 0.3]
+    limiter.limit(*sample)
+    sample[place] = value
+    assert limiter.limit(*sample) == 0.0
+    assert limiter.limiting
+
+
 @given(numbers, st.floats(-6, 6), st.floats(-4, 4))
 def test_mirrored_motion_gives_the_mirrored_command(desired, level, rate):
     limits = PumpLimits(rate_pa_s=1e9, power_w=4e5)

@@ -81,12 +81,18 @@ def test_multi_step_prediction_equals_brute_force_recursion(seed, order, outputs
 
 
 @settings(deadline=None, max_examples=40)
-@given(**shapes, horizon=st.integers(2, 12), free=st.integers(1, 12), target=st.booleans())
+@given(
+    **shapes,
+    horizon=st.integers(2, 12),
+    free=st.integers(1, 12),
+    first=st.integers(0, 5),
+    target=st.booleans(),
+)
 def test_gpc_is_the_dense_least_squares_optimum(
-    seed, order, outputs, inputs, horizon, free, target
+    seed, order, outputs, inputs, horizon, free, first, target
 ):
     arx = random_arx(seed, order, outputs, inputs)
-    free = min(free, horizon)
+    free, first = min(free, horizon), min(first, horizon - 1)
     rng = np.random.default_rng(seed + 2)
     output_weight, input_weight = rng.uniform(0.1, 5, outputs), rng.uniform(0.5, 5, inputs)
     past_u, past_y = rng.normal(size=(order, inputs)), rng.normal(size=(order, outputs))
@@ -95,7 +101,7 @@ def test_gpc_is_the_dense_least_squares_optimum(
     def residual(plan):
         future = np.zeros((horizon, inputs))
         future[:free] = plan.reshape(free, inputs)
-        deviation = reference - brute_force(arx, past_u, past_y, future)
+        deviation = (reference - brute_force(arx, past_u, past_y, future))[first:]
         return np.concatenate(
             [(np.sqrt(output_weight) * deviation).ravel(), (np.sqrt(input_weight) * future).ravel()]
         )
@@ -104,7 +110,7 @@ def test_gpc_is_the_dense_least_squares_optimum(
     columns = np.array([residual(unit) - base for unit in np.eye(free * inputs)]).T
     best = np.linalg.lstsq(columns, -base, rcond=None)[0][:inputs]
 
-    law = design_gpc(arx, free, horizon, output_weight, input_weight)
+    law = design_gpc(arx, free, horizon, output_weight, input_weight, first)
     u = (
         np.einsum("pab,pb->a", law.input_gains, past_u)
         + np.einsum("pab,pb->a", law.output_gains, past_y)
@@ -151,6 +157,14 @@ def _amplification(arx: ARX, control_horizon: int) -> float:
     return float(values[0] / values[-1])
 
 
+def test_relaxed_deadbeat_becomes_the_exact_one_as_its_weight_grows():
+    arx = random_arx(11, 2, 2, 1)
+    exact, relaxed = design_dpc(arx, 6, 9), design_dpc(arx, 6, 9, output_weight=1e10)
+    np.testing.assert_allclose(relaxed.output_gains, exact.output_gains, rtol=1e-5)
+    gentle = design_dpc(arx, 6, 9, output_weight=1e-3)
+    assert np.abs(gentle.output_gains).max() < 0.5 * np.abs(exact.output_gains).max()
+
+
 def test_longer_control_horizon_asks_for_less_pressure():
     arx = ARX(ALPHA, BETA, 0.2)
     effort = [np.abs(design_dpc(arx, hc, hc + 4).output_gains).max() for hc in (8, 25, 50)]
@@ -174,6 +188,7 @@ def test_dpc_does_not_depend_on_the_units_of_its_outputs():
         ({"output_weight": [1.0, 2.0]}, "output_weight must be a number or have shape"),
         ({"input_weight": 0.0}, "input_weight must be positive"),
         ({"input_weight": np.nan}, "input_weight must be"),
+        ({"first_output": 50}, "first_output must be 0 to 49"),
     ],
 )
 def test_bad_gpc_settings_are_refused_by_name(arguments, message):

@@ -20,9 +20,17 @@ What is left is the zero dynamics, the water's motion under s = 0::
     small angles:  (m_phi kL - m_c) h'' + b kL h' + (k_phi kL + rho g At L) h = -K_wave
 
 so with kL = 0 the level swings on for ever after a disturbance, and kL > 0 borrows damping from the
-ship at the price of the roll phi = -kL h. Neither knows the reservoirs' limits: therefore the
-pressure is blended out, and the tank left passive, while the swing of the level
-sqrt(h^2 + (h' / w_0)^2) goes from a soft to a hard limit.
+ship at the price of the roll phi = -kL h. Sampling, delay and the pump's lag make kL = 0 unstable,
+and a small kL too if the tank is as large as Patti-B's. So the pump may also brake the level
+(`level_brake`), at the price of some roll: P = ... - c_b h' gives::
+
+    s'' + 2 zeta w s' + w^2 s = -2 zeta_h w_0 abs(m_c) / m_phi h',    w_0 = sqrt(g / (H + Lz))
+
+which makes the zero dynamics h'' + 2 zeta_h w_0 h' + w_0^2 h = ... as long as the ship's own
+stiffness is small against m_phi w_0^2. Neither law knows the reservoirs' limits: therefore the
+pressure is blended out, and the tank left passive, while the swing sqrt(h^2 + (h' / w_t)^2), the
+level that the water would reach if left alone (w_t its natural frequency), goes from a soft to a
+hard limit.
 """
 
 import math
@@ -52,6 +60,8 @@ class FeedbackLinearization:
         kL, zero or more.
     shift_length_m : float
         l.
+    level_damping_ratio : float
+        zeta_h; 0 for the exact linear response.
     sample_time_s : float
 
     Raises
@@ -69,8 +79,10 @@ class FeedbackLinearization:
     hard_level_m: float
     shift_rad_m: float = 0.0
     shift_length_m: float = 1.0
+    level_damping_ratio: float = 0.0
     sample_time_s: float = 0.01
     model: RollModel = field(init=False, repr=False, compare=False)
+    _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("frequency_rad_s", "damping_ratio", "shift_length_m", "sample_time_s"):
@@ -82,9 +94,13 @@ class FeedbackLinearization:
                 "feedback linearization needs 0 < soft_level_m < hard_level_m, got "
                 f"{self.soft_level_m} and {self.hard_level_m}"
             )
-        if not (math.isfinite(self.shift_rad_m) and self.shift_rad_m >= 0):
-            raise ValueError(f"shift_rad_m must be zero or more, got {self.shift_rad_m}")
+        for name in ("shift_rad_m", "level_damping_ratio"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"feedback linearization {name} must be zero or more, got {value}")
         object.__setattr__(self, "model", RollModel(self.ship, self.tank))
+        brake = level_brake(self.model, self.level_damping_ratio)
+        object.__setattr__(self, "_brake_pa_s_m", brake)
         reach = min(self.hard_level_m, self.tank.level_limit_m)
         levels = np.linspace(0.0, reach, 201)
         grips = [self._grip(level) for level in levels.tolist()]
@@ -113,11 +129,12 @@ class FeedbackLinearization:
         output, rate, drift = self._output(state.tolist(), phi_ddot, h_ddot)
         w = self.frequency_rad_s
         wanted = -(w**2) * (output - target_rad) - 2 * self.damping_ratio * w * rate
-        return (wanted - drift) / self._grip(float(state[2]))
+        brake = self._brake_pa_s_m * float(state[3])
+        return (wanted - drift) / self._grip(float(state[2])) - brake
 
     def share(self, level_m: float, level_rate_m_s: float) -> float:
         """Share of the linearizing pressure that the swing of the level leaves, 0 to 1."""
-        swing = math.hypot(level_m, level_rate_m_s / self.zero_dynamics_rad_s)
+        swing = math.hypot(level_m, level_rate_m_s / self.tank.natural_frequency_rad_s)
         x = (self.hard_level_m - swing) / (self.hard_level_m - self.soft_level_m)
         x = min(max(x, 0.0), 1.0)
         return x * x * (3 - 2 * x)
@@ -146,6 +163,26 @@ class FeedbackLinearization:
         determinant = roll_inertia * c.level_inertia - c.coupling**2
         shifted = self.shift_rad_m * math.cos(level_m / self.shift_length_m) * roll_inertia
         return c.area * (shifted - c.coupling) / determinant
+
+
+def level_brake(model: RollModel, damping_ratio: float) -> float:
+    """Pump pressure per level rate, against the flow, that damps the water under zero roll.
+
+    Parameters
+    ----------
+    model : RollModel
+    damping_ratio : float
+        zeta_h that the zero dynamics get.
+
+    Returns
+    -------
+    float
+        c_b in Pa s/m.
+    """
+    c, tank = model.coefficients, model.tank
+    frequency = math.sqrt(GRAVITY_M_S2 / (tank.height_m + tank.lz_m))
+    inertia = (c.inertia * c.level_inertia - c.coupling**2) / (c.inertia * c.area)
+    return 2 * damping_ratio * frequency * inertia
 
 
 class FeedbackLinearizationController:

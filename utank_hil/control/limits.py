@@ -112,17 +112,17 @@ class CommandLimiter:
         level_m, level_rate_m_s : float
         share : float
             Part of the greatest pressure that is allowed at present.
+
+        Returns
+        -------
+        float
+            On its way to zero if an argument is not a finite number.
         """
-        limits = self._limits
-        high = limits.pressure_pa * share
-        low = -high
-        if level_rate_m_s > 0:
-            high = min(high, self._barrier_pa(level_m, level_rate_m_s))
-            high = min(high, limits.power_w / (self._area_m2 * level_rate_m_s))
-        elif level_rate_m_s < 0:
-            low = max(low, -self._barrier_pa(-level_m, -level_rate_m_s))
-            low = max(low, limits.power_w / (self._area_m2 * level_rate_m_s))
-        command = self._towards(min(max(desired_pa, low), high))
+        if math.isfinite(desired_pa + level_m + level_rate_m_s):
+            target_pa = self._permitted_pa(desired_pa, level_m, level_rate_m_s, share)
+        else:
+            target_pa = 0.0
+        command = self._towards(target_pa)
         self.limiting = command != desired_pa
         return command
 
@@ -152,6 +152,18 @@ class CommandLimiter:
         self._sum_pa = 0.0
         self._count = 0
         return mean
+
+    def _permitted_pa(
+        self, desired_pa: float, level_m: float, rate_m_s: float, share: float
+    ) -> float:
+        """Within pressure, level and power limits; the barrier brakes with the share, too."""
+        most = self._limits.pressure_pa * share
+        if rate_m_s == 0:
+            return min(max(desired_pa, -most), most)
+        way = math.copysign(1.0, rate_m_s)  # seen in the direction in which the water moves
+        power_pa = self._limits.power_w / (self._area_m2 * abs(rate_m_s))
+        high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s)), power_pa)
+        return way * max(min(way * desired_pa, high), -most)
 
     def _barrier_pa(self, level_m: float, rate_m_s: float) -> float:
         """Greatest pressure for water rising at `rate_m_s` > 0 towards the positive limit."""

@@ -71,7 +71,7 @@ def design_lqr(
         raise ValueError(f"cross_weight must have shape ({states}, {inputs}), got {n.shape}")
     value: FloatArray = solve_discrete_are(a, b, q, r, s=n)
     gain = np.linalg.solve(r + b.T @ value @ b, b.T @ value @ a + n.T)
-    return GainLaw(gain, sample_time_s)
+    return GainLaw(np.asarray(gain, dtype=np.float64), sample_time_s)
 
 
 def kalman_predictor(
@@ -109,7 +109,8 @@ def kalman_predictor(
     measurement = _weight("measurement_covariance", measurement_covariance, len(c))
     error: FloatArray = solve_discrete_are(a.T, c.T, process, measurement)
     innovation = c @ error @ c.T + measurement
-    return np.linalg.solve(innovation, c @ error @ a.T).T, innovation
+    gain = np.linalg.solve(innovation, c @ error @ a.T).T
+    return np.asarray(gain, dtype=np.float64), innovation
 
 
 def design_lqg(
@@ -201,52 +202,61 @@ class LQGLaw:
 class LQGController:
     """Steps an `LQGLaw`.
 
+    Predicted state, last input and newest measurement are kept in one vector, so that a step is two
+    products.
+
     Parameters
     ----------
     law : LQGLaw
-
-    Attributes
-    ----------
-    innovation : ndarray, shape (m,)
-        What the newest measurement held beyond its prediction: white while the model is true.
     """
 
     def __init__(self, law: LQGLaw) -> None:
         self.sample_time_s = law.sample_time_s
         a, b, c, d, _ = law.model
-        self._a, self._b, self._c, self._d = a, b, c, d
-        self._gain, self._observer_gain = -law.gain, law.observer_gain
+        observer = law.observer_gain
+        self._states, self._inputs = b.shape
+        self._advance = np.hstack([a - observer @ c, b - observer @ d, observer])
+        self._surprise = np.hstack([-c, -d, np.eye(len(c))])
+        self._gain = -law.gain
         self._reference_gain: FloatArray | None = None
         self._law = law
         self.reset()
 
     def reset(self) -> None:
         """Forget the past: state and input zero."""
-        self._state = np.zeros(len(self._a))
-        self._input = np.zeros(self._b.shape[1])
-        self.innovation = np.zeros(len(self._c))
+        self._memory = np.zeros(self._advance.shape[1])
+        self._stepped = self._memory.copy()
+
+    @property
+    def innovation(self) -> FloatArray:
+        """What the newest measurement held beyond its prediction, shape (m,).
+
+        White while the model is true.
+        """
+        surprise: FloatArray = self._surprise @ self._stepped
+        return surprise
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (r,).
 
         `reference`, shape (m,), is a constant target of the outputs.
         """
-        u = self._input
-        self.innovation = y - self._c.dot(self._state) - self._d.dot(u)
-        self._state = (
-            self._a.dot(self._state) + self._b.dot(u) + self._observer_gain.dot(self.innovation)
-        )
-        command: FloatArray = self._gain.dot(self._state)
+        memory, states = self._memory, self._states
+        memory[states + self._inputs :] = y
+        self._stepped[:] = memory
+        state = self._advance.dot(memory)
+        command: FloatArray = self._gain.dot(state)
         if reference is not None:
             if self._reference_gain is None:
                 self._reference_gain = self._law.reference_gain()
             command += self._reference_gain @ reference
-        self._input = command.copy()
+        memory[:states] = state
+        memory[states : states + self._inputs] = command
         return command
 
     def applied(self, u: FloatArray) -> None:
         """Replace the newest input by what was really commanded: the predictor goes on from it."""
-        self._input = np.array(u, dtype=np.float64)
+        self._memory[self._states : self._states + self._inputs] = u
 
 
 def _weight(name: str, values: npt.ArrayLike, size: int) -> FloatArray:

@@ -7,6 +7,7 @@ wave it expects, not only the motion there is.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -122,3 +123,21 @@ def wave_plant(
     process = np.zeros(plant.A.shape)
     process[: n + 2, : n + 2] = _noise_covariance(a, noise, predictor.sample_time_s)
     return plant, process
+
+
+# Found as the predictive defaults were (`utank_hil.control.defaults`), by the linear loop's answer
+# to the storm hour: least roll with a pressure of 33 kPa and a level of 2.3 m RMS and a peak
+# sensitivity of 1.7 at most.
+LQG_ROLL_RATE_LEVEL: Final = LQGDesign(
+    predictor=Predictor(
+        measured=("roll_rad", "roll_rate_rad_s", "level_m"),
+        measurement_std=(4.9e-3, 3.6e-3, 0.055),
+        order=1,
+        wave_peak_rad_s=0.634,
+        wave_damping_ratio=0.0051,
+        wave_slope_rad=0.054,
+        pressure_noise_pa_rt_s=1740.0,
+    ),
+    state_weight=(3.0e11, 6.0e11, 9.0e5, 2.0e5),
+    washout_rad_s=0.02,
+)

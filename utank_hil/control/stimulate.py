@@ -1,0 +1,181 @@
+"""Stimulating roll: the pump rolls the ship on still water, for training and inclining tests.
+
+The pressure is P = p(t) sin(w t), its amplitude from the linear model's gain G = abs(roll / P) at
+the wanted period and slowly corrected by what the ship really does::
+
+    p = m a(t) / G,    m' = (1 - abs(roll_w) / a) / T
+
+where a(t) is the wanted amplitude, ramped in and out, and roll_w the roll's component at the
+frequency w, from a lock-in of two low-passes. T is long against the decay of the free roll, so that
+the correction does not answer the ship's own transient.
+
+Beyond a roll or level limit the stimulation ends: the amplitude is ramped out and stays zero until
+`reset`.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+FACTOR = (0.25, 3.0)  # range of the correction m: beyond it the model is of another ship
+
+
+@dataclass(frozen=True, slots=True)
+class Stimulation:
+    """What to do, and for which ship.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    amplitude_rad, period_s : float
+        Wanted roll.
+    ramp_s : float
+        Time in which the amplitude goes from zero to full and back.
+    pressure_pa : float
+        Greatest pressure.
+    roll_limit_rad, level_limit_m : float
+        Where the stimulation ends.
+    correction_s : float
+        T.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not positive, the amplitude is at or above the roll limit, or the model
+        says that it takes more pressure or level than there is.
+    """
+
+    ship: RollShip
+    tank: Tank
+    amplitude_rad: float
+    period_s: float
+    ramp_s: float
+    pressure_pa: float
+    roll_limit_rad: float
+    level_limit_m: float
+    correction_s: float = 120.0
+    sample_time_s: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name in (
+            "amplitude_rad",
+            "period_s",
+            "ramp_s",
+            "pressure_pa",
+            "roll_limit_rad",
+            "level_limit_m",
+            "correction_s",
+            "sample_time_s",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"stimulation {name} must be positive, got {value}")
+        if self.amplitude_rad >= self.roll_limit_rad:
+            raise ValueError(
+                f"stimulation amplitude_rad {self.amplitude_rad} must be below roll_limit_rad "
+                f"{self.roll_limit_rad}"
+            )
+        roll, level = self.gains
+        for name, needed, limit in (
+            ("pressure_pa", self.amplitude_rad / roll, self.pressure_pa),
+            ("level_limit_m", self.amplitude_rad * level / roll, self.level_limit_m),
+        ):
+            if needed > limit:
+                raise ValueError(
+                    f"{self.amplitude_rad:.3g} rad at {self.period_s:.3g} s take {needed:.4g}, "
+                    f"{name} is {limit:.4g}: roll less, or nearer to the natural period"
+                )
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Amplitudes of roll and level per amplitude of the pressure, rad/Pa and m/Pa."""
+        mass, damping, stiffness = coupled_matrices(self.ship, self.tank)
+        w = math.tau / self.period_s
+        impedance = stiffness - w**2 * mass + 1j * w * damping
+        roll, level = np.linalg.solve(impedance, [0.0, self.tank.reservoir_area_m2])
+        return float(abs(roll)), float(abs(level))
+
+    def controller(self) -> "StimulationController":
+        """A new steppable controller, its ramp at zero."""
+        return StimulationController(self)
+
+
+class StimulationController:
+    """Steps a `Stimulation`.
+
+    Parameters
+    ----------
+    plan : Stimulation
+
+    Attributes
+    ----------
+    ended : bool
+        A limit was passed; the ship is left to come to rest.
+    amplitude_rad : float
+        Measured amplitude of roll at the wanted period.
+    """
+
+    def __init__(self, plan: Stimulation) -> None:
+        self.sample_time_s = plan.sample_time_s
+        self._plan = plan
+        self._turn = math.tau / plan.period_s * plan.sample_time_s
+        self._share = plan.sample_time_s / plan.period_s  # low-pass of the lock-in: one period
+        self._pressure_per_roll = 1 / plan.gains[0]
+        self.reset()
+
+    def reset(self) -> None:
+        """As newly built: ready to ramp in."""
+        self.ended = False
+        self.amplitude_rad = 0.0
+        self._wanted_rad = 0.0
+        self._factor = 1.0
+        self._steps = 0
+        self._first = self._second = complex(0.0)
+        self._command_pa = 0.0
+        self._obeyed = True
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Pressure, shape (1,), for `y` = (roll, roll rate, level, level rate).
+
+        `reference`, one number, overrides the wanted amplitude: 0 ramps out.
+        """
+        plan = self._plan
+        self._lock_in(float(y[0]))
+        beyond = abs(y[0]) > plan.roll_limit_rad or abs(y[2]) > plan.level_limit_m
+        self.ended = self.ended or bool(beyond)
+        target = plan.amplitude_rad if reference is None else abs(float(reference[0]))
+        target = 0.0 if self.ended else min(target, plan.roll_limit_rad)
+        change = plan.amplitude_rad * plan.sample_time_s / plan.ramp_s
+        if self._obeyed:
+            self._wanted_rad += min(max(target - self._wanted_rad, -change), change)
+        else:  # another law is in charge: start from zero when it lets go
+            self._wanted_rad = 0.0
+        if self._wanted_rad == target > 0:
+            self._factor += (
+                plan.sample_time_s / plan.correction_s * (1 - self.amplitude_rad / target)
+            )
+            self._factor = min(max(self._factor, FACTOR[0]), FACTOR[1])
+        size = min(self._factor * self._wanted_rad * self._pressure_per_roll, plan.pressure_pa)
+        self._command_pa = size * math.sin(self._turn * self._steps)
+        self._steps += 1
+        self._obeyed = True
+        return np.array([self._command_pa])
+
+    def applied(self, u: FloatArray) -> None:
+        """Start again from zero if nothing of the last command left."""
+        self._obeyed = not (u[0] == 0 and self._command_pa != 0)
+
+    def _lock_in(self, roll_rad: float) -> None:
+        angle = self._turn * self._steps
+        turned = roll_rad * complex(math.cos(angle), -math.sin(angle))
+        self._first += self._share * (turned - self._first)
+        self._second += self._share * (self._first - self._second)
+        self.amplitude_rad = 2 * abs(self._second)

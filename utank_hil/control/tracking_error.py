@@ -1,0 +1,56 @@
+"""The error dynamics that the fuzzy laws shape, thesis (4.13) and (4.14).
+
+With e = (phi - y_d, phi'), the wanted dynamics e'' + 2 zeta w e' + w^2 e = 0 and ::
+
+    A = [0 1; -w^2 -2 zeta w],    B = (0, 1),    A' P + P A = -q I
+
+the laws are driven by the one number s = B' P e = p12 e + p22 e'.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorDynamics:
+    """Wanted error dynamics and their Lyapunov function e' P e / 2.
+
+    Parameters
+    ----------
+    frequency_rad_s, damping_ratio : float
+        w and zeta.
+    q : float
+        Least eigenvalue of Q = q I.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is not positive.
+    """
+
+    frequency_rad_s: float
+    damping_ratio: float
+    q: float
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_rad_s", "damping_ratio", "q"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"error dynamics {name} must be positive, got {value}")
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Gains k of the outer loop: w^2 and 2 zeta w."""
+        return self.frequency_rad_s**2, 2 * self.damping_ratio * self.frequency_rad_s
+
+    @property
+    def lyapunov(self) -> FloatArray:
+        """P, shape (2, 2)."""
+        k1, k2 = self.gains
+        p12 = self.q / (2 * k1)
+        p22 = (self.q / 2 + p12) / k2
+        return np.array([[k2 * p12 + k1 * p22, p12], [p12, p22]])
