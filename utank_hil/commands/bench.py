@@ -46,7 +46,7 @@ def bench(
 
     In real time each run lasts its duration; without [bold]--duration[/bold] that is 120 s.
     """
-    # the ship's side stands above this package and is loaded by this command alone
+    # the ship's side stands above this package: loaded only where a scenario is needed
     from firmware_sim.bench import BenchOptions, run_bench
     from firmware_sim.report import as_json, motion_table, pump_table, write_report
     from firmware_sim.scenario import Scenario

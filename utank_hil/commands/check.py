@@ -13,7 +13,8 @@ from rich.table import Table
 
 from utank_hil.analysis.robustness import Robustness, robustness
 from utank_hil.commands.common import Json, load
-from utank_hil.config import ControllerConfig, PassiveLaw
+from utank_hil.config import ControllerConfig
+from utank_hil.config_laws import build_law
 
 
 def check(
@@ -39,16 +40,16 @@ def check(
 
 
 def judge(config: ControllerConfig) -> Robustness | None:
-    """Robustness of a configuration's law; None for the passive tank, which has no loop."""
-    if isinstance(config.law, PassiveLaw):
-        return None
+    """Robustness of a configuration's law; None if it is nonlinear or has no loop."""
     vessel = config.vessel
-    law = config.law.law(vessel.ship, vessel.tank, config.delay_s, vessel.pump.lag_s)
+    built = build_law(config.law, vessel, config.delay_s, config.limits)
+    if built.linear is None:
+        return None
     return robustness(
-        law,
+        built.linear,
         vessel.ship,
         vessel.tank,
-        config.law.predictor.measured,
+        built.measured,
         config.delay_s,
         vessel.pump.lag_s,
     )
@@ -79,7 +80,7 @@ def _print(config: ControllerConfig, report: Robustness | None) -> None:
     console = Console(highlight=False)
     console.print(f"{config.name} for {config.vessel.name}: the configuration is valid.")
     if report is None:
-        console.print("The tank stays passive: there is no loop and there are no margins.")
+        console.print("The law is nonlinear or passive: it has no margins of a linear loop.")
         return
     margin = report.nominal
     table = Table(title="Margins, delay and pump lag included")

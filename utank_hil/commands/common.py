@@ -7,6 +7,7 @@ from typing import Annotated, Final, NoReturn, TypeVar
 import typer
 from pydantic import BaseModel
 from rich.console import Console
+from rich.markup import escape
 
 from utank_hil.config_files import ConfigError, load_config
 
@@ -41,7 +42,7 @@ def new_app(help_text: str) -> typer.Typer:
 
 def fail(message: object) -> NoReturn:
     """Print an error and end with exit code 2."""
-    notes.print("[red]error:[/red]", str(message), markup=True, soft_wrap=True)
+    notes.print("[red]error:[/red]", escape(str(message)), soft_wrap=True)
     raise typer.Exit(2)
 
 
@@ -51,7 +52,7 @@ def load(path: Path, model: type[ModelT]) -> ModelT:
         return load_config(path, model)
     except ConfigError as error:
         for problem in error.problems:
-            notes.print("[red]error:[/red]", str(problem), soft_wrap=True)
+            notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
         raise typer.Exit(2) from None
 
 

@@ -3,33 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.telemetry.style import COLORS, HIGHLIGHT, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.typing import RcKeyType
 
 ZOOM_S: Final = 180.0
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
-
-# Dark grey for the reference, then Okabe and Ito's colours, told apart by colour-blind eyes
-_COLORS: Final = ("#555555", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
-_STYLE: "Final[dict[RcKeyType, Any]]" = {
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#888888",
-    "axes.grid": True,
-    "grid.color": "#E6E6E6",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,36 +59,28 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
     ValueError
         If there are no curves, or more than the colours that can be told apart.
     """
-    if not 1 <= len(curves) <= len(_COLORS):
-        raise ValueError(f"can draw 1 to {len(_COLORS)} runs in one picture, got {len(curves)}")
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    if not 1 <= len(curves) <= len(COLORS):
+        raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
     whole = (float(curves[0].time_s[0]), float(curves[0].time_s[-1]))
     zoom = _worst_span(curves[0], whole)
     spans = [whole] if zoom == whole else [whole, zoom]
-    with mpl.rc_context(rc=_STYLE):
-        figure = Figure(figsize=(13.0 if len(spans) > 1 else 9.0, 7.5), layout="constrained")
-        FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
+    with picture(path, title, (13.0 if len(spans) > 1 else 9.0, 7.5)) as figure:
         axes = figure.subplots(3, len(spans), sharex="col", sharey="row", squeeze=False)
         for column, span_s in zip(axes.T, spans, strict=True):
             _draw_column(column, curves, span_s)
         if len(spans) > 1:
             unit_s, _ = _time_unit(whole)
             for axis in axes[:, 0]:
-                axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color="#F0E442", alpha=0.35, lw=0)
+                axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color=HIGHLIGHT, alpha=0.35, lw=0)
             axes[0, 0].set_title("Whole run", loc="left", fontsize=10)
             axes[0, 1].set_title("Around the largest roll", loc="left", fontsize=10)
         for axis, label in zip(axes[:, 0], _LABELS, strict=True):
             axis.set_ylabel(label)
         figure.align_ylabels()
-        figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
         handles = axes[0, -1].get_lines()[: len(curves)]
         figure.legend(
             handles, _legend(curves), loc="outside lower left", ncols=len(curves), frameon=False
         )
-        figure.savefig(path, dpi=130)
     return path
 
 
@@ -127,7 +104,7 @@ def _draw_column(
     """Draw roll, level and pressure over one span of time."""
     unit_s, unit = _time_unit(span_s)
     width = 0.5 if unit_s > 1 else 1.4
-    for curve, color in zip(curves, _COLORS, strict=False):
+    for curve, color in zip(curves, COLORS, strict=False):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
         time = curve.time_s[shown] / unit_s
         values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)

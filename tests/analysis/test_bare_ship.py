@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from utank_hil.analysis.bare_ship import roll_without_tank
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
+
+SHIP = RollShip(inertia_kg_m2=1.9275e9, stiffness_nm_rad=4.81875e8, damping_nms_rad=4.81875e7)
+
+
+def integrated(ship: RollShip, moment: Harmonics, time_s: np.ndarray) -> np.ndarray:
+    """Roll from rest by an adaptive Runge-Kutta method, wave by wave from its cosine."""
+
+    def rates(t: float, x: np.ndarray) -> list[float]:
+        k = float(moment.amplitude @ np.cos(moment.frequency_rad_s * t + moment.phase_rad))
+        acceleration = k - ship.damping_nms_rad * x[1] - ship.stiffness_nm_rad * x[0]
+        return [x[1], acceleration / ship.inertia_kg_m2]
+
+    solution = solve_ivp(
+        rates, (0.0, time_s[-1]), [0.0, 0.0], t_eval=time_s, rtol=1e-10, atol=1e-12, method="DOP853"
+    )
+    return np.asarray(solution.y[0])
+
+
+@pytest.mark.parametrize(
+    "moment",
+    [
+        Harmonics(np.array([2e7]), np.array([0.5]), np.array([0.7])),  # at resonance
+        Harmonics(np.array([2e7, -3e7]), np.array([0.3, 1.4]), np.array([2.0, -0.3])),
+        Harmonics(np.array([1e7]), np.array([0.0]), np.array([0.0])),  # a constant heel
+        Sea.irregular(jonswap(4.7, 10.0), 5, components=64).roll_moment(
+            SHIP.stiffness_nm_rad, EffectiveSlope(0.5)
+        ),
+    ],
+)
+def test_closed_form_equals_integration_of_the_equation_of_motion(moment: Harmonics) -> None:
+    time_s = 0.05 * np.arange(4001)
+    roll = roll_without_tank(SHIP, moment, 0.05, len(time_s))
+    expected = integrated(SHIP, moment, time_s)
+    assert np.abs(expected).max() > 0.01
+    np.testing.assert_allclose(roll, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert abs(roll[0]) < 1e-15
+
+
+def test_step_only_samples_the_answer() -> None:
+    moment = Harmonics(np.array([2e7]), np.array([0.55]), np.array([0.1]))
+    fine = roll_without_tank(SHIP, moment, 0.1, 1001)
+    coarse = roll_without_tank(SHIP, moment, 1.0, 101)
+    np.testing.assert_allclose(fine[::10], coarse, rtol=0, atol=1e-14)
+
+
+def test_overdamped_ship_is_refused() -> None:
+    heavy = RollShip(inertia_kg_m2=1e9, stiffness_nm_rad=2.5e8, damping_nms_rad=1.01e9)
+    moment = Harmonics(np.array([2e7]), np.array([0.55]), np.array([0.1]))
+    with pytest.raises(ValueError, match="overdamped"):
+        roll_without_tank(heavy, moment, 0.1, 10)

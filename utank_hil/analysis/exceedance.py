@@ -1,0 +1,50 @@
+"""How often a motion passes a level: of a record, and as Rayleigh has it for a narrow band."""
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
+    """Share of the single amplitudes that are above each level.
+
+    A single amplitude is the greatest deviation from the mean between two crossings of it, to
+    either side; what comes before the first crossing and after the last is left out.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+    levels : ndarray, shape (k,)
+        In the signal's unit.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+
+    Raises
+    ------
+    ValueError
+        If the record does not cross its mean twice.
+    """
+    centred = signal - signal.mean()
+    crossings = np.flatnonzero(np.diff(np.signbit(centred))) + 1
+    if len(crossings) < 2:
+        raise ValueError("the record holds no whole half-cycle: exceedance needs a longer one")
+    size = np.abs(centred[: crossings[-1]])
+    amplitudes = np.maximum.reduceat(size, crossings[:-1])
+    share: FloatArray = np.mean(amplitudes[:, None] > np.asarray(levels), axis=0)
+    return share
+
+
+def rayleigh_exceedance(standard_deviation: float, levels: FloatArray) -> FloatArray:
+    """Share exp(-x^2 / 2 s^2) of the amplitudes of a narrow-banded Gaussian motion above x.
+
+    Longuet-Higgins (1952), "On the statistical distribution of the heights of sea waves".
+
+    Parameters
+    ----------
+    standard_deviation : float
+    levels : ndarray, shape (k,)
+    """
+    share: FloatArray = np.exp(-np.square(levels) / (2 * standard_deviation**2))
+    return share

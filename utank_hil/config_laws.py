@@ -1,0 +1,169 @@
+"""The laws that a controller configuration can name, and the controllers they become."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field
+
+from utank_hil.config_files import Section
+from utank_hil.control import Controller, LinearLaw, PassiveController, PredictiveDesign, PumpLimits
+from utank_hil.control.constrained_design import ConstrainedDesign
+from utank_hil.control.direct_fuzzy import RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.feedback_linearization import FeedbackLinearization
+from utank_hil.control.indirect_fuzzy import IndirectFuzzy
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.pd import PD_MEASURED, design_pd
+from utank_hil.control.stimulate import Stimulation
+from utank_hil.dynamics.linear import STATES
+
+if TYPE_CHECKING:
+    from utank_hil.config import Vessel
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltLaw:
+    """A law ready for the bus.
+
+    Attributes
+    ----------
+    controller : Controller
+        New, at rest.
+    measured : tuple of str
+        What it measures, in order; names of `STATES`.
+    linear : LinearLaw or None
+        The law for the analysis of its loop, where it is linear and has a loop.
+    """
+
+    controller: Controller
+    measured: tuple[str, ...]
+    linear: LinearLaw | None = None
+
+
+class PassiveLaw(Section):
+    """No pump pressure: the tank on its own."""
+
+    kind: Literal["passive"]
+
+
+class PDLaw(Section):
+    """PD on the level, the virtual optimal passive tank."""
+
+    kind: Literal["pd"]
+
+
+class LQGLaw(Section):
+    """Linear-quadratic regulator with a Kalman filter that knows the sea."""
+
+    kind: Literal["lqg"]
+    design: LQGDesign
+
+
+class FeedbackLinearizationLaw(Section):
+    """Feedback linearization; keys as the parameters of `FeedbackLinearization`."""
+
+    kind: Literal["feedback_linearization"]
+    frequency_rad_s: float
+    damping_ratio: float
+    soft_level_m: float
+    hard_level_m: float
+    shift_rad_m: float = 0.0
+    shift_length_m: float = 1.0
+    level_damping_ratio: float = 0.0
+
+
+class SmallGainFuzzyLaw(Section):
+    """Direct adaptive fuzzy law (4.20)-(4.22)."""
+
+    kind: Literal["fuzzy_small_gain"]
+    design: SmallGainFuzzy
+
+
+class RobustFuzzyLaw(Section):
+    """Direct adaptive fuzzy law (4.23), (4.24)."""
+
+    kind: Literal["fuzzy_robust"]
+    design: RobustFuzzy
+
+
+class IndirectFuzzyLaw(Section):
+    """Indirect adaptive fuzzy law (4.25)."""
+
+    kind: Literal["fuzzy_indirect"]
+    design: IndirectFuzzy
+
+
+class StimulationLaw(Section):
+    """Rolls the ship on still water; keys as the parameters of `Stimulation`."""
+
+    kind: Literal["stimulate"]
+    amplitude_rad: float
+    period_s: float
+    ramp_s: float
+    roll_limit_rad: float
+    correction_s: float = 120.0
+
+
+Law = Annotated[
+    PassiveLaw
+    | PDLaw
+    | LQGLaw
+    | PredictiveDesign
+    | ConstrainedDesign
+    | FeedbackLinearizationLaw
+    | SmallGainFuzzyLaw
+    | RobustFuzzyLaw
+    | IndirectFuzzyLaw
+    | StimulationLaw,
+    Field(discriminator="kind"),
+]
+
+
+def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) -> BuiltLaw:
+    """Design a configured law for a vessel.
+
+    Parameters
+    ----------
+    law : one of `Law`
+    vessel : Vessel
+    delay_s : float
+        From the sampling of a measurement to the drive's answer.
+    limits : PumpLimits
+        For the laws that plan within them.
+
+    Raises
+    ------
+    ValueError
+        If a parameter does not fit the vessel.
+    """
+    ship, tank, lag_s = vessel.ship, vessel.tank, vessel.pump.lag_s
+    match law:
+        case PassiveLaw():
+            return BuiltLaw(PassiveController(), ("roll_rad",))
+        case PDLaw():
+            pd = design_pd(ship, tank)
+            return BuiltLaw(pd.controller(), PD_MEASURED, pd)
+        case LQGLaw():
+            lqg = law.design.law(ship, tank, delay_s, lag_s)
+            return BuiltLaw(lqg.controller(), law.design.predictor.measured, lqg)
+        case PredictiveDesign():
+            predictive = law.law(ship, tank, delay_s, lag_s)
+            return BuiltLaw(predictive.controller(), law.predictor.measured, predictive)
+        case ConstrainedDesign():
+            constrained = law.law(ship, tank, delay_s, lag_s, limits)
+            return BuiltLaw(constrained.controller(), law.measured, constrained)
+        case FeedbackLinearizationLaw():
+            parameters = law.model_dump(exclude={"kind"})
+            linearization = FeedbackLinearization(ship=ship, tank=tank, **parameters)
+            return BuiltLaw(linearization.controller(), STATES)
+        case StimulationLaw():
+            parameters = law.model_dump(exclude={"kind"})
+            plan = Stimulation(
+                ship=ship,
+                tank=tank,
+                pressure_pa=limits.pressure_pa,
+                level_limit_m=limits.level_m,
+                **parameters,
+            )
+            return BuiltLaw(plan.controller(), STATES)
+        case _:
+            return BuiltLaw(law.design.controller(), STATES)

@@ -1,0 +1,56 @@
+"""How pictures look: one style and one set of colours for all of them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.typing import RcKeyType
+
+# Dark grey for the reference, then Okabe and Ito's colours, told apart by colour-blind eyes
+COLORS: Final = ("#555555", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
+HIGHLIGHT: Final = "#F0E442"
+STYLE: "Final[dict[RcKeyType, Any]]" = {
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#888888",
+    "axes.grid": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+}
+
+
+@contextmanager
+def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[Figure]":
+    """Give an empty figure to draw in; its title is set and it is written when the block ends.
+
+    Parameters
+    ----------
+    path : Path
+        The `.png` file; written anew.
+    title : str
+        Stands above the picture.
+    size_in : tuple of float
+        Width and height in inches.
+
+    Yields
+    ------
+    matplotlib.figure.Figure
+        Laid out by constraints.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(rc=STYLE):
+        figure = Figure(figsize=size_in, layout="constrained")
+        FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
+        yield figure
+        figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
+        figure.savefig(path, dpi=130)
