@@ -1,0 +1,149 @@
+"""The cost of a plan over a receding horizon, and the motions that it leads to.
+
+The plan holds the command of one pump at a few future samples, its knots; between them the command
+runs straight, after the last one it is zero. For x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k)
+all predictions are linear in the state x(k) and the plan z, and the cost is a sum of squares::
+
+    y(k+q) = outputs_state[q] x + outputs_plan[q] z
+    sum_{q >= first_output} |y_T - y(k+q)|^2_W + Q sum_q u(k+q)^2 + |L x(k+N)|^2
+        = |M z + E x - E_T y_T|^2
+
+With a knot at each of the first hc samples, L = 0 and N = hp this is the cost of generalized
+predictive control, thesis (3.8).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.sampling import LinearModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Horizon:
+    """Cost and predictions over N samples; n states, m outputs, j knots.
+
+    Attributes
+    ----------
+    knots : ndarray of int, shape (j,)
+        Samples of the horizon at which the plan holds the command.
+    interpolation : ndarray, shape (N, j)
+        From the plan to the command at each sample.
+    outputs_state : ndarray, shape (N, m, n)
+    outputs_plan : ndarray, shape (N, m, j)
+    outputs_held : ndarray, shape (N, m)
+        Effect on the outputs of one unit of command held all the time.
+    hessian : ndarray, shape (j, j)
+        M'M.
+    unlimited_state : ndarray, shape (j, n)
+        The best plan is unlimited_state x + unlimited_target y_T as long as no limit is in its way.
+    unlimited_target : ndarray, shape (j, m)
+    """
+
+    knots: npt.NDArray[np.int64]
+    interpolation: FloatArray
+    outputs_state: FloatArray
+    outputs_plan: FloatArray
+    outputs_held: FloatArray
+    hessian: FloatArray
+    unlimited_state: FloatArray
+    unlimited_target: FloatArray
+
+
+def condense(
+    model: LinearModel,
+    knots: tuple[int, ...],
+    samples: int,
+    output_weight: FloatArray,
+    input_weight: float,
+    *,
+    first_output: int = 0,
+    terminal: FloatArray | None = None,
+) -> Horizon:
+    """Cost and predictions of a plan.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Discrete, one input, outputs y.
+    knots : tuple of int
+        Increasing, from 0; the last one below `samples`.
+    samples : int
+        N.
+    output_weight : ndarray, shape (m,)
+        Diagonal of W, zero or more.
+    input_weight : float
+        Q, positive.
+    first_output : int
+        Outputs before y(k + first_output) are not weighed.
+    terminal : ndarray, shape (t, n), optional
+        L.
+
+    Raises
+    ------
+    ValueError
+        If the knots or a weight are out of their range.
+    """
+    if not knots or knots[0] != 0 or np.any(np.diff(knots) < 1) or knots[-1] >= samples:
+        raise ValueError(
+            f"knots must increase from 0 and stay below the horizon of {samples} samples, "
+            f"got {knots}"
+        )
+    if not (np.min(output_weight) >= 0 and input_weight > 0):
+        raise ValueError("output weights must not be negative, the input weight must be positive")
+    if model.B.shape[1] != 1:
+        raise ValueError(f"a plan is that of one pump, the model has {model.B.shape[1]} inputs")
+    states, outputs = len(model.A), len(model.C)
+    interpolation = _interpolation(knots, samples)
+    by_state = np.empty((samples, outputs, states))
+    pulse = np.empty((samples, outputs))
+    power = np.eye(states)
+    reach = np.empty((states, samples))  # of u(k+q) on x(k+N)
+    arrived = model.B[:, 0]
+    for q in range(samples):
+        by_state[q] = model.C @ power
+        pulse[q] = model.D[:, 0] if q == 0 else by_state[q - 1] @ model.B[:, 0]
+        power = model.A @ power
+        reach[:, samples - 1 - q] = arrived
+        arrived = model.A @ arrived
+    by_input = np.zeros((samples, outputs, samples))
+    for j in range(samples):
+        by_input[j:, :, j] = pulse[: samples - j]
+    by_plan = by_input @ interpolation
+
+    root = np.tile(np.sqrt(output_weight), samples)
+    root[: first_output * outputs] = 0.0
+    rest = np.zeros((0, states)) if terminal is None else terminal
+    plan_rows = np.vstack(
+        [
+            root[:, None] * by_plan.reshape(-1, len(knots)),
+            np.sqrt(input_weight) * interpolation,
+            rest @ reach @ interpolation,
+        ]
+    )
+    state_rows = np.vstack(
+        [root[:, None] * by_state.reshape(-1, states), np.zeros((samples, states)), rest @ power]
+    )
+    target_rows = np.zeros((len(plan_rows), outputs))
+    target_rows[: len(root)] = root[:, None] * np.tile(np.eye(outputs), (samples, 1))
+    # solved as the least-squares problem that it is: squaring it loses half the digits
+    orthogonal, triangle = np.linalg.qr(plan_rows)
+    return Horizon(
+        knots=np.array(knots),
+        interpolation=interpolation,
+        outputs_state=by_state,
+        outputs_plan=by_plan,
+        outputs_held=pulse.cumsum(axis=0),
+        hessian=plan_rows.T @ plan_rows,
+        unlimited_state=-np.linalg.solve(triangle, orthogonal.T @ state_rows),
+        unlimited_target=np.linalg.solve(triangle, orthogonal.T @ target_rows),
+    )
+
+
+def _interpolation(knots: tuple[int, ...], samples: int) -> FloatArray:
+    """Hat functions over the knots; zero after the last one."""
+    at = np.arange(samples)
+    hats = np.array([np.interp(at, knots, row, right=0.0) for row in np.eye(len(knots))])
+    return hats.T

@@ -1,0 +1,71 @@
+"""Small dense quadratic programmes, solved again and again with new gradients and bounds.
+
+::
+
+    minimize 1/2 x'H x + f'x    subject to    lower <= (x, G x) <= upper
+
+A dual active-set method (DAQP): exact to rounding, a handful of iterations when it starts from the
+active set of the last solution, and nothing allocated on the way.
+
+References
+----------
+D. Arnström, A. Bemporad, D. Axehill, A dual active-set solver for embedded quadratic programming
+using recursive LDL' updates, IEEE Transactions on Automatic Control 67 (2022) 4362-4369.
+"""
+
+import daqp
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+_OPTIMAL = 1
+
+
+class ActiveSetSolver:
+    """Solves one family of programmes, warm-started.
+
+    Parameters
+    ----------
+    hessian : ndarray, shape (n, n)
+        H, positive definite.
+    rows : ndarray, shape (m, n)
+        G.
+    iteration_limit : int
+        Budget of a solution.
+
+    Attributes
+    ----------
+    iterations : int
+        Taken by the last solution.
+    """
+
+    def __init__(self, hessian: FloatArray, rows: FloatArray, iteration_limit: int) -> None:
+        bounds = len(hessian) + len(rows)
+        self._model = daqp.Model()
+        self._cold = np.zeros(bounds, dtype=np.int32)
+        self._warm = True
+        self.iterations = 0
+        flag, _ = self._model.setup(
+            hessian, np.zeros(len(hessian)), rows, np.ones(bounds), -np.ones(bounds), self._cold
+        )
+        if flag < 0:
+            raise ValueError(f"the quadratic programme cannot be set up (DAQP flag {flag})")
+        self._model.settings = {"iter_limit": iteration_limit}
+
+    def solve(
+        self, gradient: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> FloatArray | None:
+        """The minimizer, or None if it was not found within the iteration limit.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (n,)
+        lower, upper : ndarray, shape (n + m,)
+            Of the variables, then of the rows.
+        """
+        sense = None if self._warm else self._cold
+        self._model.update(f=gradient, bupper=upper, blower=lower, sense=sense)
+        x, _, flag, info = self._model.solve()
+        self.iterations = int(info["iterations"])
+        self._warm = flag == _OPTIMAL
+        return np.array(x) if self._warm else None

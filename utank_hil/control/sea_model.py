@@ -1,0 +1,130 @@
+"""A sea in the predictor: the wave moment that the Kalman filter expects, from a spectrum.
+
+A Gaussian sea is white noise through the minimum-phase filter whose response has the spectrum's
+shape, and the best forecast of it is that of this filter. Its impulse response h follows from the
+logarithm of the spectrum (Kolmogorov's factorization, by fast Fourier transforms)::
+
+    |H(exp(j w Ts))|^2 = pi S(w) / Ts,    S one-sided over angular frequency
+
+and is brought down to a few states by balanced truncation, which keeps it stable. One lightly
+damped oscillator, or a row of them, has skirts of finite slope instead of the steep front of
+swell, and so puts wave energy where the ship is in resonance and the sea has none.
+
+References
+----------
+A. Papoulis, Signal Analysis, 1977, section 7-3 (factorization by the logarithm).
+S. Kung, A new identification and model reduction algorithm via singular value decomposition,
+Asilomar 1978.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.sea import Spectrum
+
+_POINTS = 8192  # frequencies of the factorization: 0.004 rad/s apart at 0.2 s
+_MEMORY = 800  # samples of the impulse response that count
+
+
+@dataclass(frozen=True, slots=True)
+class SeaModel:
+    """The sea that a predictor is made for, on the beam of a ship without speed.
+
+    Parameters
+    ----------
+    frequency_hz : tuple of float
+        Centres of the spectrum's bands (`utank_hil.sea.Spectrum`).
+    density_m2_hz : tuple of float
+        Density of the surface elevation in each band.
+    effective_slope : float
+        Ratio of effective to true wave slope.
+    order : int
+        States of the model.
+    floor : float
+        Added to the slope's density, as a share of its maximum: the less of it, the further the
+        forecast reaches, and the more it is lost where spectrum or ship are not as expected.
+    smoothing_rad_s : float
+        Standard deviation of the Gaussian that the slope's density is smoothed with.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    frequency_hz: tuple[float, ...]
+    density_m2_hz: tuple[float, ...]
+    effective_slope: float = 0.5
+    order: int = 8
+    floor: float = 1.3e-3
+    smoothing_rad_s: float = 0.007
+
+    def __post_init__(self) -> None:
+        if not self.spectrum.moment(0) > 0:
+            raise ValueError("sea density_m2_hz must hold some energy")
+        for name in ("effective_slope", "order", "floor", "smoothing_rad_s"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"sea {name} must be positive, got {getattr(self, name)}")
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """Spectrum of the surface elevation."""
+        return Spectrum(np.array(self.frequency_hz), np.array(self.density_m2_hz))
+
+    def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
+        """One-sided density of the effective wave slope, rad^2 per rad/s."""
+        spectrum = self.spectrum
+        edges = 2 * np.pi * spectrum.band_edges_hz
+        band = np.searchsorted(edges[:, 0], omega_rad_s, side="right") - 1
+        inside = (band >= 0) & (omega_rad_s < edges[np.maximum(band, 0), 1])
+        height = np.where(inside, spectrum.density[np.maximum(band, 0)], 0.0) / (2 * np.pi)
+        slope: FloatArray = height * (self.effective_slope * omega_rad_s**2 / GRAVITY_M_S2) ** 2
+        return slope
+
+    def shaping_filter(self, sample_time_s: float) -> LinearModel:
+        """Discrete filter from white noise of unit variance e(k) to the effective slope s(k).
+
+        x(k) = A x(k-1) + B e(k), s(k) = C x(k): the newest noise is part of the state.
+        """
+        return _balanced(self._impulse_response(sample_time_s), self.order, sample_time_s)
+
+    def _impulse_response(self, sample_time_s: float) -> FloatArray:
+        """Minimum-phase impulse response, shape (_POINTS,)."""
+        from scipy.ndimage import gaussian_filter1d
+
+        omega = 2 * np.pi * np.abs(np.fft.fftfreq(_POINTS, sample_time_s))
+        density = gaussian_filter1d(
+            self.slope_density(omega), self.smoothing_rad_s / omega[1], mode="wrap"
+        )
+        density = density + self.floor * density.max()
+        cepstrum = np.fft.ifft(np.log(np.pi * density / sample_time_s)).real
+        causal = np.zeros(_POINTS)
+        causal[0] = cepstrum[0] / 2
+        causal[1 : _POINTS // 2] = cepstrum[1 : _POINTS // 2]
+        causal[_POINTS // 2] = cepstrum[_POINTS // 2] / 2
+        return np.asarray(np.fft.ifft(np.exp(np.fft.fft(causal))).real)
+
+
+def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearModel:
+    """Balanced truncation of a finite impulse response h[0], h[1], ... = C B, C A B, ..."""
+    from scipy.linalg import hankel
+    from scipy.sparse.linalg import eigsh
+
+    kept = impulse[:_MEMORY]
+    if order >= _MEMORY:
+        raise ValueError(f"sea order must be below {_MEMORY}, got {order}")
+    values, vectors = eigsh(hankel(kept), k=order, which="LM", v0=np.ones(_MEMORY))
+    root = np.sqrt(np.abs(values))
+    observability = vectors * root
+    shifted = np.vstack([observability[1:], np.zeros((1, order))])
+    return LinearModel(
+        (vectors / root).T @ shifted,
+        (observability[:1] * np.sign(values)).T,
+        observability[:1],
+        np.zeros((1, 1)),
+        sample_time_s,
+    )
