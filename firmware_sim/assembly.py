@@ -9,6 +9,8 @@ from firmware_sim.sensors import SensorNode
 from utank_hil.canbus import load_catalogue
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
+SECOND_NS = 1_000_000_000
+
 # enabled at zero pressure the pump leaves the tank alone; switched off, its rotor turns with the
 # water and changes the tank
 PASSIVE_SCRIPT = (TimedAction(1.0, Action.PASSIVE),)
@@ -50,6 +52,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = Plant(vessel.ship, vessel.tank, vessel.pump, scenario.wave_moment(seed))
+    plant.change_ship(scenario.sailing_ship, round(scenario.actual_from_s * SECOND_NS))
     version = vessel.version
     return ShipSide(
         plant,

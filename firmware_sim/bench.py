@@ -3,8 +3,9 @@
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.sharedctypes import Synchronized
 from typing import Any, Final
@@ -23,7 +24,8 @@ from firmware_sim.run import (
 from firmware_sim.scenario import PASSIVE, Scenario
 from utank_hil.analysis.bare_ship import roll_without_tank
 from utank_hil.arrays import FloatArray
-from utank_hil.config import PassiveLaw
+from utank_hil.config_laws import PassiveLaw
+from utank_hil.runtime import stop_on_signals
 
 POLL_S: Final = 0.1
 
@@ -102,7 +104,18 @@ _watches: list[_Watch] = []
 def _prepare(done_s: "list[Synchronized[float]]", stop: "Synchronized[bool]") -> None:
     # Ctrl-C reaches the whole process group; the parent alone decides what it means
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     _watches[:] = [_Watch(done, stop) for done in done_s]
+
+
+@contextmanager
+def _interrupts_waiting() -> Iterator[None]:
+    """Let processes start with Ctrl-C held back: it must not end them while they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
@@ -138,6 +151,12 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     Returns
     -------
     BenchResult
+        Without the runs that were ended before their first sample.
+
+    Raises
+    ------
+    OSError
+        If the interface can't be used, or everything was ended before the first sample.
     """
     seed = scenario.seed if options.seed is None else options.seed
     duration_s = scenario.duration_s if options.duration_s is None else options.duration_s
@@ -147,19 +166,26 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     done_s = [context.Value("d", 0.0, lock=False) for _ in jobs]
     stop = context.Value("b", False, lock=False)
     workers = 2 if options.channel is not None or not options.real_time else 1
-    with ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_prepare, initargs=(done_s, stop)
-    ) as pool:
-        runs = list(_run_all(pool, jobs, options, done_s, stop, progress))
+    with (
+        stop_on_signals() as stopped,
+        ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_prepare, initargs=(done_s, stop)
+        ) as pool,
+    ):
+        runs = list(_run_all(pool, jobs, options, done_s, stop, stopped, progress))
+    if len(runs[0].rows) == 0:
+        raise InterruptedError("ended before the first sample")
+    runs = [run for run in runs if len(run.rows)]
     moment = scenario.wave_moment(seed)
     count = max(len(run.rows) for run in runs)
+    shortest = min(len(run.rows) for run in runs)
     return BenchResult(
         scenario,
         _mode(options),
         seed,
         count * RECORD_S,
-        min(scenario.settle_s, count * RECORD_S / 2),
-        roll_without_tank(scenario.vessel.ship, moment, RECORD_S, count),
+        min(scenario.settle_s, shortest * RECORD_S / 2),
+        roll_without_tank(scenario.sailing_ship, moment, RECORD_S, count),
         tuple(runs),
         time.monotonic() - started,
     )
@@ -171,31 +197,32 @@ def _run_all(
     options: BenchOptions,
     done_s: "list[Synchronized[float]]",
     stop: "Synchronized[bool]",
+    stopped: Callable[[], bool],
     progress: Progress,
 ) -> Iterable[Run]:
+    def start(function: Callable[..., Any], index: int, *arguments: object) -> Future[Any]:
+        with _interrupts_waiting():
+            return pool.submit(_call, function, index, *arguments)
+
     def wait(futures: list[Future[Any]]) -> list[Any]:
         while not all(future.done() for future in futures):
-            try:
-                time.sleep(POLL_S)
-                for job, done in zip(jobs, done_s, strict=True):
-                    progress(job.name, done.value)
-            except KeyboardInterrupt:
-                stop.value = True
+            time.sleep(POLL_S)
+            stop.value = stopped()
+            for job, done in zip(jobs, done_s, strict=True):
+                progress(job.name, done.value)
         return [future.result() for future in futures]
 
     if not options.real_time:
-        yield from wait(
-            [pool.submit(_call, run_lockstep, index, job) for index, job in enumerate(jobs)]
-        )
+        yield from wait([start(run_lockstep, index, job) for index, job in enumerate(jobs)])
         return
     for index, job in enumerate(jobs):
         if options.channel is None:
-            yield from wait([pool.submit(_call, run_in_one_process, index, job)])
+            yield from wait([start(run_in_one_process, index, job)])
         else:
             ship, controller = wait(
                 [
-                    pool.submit(_call, run_ship, index, job, options.channel),
-                    pool.submit(_call, run_controller, index, job, options.channel),
+                    start(run_ship, index, job, options.channel),
+                    start(run_controller, index, job, options.channel),
                 ]
             )
             yield join(job.name, ship, controller)

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
 from firmware_sim.assembly import build_ship_side
 from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
 from firmware_sim.scenario import Scenario

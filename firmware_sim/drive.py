@@ -128,7 +128,8 @@ class PumpDrive:
 
     def _permitted(self, command: PumpCommand, now_ns: int) -> bool:
         limits, pressure_pa = self._limits, command.pressure_pa
-        if not abs(pressure_pa) <= limits.pressure_pa + ROUNDING_PA:  # not available is NaN and fails too
+        # written so that NaN, not available, fails too
+        if not abs(pressure_pa) <= limits.pressure_pa + ROUNDING_PA:
             return False
         if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
             return False

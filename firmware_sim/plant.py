@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from firmware_sim import plant_kernel as kernel
+from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
@@ -12,6 +13,16 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 TICK_NS = 10_000_000
+
+
+def _model(ship: RollShip, tank: Tank) -> FloatArray:
+    """State and input matrices side by side, and the reservoir area, as the kernel takes them."""
+    system = coupled_model(ship, tank)
+    model = np.zeros((4, 7))
+    model[:, :4] = system.A
+    model[:, 4:6] = system.B
+    model[0, 6] = tank.reservoir_area_m2
+    return model
 
 
 class Plant:
@@ -30,11 +41,9 @@ class Plant:
     """
 
     def __init__(self, ship: RollShip, tank: Tank, pump: Pump, wave_moment: Harmonics) -> None:
-        system = coupled_model(ship, tank)
-        self._model = np.zeros((4, 7))
-        self._model[:, :4] = system.A
-        self._model[:, 4:6] = system.B
-        self._model[0, 6] = tank.reservoir_area_m2
+        self._tank = tank
+        self._model = self._later_model = _model(ship, tank)
+        self._change_ns: int | None = None
         self._area_m2 = tank.reservoir_area_m2
         self._pump = pump
         self._coefficients = pump.coefficients
@@ -52,13 +61,25 @@ class Plant:
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
 
+    def change_ship(self, ship: RollShip, after_ns: int) -> None:
+        """Load the ship differently, some time after the start; the waves' moment stays.
+
+        Call it before the first `advance`.
+        """
+        self._later_model = _model(ship, self._tank)
+        self._change_ns = after_ns
+
     def advance(self, now_ns: int) -> None:
         """Integrate up to `now_ns`, in whole ticks of 10 ms after the first call."""
         if self._now_ns is None:
             self._now_ns = now_ns
+            if self._change_ns is not None:
+                self._change_ns += now_ns
         if now_ns - self._now_ns < TICK_NS:
             return
         while now_ns - self._now_ns >= TICK_NS:
+            if self._change_ns is not None and self._now_ns >= self._change_ns:
+                self._model, self._change_ns = self._later_model, None
             kernel.advance_tick(
                 self._state,
                 self._model,

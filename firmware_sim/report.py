@@ -9,6 +9,7 @@ from typing import Any, Final
 from rich.table import Table as RichTable
 
 from firmware_sim.bench import BenchResult
+from firmware_sim.retuning_figures import retuning_figures
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from utank_hil.analysis.metrics import (
     PumpStatistics,
@@ -16,10 +17,13 @@ from utank_hil.analysis.metrics import (
     pump_statistics,
     roll_statistics,
 )
+from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.telemetry import BenchCurve, draw_bench, write_recording
 
 NO_TANK: Final = "no tank"
+LEAST_ROLL_RAD: Final = 1e-6
+"""Less roll than this is none: a share of it says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +34,9 @@ class RunFigures:
     ----------
     name : str
     roll : RollStatistics
-    roll_below_no_tank, roll_below_passive : float
-        Share by which the roll RMS is less than without a tank, and than with the passive tank.
+    roll_below_no_tank, roll_below_passive : float or None
+        Share by which the roll RMS is less than without a tank, and than with the passive tank;
+        None where there is no roll to be below, on still water.
     pump : PumpStatistics
     bus_load : float
     refused_commands : int
@@ -43,8 +48,8 @@ class RunFigures:
 
     name: str
     roll: RollStatistics
-    roll_below_no_tank: float
-    roll_below_passive: float
+    roll_below_no_tank: float | None
+    roll_below_passive: float | None
     pump: PumpStatistics
     bus_load: float
     refused_commands: int
@@ -55,20 +60,27 @@ class RunFigures:
 
 def figures(result: BenchResult) -> tuple[RollStatistics, tuple[RunFigures, ...]]:
     """Figures of the bare ship, and of each run."""
-    skip = round(result.settle_s / RECORD_S)
-    bare = roll_statistics(result.without_tank_rad[skip:])
-    passive = roll_statistics(result.runs[0].column("true_roll_rad")[skip:])
-    return bare, tuple(_figures(run, skip, bare, passive) for run in result.runs)
+    skip = int(result.settle_s / RECORD_S)
+    bare_rad, passive = result.without_tank_rad, result.runs[0]
+    return roll_statistics(bare_rad[skip:]), tuple(
+        _figures(run, skip, bare_rad, passive) for run in result.runs
+    )
 
 
-def _figures(run: Run, skip: int, bare: RollStatistics, passive: RollStatistics) -> RunFigures:
+def _figures(run: Run, skip: int, bare_rad: FloatArray, passive: Run) -> RunFigures:
+    # a run that was ended early is compared over the time it had
+    count = min(len(run.rows), len(passive.rows))
+    compared_rad, without_tank_rad, passive_rad = (
+        roll_statistics(roll_rad[skip:count]).rms_rad
+        for roll_rad in (run.column("true_roll_rad"), bare_rad, passive.column("true_roll_rad"))
+    )
     roll = roll_statistics(run.column("true_roll_rad")[skip:])
     mode = run.column("mode")
     return RunFigures(
         name=run.name,
         roll=roll,
-        roll_below_no_tank=1.0 - roll.rms_rad / bare.rms_rad,
-        roll_below_passive=1.0 - roll.rms_rad / passive.rms_rad,
+        roll_below_no_tank=_share_below(compared_rad, without_tank_rad),
+        roll_below_passive=_share_below(compared_rad, passive_rad),
         pump=pump_statistics(
             run.column("true_pressure_pa")[skip:],
             run.column("true_shaft_power_w")[skip:],
@@ -80,6 +92,10 @@ def _figures(run: Run, skip: int, bare: RollStatistics, passive: RollStatistics)
         fault=Fault(int(run.column("fault")[-1])).name,
         active_share=float((mode[skip:] == Mode.ACTIVE).mean()),
     )
+
+
+def _share_below(value: float, reference: float) -> float | None:
+    return None if reference < LEAST_ROLL_RAD else 1.0 - value / reference
 
 
 def motion_table(result: BenchResult) -> RichTable:
@@ -99,8 +115,8 @@ def motion_table(result: BenchResult) -> RichTable:
         table.add_row(
             run.name,
             *_roll_cells(run.roll),
-            f"{run.roll_below_no_tank:.1%}",
-            "" if first else f"{run.roll_below_passive:.1%}",
+            _percent(run.roll_below_no_tank),
+            "" if first else _percent(run.roll_below_passive),
         )
     return table
 
@@ -130,6 +146,10 @@ def pump_table(result: BenchResult) -> RichTable:
             run.mode,
         )
     return table
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{share:.1%}"
 
 
 def _table(title: str, *headings: str) -> RichTable:
@@ -163,6 +183,7 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
             {
                 **asdict(run),
                 "loop": None if done.loop is None else done.loop.statistics.summary(),
+                "retuning": retuning_figures(done, result.settle_s),
             }
             for run, done in zip(runs, result.runs, strict=True)
         ],

@@ -1,5 +1,7 @@
 """One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -8,6 +10,7 @@ import numpy as np
 from firmware_sim.assembly import ShipSide, build_ship_side
 from firmware_sim.scenario import Scenario
 from firmware_sim.truth import TRUTH, TruthRecorder
+from utank_hil.analysis.retune import retuner_work
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import SocketCanPort
 from utank_hil.config import ControllerConfig
@@ -23,6 +26,12 @@ from utank_hil.runtime import (
 from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.controller_node import TICK_NS, ControllerNode
 from utank_hil.runtime.panel import TimedAction
+from utank_hil.runtime.retuning import (
+    Retuner,
+    RetunerProcess,
+    RetuningEvent,
+    SimulatedRetuner,
+)
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.table import Table
 
@@ -31,7 +40,7 @@ RECORD_TICKS: Final = 5
 """Of the controller's ticks, every fifth is kept: 20 Hz, ample for a ship."""
 RECORD_NS: Final = RECORD_TICKS * TICK_NS
 RECORD_S: Final = RECORD_NS / SECOND_NS
-COLUMNS: Final = (*SIGNALS, *TRUTH)
+COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 
 
 class Watch(Protocol):
@@ -94,6 +103,8 @@ class Run:
         Work of the pump's shaft.
     loop : LoopResult or None
         Of the loop with the controller; None in simulated time.
+    retuning : tuple of RetuningEvent
+        What the controller did to retune itself.
     """
 
     name: str
@@ -102,6 +113,7 @@ class Run:
     refused_commands: int
     energy_j: float
     loop: LoopResult | None = None
+    retuning: tuple[RetuningEvent, ...] = ()
 
     def column(self, name: str) -> FloatArray:
         """One column of `rows`, shape (n,)."""
@@ -125,12 +137,15 @@ class ControllerRun:
     rows: FloatArray
     start_ns: int
     loop: LoopResult
+    retuning: tuple[RetuningEvent, ...]
 
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
     """Run in simulated time; the same job gives the same rows, bit for bit."""
     ship, truth, truth_table = _ship(job)
-    controller, table = _controller(job)
+    work = retuner_work(job.controller)
+    retuner = work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
+    controller, table = _controller(job, retuner)
     lockstep = Lockstep(
         [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
     )
@@ -143,6 +158,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         lockstep.bus.statistics(lockstep.now_ns).load,
         ship.drive.refused,
         ship.plant.pump_energy_j,
+        retuning=controller.retuning_events,
     )
 
 
@@ -150,8 +166,9 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
     """Run in real time with all nodes in one loop and no bus but the loop itself."""
     ship, truth, truth_table = _ship(job)
     statistics = LoopStatistics()
-    controller, table = _controller(job, statistics)
-    loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
+    with _retuner(job.controller) as retuner:
+        controller, table = _controller(job, retuner, statistics)
+        loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
     rows = _side_by_side(table.rows, truth_table.rows)
     return Run(
         job.name,
@@ -160,6 +177,7 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
         ship.drive.refused,
         ship.plant.pump_energy_j,
         loop,
+        controller.retuning_events,
     )
 
 
@@ -173,17 +191,16 @@ def run_ship(job: Job, channel: str, watch: Watch) -> ShipRun:
 def run_controller(job: Job, channel: str, watch: Watch) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
-    controller, table = _controller(job, statistics)
-    loop = _run_loop(job, [controller], channel, statistics, watch)
-    return ControllerRun(table.rows, controller.start_ns, loop)
+    with _retuner(job.controller) as retuner:
+        controller, table = _controller(job, retuner, statistics)
+        loop = _run_loop(job, [controller], channel, statistics, watch)
+    return ControllerRun(table.rows, controller.start_ns, loop, controller.retuning_events)
 
 
 def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
     """Put the halves of a run on a real bus side by side, on the controller's time."""
-    shift = round((controller.start_ns - ship.start_ns) / RECORD_NS)
-    truth = ship.rows[max(shift, 0) :]
-    told = controller.rows[max(-shift, 0) :]
-    rows = _side_by_side(told, truth)
+    shift_s = (controller.start_ns - ship.start_ns) / SECOND_NS
+    rows = _side_by_side(controller.rows, ship.rows, shift_s)
     return Run(
         name,
         rows,
@@ -191,6 +208,7 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         ship.refused_commands,
         ship.energy_j,
         controller.loop,
+        controller.retuning,
     )
 
 
@@ -200,10 +218,25 @@ def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, Table]:
     return ship, TruthRecorder(ship.plant, table, RECORD_NS), table
 
 
-def _controller(job: Job, statistics: LoopStatistics | None = None) -> tuple[ControllerNode, Table]:
+def _controller(
+    job: Job, retuner: Retuner | None, statistics: LoopStatistics | None = None
+) -> tuple[ControllerNode, Table]:
     table = Table(len(SIGNALS), job.ticks, RECORD_TICKS)
-    node = build_controller_node(job.controller, statistics=statistics, sink=table.write)
+    node = build_controller_node(
+        job.controller, retuner=retuner, statistics=statistics, sink=table.write
+    )
     return node, table
+
+
+@contextmanager
+def _retuner(controller: ControllerConfig) -> Iterator[Retuner | None]:
+    """The retuner's process, if the controller has one."""
+    work = retuner_work(controller)
+    if work is None:
+        yield None
+    else:
+        with RetunerProcess(*work) as retuner:
+            yield retuner
 
 
 def _run_loop(
@@ -229,6 +262,17 @@ def _run_loop(
     return LoopResult(statistics, scheduling)
 
 
-def _side_by_side(told: FloatArray, truth: FloatArray) -> FloatArray:
-    count = min(len(told), len(truth))
-    return np.hstack([told[:count], truth[:count]])
+def _side_by_side(told: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:
+    """Join rows of controller and ship, both of which begin with their time, by that time.
+
+    Not by their numbers: in real time a late tick leaves a row out, on one side or on both.
+    `shift_s` is the time from the ship's start to the controller's.
+    """
+    if len(truth) == 0:
+        return np.empty((0, len(COLUMNS)))
+    when_s = told[:, 0] + shift_s
+    half_s = RECORD_S / 2
+    told = told[(when_s > truth[0, 0] - half_s) & (when_s < truth[-1, 0] + half_s)]
+    middles_s = (truth[1:, 0] + truth[:-1, 0]) / 2
+    nearest = np.searchsorted(middles_s, told[:, 0] + shift_s)
+    return np.hstack([told, truth[nearest, 1:]])

@@ -1,6 +1,7 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
 import math
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,6 +12,7 @@ from firmware_sim.drive import DriveLimits
 from firmware_sim.sensors import SensorErrors
 from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.config_files import Section
+from utank_hil.dynamics.ship import RollShip
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap, load_ndbc
 
@@ -30,7 +32,10 @@ class MeasuredSea(Section):
 
     @model_validator(mode="after")
     def _hour_is_there(self) -> "MeasuredSea":
-        self.sea(0)
+        try:
+            self.sea(0)
+        except OSError as error:  # pydantic lists ValueErrors with their place, and nothing else
+            raise ValueError(f"file {self.file} can't be read: {error.strerror}") from error
         return self
 
     def sea(self, seed: int) -> Sea:
@@ -93,6 +98,12 @@ class Scenario(Section):
     settle_s: Annotated[float, Field(ge=0)]
     """Left out of the statistics at the start."""
     seed: Annotated[int, Field(ge=0)] = 1
+    actual_ship: dict[str, float] = Field(default_factory=dict)
+    """Keys of the ship that differ from the vessel's, which is what the controller believes."""
+    actual_from_s: Annotated[float, Field(ge=0)] = 0.0
+    """When the difference comes about: cargo moved, fuel burnt."""
+    retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
+    """Time that identification and design take in simulated time."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
@@ -100,7 +111,31 @@ class Scenario(Section):
             raise ValueError("settle_s must be less than duration_s, else nothing is left to judge")
         if PASSIVE in self.controllers:
             raise ValueError("controllers must not name one 'passive': that run is always made")
+        for name, controller in self.controllers.items():
+            self._check_drive_takes(name, controller)
+        try:
+            _ = self.sailing_ship
+        except TypeError as error:  # an unknown key; a wrong value is a ValueError already
+            raise ValueError(f"actual_ship: {error}") from error
         return self
+
+    @property
+    def sailing_ship(self) -> RollShip:
+        """The ship as she is from `actual_from_s` on."""
+        return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
+
+    def _check_drive_takes(self, name: str, controller: ControllerConfig) -> None:
+        """Raise if the drive would refuse what a controller may send."""
+        limits, drive = controller.limits, self.drive
+        for key, sent, taken in (
+            ("limits.pressure_pa", limits.pressure_pa, drive.pressure_pa),
+            ("limits.rate_pa_s", limits.rate_pa_s, drive.pressure_rate_pa_s),
+            ("command_timeout_ms", controller.command_timeout_ms, drive.longest_timeout_ms),
+        ):
+            if sent > taken:
+                raise ValueError(
+                    f"controllers.{name}.{key} is {sent:g}, but the drive takes {taken:g} at most"
+                )
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the sea on the ship."""

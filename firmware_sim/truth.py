@@ -10,6 +10,7 @@ from utank_hil.canbus import Frame
 from utank_hil.telemetry.table import Table
 
 TRUTH: Final = (
+    "time_s",
     "true_roll_rad",
     "true_level_m",
     "true_pressure_pa",
@@ -54,6 +55,7 @@ class TruthRecorder:
         plant = self._plant
         plant.advance(now_ns)
         self._row[:] = (
+            (now_ns - self.start_ns) * 1e-9,
             plant.roll_rad,
             plant.level_m,
             plant.pressure_pa,

@@ -78,7 +78,7 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise ConfigError([_located(item, origins) for item in error.errors()]) from None
+        raise ConfigError([_located(item, content, origins) for item in error.errors()]) from None
 
 
 def _read(
@@ -148,8 +148,24 @@ def _dotted(key: Key) -> str:
     return ".".join(str(part) for part in key)
 
 
-def _located(error: Any, origins: dict[Key, Path]) -> ConfigProblem:
-    file, key = _within(tuple(error["loc"]), origins)
+def _written(error: Any, content: Any) -> Key:
+    """The key as it stands in the file: pydantic names the chosen kind of a section as well."""
+    location = error["loc"]
+    key: Key = ()
+    for index, part in enumerate(location):
+        if isinstance(content, dict):
+            absent = error["type"] == "missing" and index == len(location) - 1
+            if part not in content and not absent:
+                continue
+            content = content.get(part)
+        elif isinstance(content, list):
+            content = content[part]
+        key = (*key, part)
+    return key
+
+
+def _located(error: Any, content: Any, origins: dict[Key, Path]) -> ConfigProblem:
+    file, key = _within(_written(error, content), origins)
     reason = str(error["msg"]).removeprefix("Value error, ")
     if error["type"] == "missing":
         reason = "is required but missing"

@@ -16,6 +16,7 @@ from utank_hil.canbus.enumerations import (
     NodeState,
     Quality,
     ResetCause,
+    RetuningState,
     Switch,
 )
 from utank_hil.canbus.exchange import Receiver, Rejection, Transmitter
@@ -60,6 +61,7 @@ __all__ = [
     "Receiver",
     "Rejection",
     "ResetCause",
+    "RetuningState",
     "SensorMotion",
     "SensorPump",
     "SensorTank",

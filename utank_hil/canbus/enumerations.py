@@ -57,6 +57,18 @@ class Fault(IntEnum):
     INTERNAL = 26
 
 
+class RetuningState(IntEnum):
+    """Where the controller is in identifying the ship and retuning itself."""
+
+    IDLE = 0
+    IDENTIFY = 1
+    DESIGN = 2
+    TRIAL = 3
+    RETUNED = 4
+    REFUSED = 5
+    UNDONE = 6
+
+
 class ControlWord(IntEnum):
     """CiA 402 control word (object 0x6040), low byte, as the standard's commands."""
 

@@ -20,6 +20,7 @@ from utank_hil.canbus.enumerations import (
     NodeState,
     Quality,
     ResetCause,
+    RetuningState,
     Switch,
 )
 
@@ -168,6 +169,8 @@ class ControllerStatus(NamedTuple):
         Share of the bus in use, 0 to 1.
     catalogue_version, configuration_version
         Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
+    retuning
+        Where it is in retuning itself; None if it can't.
     """
 
     mode: Mode | None
@@ -180,6 +183,7 @@ class ControllerStatus(NamedTuple):
     bus_load: float
     catalogue_version: int | None
     configuration_version: int | None
+    retuning: RetuningState | None = None
 
 
 class OperatorCommand(NamedTuple):
@@ -197,6 +201,12 @@ class OperatorCommand(NamedTuple):
         Rising edge: clear a latched fault.
     acknowledge
         Rising edge: accept the alarms.
+    retune
+        Rising edge: identify the ship and retune the controller.
+    undo
+        Rising edge: back to the law before the last retuning.
+    forbid_retuning
+        No retuning, by order or by itself; one under way is given up.
     """
 
     mode_request: Mode | None
@@ -204,6 +214,9 @@ class OperatorCommand(NamedTuple):
     stop: bool
     reset: bool
     acknowledge: bool
+    retune: bool = False
+    undo: bool = False
+    forbid_retuning: bool = False
 
 
 class Heartbeat(NamedTuple):

@@ -22,8 +22,9 @@ def panel(
 ) -> None:
     """Operate the controller from the keyboard: type an action and Enter.
 
-    Actions: standby, passive, arm, disarm, stop, reset, quit. Leaving the panel silences it; a
-    controller in charge then ramps down after five seconds.
+    Actions: standby, passive, arm, disarm, stop, reset, quit; for retuning: retune, undo, forbid,
+    permit. Leaving the panel silences it; a controller in charge then ramps down after five
+    seconds.
 
     [bold]Example:[/bold] utank-hil panel configs/ships/thesis_first.yaml --bus can0
     """
@@ -58,6 +59,8 @@ class _Keyboard:
         status = self._node.status
         if status is not None and status.mode is not None and status.fault is not None:
             said = f"controller: {status.mode.name}, fault {status.fault.name}"
+            if status.retuning is not None:
+                said += f", retuning {status.retuning.name}"
             if said != self._shown:
                 notes.print(said)
                 self._shown = said

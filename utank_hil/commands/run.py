@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from utank_hil.analysis.retune import retuner_work
 from utank_hil.canbus import SocketCanPort
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
 from utank_hil.commands.timing import timing_table
@@ -20,6 +21,7 @@ from utank_hil.runtime import (
     stop_on_signals,
 )
 from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.runtime.retuning import RetunerProcess
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderProcess, RingWriter, open_viewer
 
@@ -68,7 +70,9 @@ def run(
                 viewer = stack.enter_context(open_viewer(recorder.url))
                 if viewer.url is not None:
                     notes.print(f"Open {viewer.url} in a browser.", soft_wrap=True)
-        node = build_controller_node(loaded, statistics=statistics, sink=sink)
+        work = retuner_work(loaded)
+        retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
+        node = build_controller_node(loaded, retuner=retuner, statistics=statistics, sink=sink)
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
@@ -80,6 +84,14 @@ def run(
         summary = {
             "mode": node.mode.name,
             "fault": node.fault.name,
+            "retuning": [
+                {
+                    "time_s": (event.time_ns - node.start_ns) * 1e-9,
+                    "state": event.state.name,
+                    "reasons": list(event.reasons),
+                }
+                for event in node.retuning_events
+            ],
             "loop": statistics.summary(),
             "recording": None if file is None else str(file),
         }
@@ -87,6 +99,11 @@ def run(
         return
     console = Console(highlight=False)
     console.print(timing_table({loaded.name: statistics}))
+    for event in node.retuning_events:
+        console.print(
+            f"{(event.time_ns - node.start_ns) * 1e-9:8.0f} s retuning {event.state.name}",
+            *event.reasons,
+        )
     console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
     if file is not None:
         console.print(f"recording: {shown(file)}", soft_wrap=True)

@@ -6,8 +6,14 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import load_catalogue
-from utank_hil.config import ControllerConfig, PassiveLaw
-from utank_hil.control import CommandLimiter, Controller, PassiveController
+from utank_hil.config import ControllerConfig
+from utank_hil.config_laws import build_law
+from utank_hil.control import (
+    CommandLimiter,
+    LinearLaw,
+    PredictiveDesign,
+    wave_arx,
+)
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.runtime.controller_node import (
     NANOSECONDS,
@@ -17,6 +23,12 @@ from utank_hil.runtime.controller_node import (
     Measure,
 )
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.retuning import (
+    AdaptiveController,
+    Retuner,
+    RetuningSettings,
+    make_pulses,
+)
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 
@@ -44,6 +56,7 @@ def measure_of(names: tuple[str, ...]) -> Measure:
 def build_controller_node(
     config: ControllerConfig,
     *,
+    retuner: Retuner | None = None,
     statistics: LoopStatistics | None = None,
     sink: Callable[[FloatArray], None] | None = None,
 ) -> ControllerNode:
@@ -52,19 +65,28 @@ def build_controller_node(
     Parameters
     ----------
     config : ControllerConfig
+    retuner : Retuner, optional
+        Who identifies and designs, if the configuration has the controller retune itself; without
+        one it does not.
     statistics, sink
         As `ControllerNode` takes them.
     """
-    ship, tank, pump = config.vessel.ship, config.vessel.tank, config.vessel.pump
-    if isinstance(config.law, PassiveLaw):
-        controller: Controller = PassiveController()
-        measured: tuple[str, ...] = ("roll_rad",)
-    else:
-        controller = config.law.law(ship, tank, config.delay_s, pump.lag_s).controller()
-        measured = config.law.predictor.measured
+    tank = config.vessel.tank
+    retuning = None
+    built = build_law(config.law, config.vessel, config.delay_s, config.limits)
+    controller = built.controller
+    if (
+        retuner is not None
+        and config.retuning is not None
+        and isinstance(config.law, PredictiveDesign)
+        and built.linear is not None
+    ):
+        controller = retuning = _adaptive(
+            config, config.law, built.linear, config.retuning, retuner
+        )
     return ControllerNode(
         controller,
-        measure_of(measured),
+        measure_of(built.measured),
         LevelObserver(tank, TANK_PERIOD_S),
         CommandLimiter(config.limits, tank, TICK_NS * NANOSECONDS),
         Supervisor(config.safety),
@@ -74,6 +96,30 @@ def build_controller_node(
             bit_rate=config.bit_rate,
         ),
         load_catalogue(),
+        retuning=retuning,
         statistics=statistics,
         sink=sink,
+    )
+
+
+def _adaptive(
+    config: ControllerConfig,
+    design: PredictiveDesign,
+    law: LinearLaw,
+    settings: RetuningSettings,
+    retuner: Retuner,
+) -> AdaptiveController:
+    """A controller that begins with `law` and retunes itself."""
+    ship, tank, path = (
+        config.vessel.ship,
+        config.vessel.tank,
+        (config.delay_s, config.vessel.pump.lag_s),
+    )
+    return AdaptiveController(
+        law,
+        wave_arx(design.predictor, ship, tank, *path),
+        design.predictor.measured.index("roll_rad"),
+        settings,
+        make_pulses(settings, config.limits, ship, tank, law.sample_time_s, *path),
+        retuner,
     )

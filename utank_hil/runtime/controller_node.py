@@ -1,5 +1,6 @@
 """The controller on the bus: from the frames that come in to the pump command that goes out."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final
@@ -19,6 +20,7 @@ from utank_hil.canbus import (
     Mode,
     NodeState,
     PumpCommand,
+    RetuningState,
 )
 from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
@@ -26,6 +28,7 @@ from utank_hil.control.limits import CommandLimiter
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.retuning.adaptive import AdaptiveController, RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Observations, Supervisor
@@ -39,6 +42,8 @@ LOAD_WINDOW_TICKS: Final = 100
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
 DEGRADED_SHARE: Final = 0.5
+FRESH_NS: Final = 50_000_000
+"""An older measurement is a gap in the record that the ship is identified from."""
 
 Measure = Callable[[Inbox, LevelObserver], FloatArray]
 
@@ -79,6 +84,8 @@ class ControllerNode:
     catalogue : Catalogue
     statistics : LoopStatistics, optional
         Of the loop that drives this node, to be shown in the telemetry.
+    retuning : AdaptiveController, optional
+        The controller again, when it is one that retunes itself.
     sink : callable, optional
         Takes one telemetry row (columns `SIGNALS`) every tick; must copy it and not wait.
 
@@ -106,6 +113,7 @@ class ControllerNode:
         settings: ControllerSettings,
         catalogue: Catalogue,
         *,
+        retuning: AdaptiveController | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
     ) -> None:
@@ -117,6 +125,7 @@ class ControllerNode:
                 f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
             )
         self._controller = controller
+        self._retuning = retuning
         self._measure = measure
         self._limiter = limiter
         self._supervisor = supervisor
@@ -145,8 +154,10 @@ class ControllerNode:
         self._arm_bit = self._reset_bit = True  # a bit that is set before we look is no edge
         self._frames_sent = 0
         self._frames_counted = 0
+        self._load_since_ns = 0
         self._bus_load = 0.0
         self._law_pa = 0.0
+        self._law_failed = False
         self._command_pa = 0.0
 
     @property
@@ -159,6 +170,11 @@ class ControllerNode:
         """Fault of the supervisor, see there."""
         return self._supervisor.fault
 
+    @property
+    def retuning_events(self) -> tuple[RetuningEvent, ...]:
+        """What was done so far to retune the controller."""
+        return () if self._retuning is None else tuple(self._retuning.events)
+
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
         self._inbox.receive(frame, now_ns)
@@ -170,11 +186,11 @@ class ControllerNode:
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
         if self._ticks == 0:
-            self.start_ns = self._last_ns = now_ns
+            self.start_ns = self._last_ns = self._load_since_ns = now_ns
         self._estimate()
         self._observe(now_ns)
         self._supervisor.update(self._seen, now_ns)
-        self._control()
+        self._control(now_ns)
         self._limit()
         frames = self._encode(now_ns)
         self._show(now_ns)
@@ -226,11 +242,16 @@ class ControllerNode:
         seen.heel_rad = self._heel_rad
         if self._ticks % LOAD_WINDOW_TICKS == 0:
             heard = inbox.frames + self._frames_sent
-            window_s = LOAD_WINDOW_TICKS * TICK_NS * NANOSECONDS
+            # at the first tick nothing but a backlog was heard
+            window_s = (now_ns - self._load_since_ns) * NANOSECONDS
             bits = (heard - self._frames_counted) * MEAN_FRAME_BITS
-            self._bus_load = bits / (self._settings.bit_rate * window_s)
+            if window_s > 0:
+                self._bus_load = bits / (self._settings.bit_rate * window_s)
+            self._load_since_ns = now_ns
             self._frames_counted = heard
         seen.bus_load = self._bus_load
+        seen.law_failed = self._law_failed
+        seen.command_pa = self._command_pa
         order = inbox.operator
         seen.requested_mode = inbox.requested_mode()
         seen.armed = order is not None and order.arm
@@ -243,7 +264,7 @@ class ControllerNode:
         if seen.reset_edge:
             self._drive_sequence.request_reset()
 
-    def _control(self) -> None:
+    def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
         if self._ticks % self._sample_ticks:
             return
@@ -251,8 +272,20 @@ class ControllerNode:
         if self._ticks:
             self._applied[0] = self._limiter.mean_since_last_call()
             self._controller.applied(self._applied)
+        if self._retuning is not None:
+            seen = self._seen
+            self._retuning.update(
+                now_ns,
+                self._inbox.operator,
+                engaged=self._supervisor.demand is Demand.CONTROL,
+                fresh=max(seen.motion_age_ns, seen.tank_age_ns) <= FRESH_NS,
+            )
         answer = self._controller.step(self._measure(self._inbox, self._level))
         self._law_pa = float(answer[0])
+        self._law_failed = not math.isfinite(self._law_pa)
+        if self._law_failed:
+            self._law_pa = 0.0
+            self._controller.reset()
 
     def _limit(self) -> None:
         """Turn the law's pressure, or zero, into a permitted one."""
@@ -288,6 +321,7 @@ class ControllerNode:
                         bus_load=self._bus_load,
                         catalogue_version=self._catalogue_version,
                         configuration_version=self._settings.configuration_version,
+                        retuning=None if self._retuning is None else self._retuning.state,
                     )
                 )
             )
@@ -327,5 +361,6 @@ class ControllerNode:
             lateness_s,
             duration_s,
             overruns,
+            RetuningState.IDLE if self._retuning is None else self._retuning.state,
         )
         self._sink(self._row)

@@ -134,10 +134,12 @@ class Inbox:
 
     def _on_tank(self, frame: Frame, now_ns: int) -> None:
         tank = self._tank.accept(frame)
-        if tank is None or tank.quality not in (Quality.GOOD, Quality.DEGRADED):
+        if tank is None:
             return
         # the switches count whatever the gauges say, and a broken switch counts as closed
         self.high_level = not (tank.port_high is Switch.OFF and tank.starboard_high is Switch.OFF)
+        if tank.quality not in (Quality.GOOD, Quality.DEGRADED):
+            return
         if math.isfinite(tank.port_level_m + tank.starboard_level_m):
             self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
             self.tank_ns = now_ns

@@ -27,11 +27,22 @@ class Action(Enum):
     DISARM = "disarm"
     STOP = "stop"
     RESET = "reset"
+    RETUNE = "retune"
+    UNDO = "undo"
+    FORBID = "forbid"
+    PERMIT = "permit"
+
+
+_EDGES = (Action.STOP, Action.RESET, Action.RETUNE, Action.UNDO)
 
 
 @dataclass(frozen=True, slots=True)
 class TimedAction:
-    """A button pressed at a time after the panel's start."""
+    """A button pressed at a time after the panel first hears of a controller that is ready.
+
+    Not after the panel's own start: on a real bus a controller may be started later, and a button
+    pressed before would be no rising edge to it.
+    """
 
     time_s: float
     action: Action
@@ -71,8 +82,8 @@ class OperatorPanel:
         self._start_ns: int | None = None
         self._mode = Mode.STANDBY
         self._armed = False
-        self._stop_until_ns = 0
-        self._reset_until_ns = 0
+        self._forbidden = False
+        self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
         self._pressed: list[Action] = []
         self._sent: OperatorCommand | None = None
         self._ticks = 0
@@ -89,19 +100,23 @@ class OperatorPanel:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send the state of the buttons when it is due or has changed."""
-        if self._start_ns is None:
+        if self._start_ns is None and self._controller_is_ready():
             self._start_ns = now_ns
-        while self._script and self._script[-1].time_s * 1e9 <= now_ns - self._start_ns:
-            self._pressed.append(self._script.pop().action)
+        if self._start_ns is not None:
+            while self._script and self._script[-1].time_s * 1e9 <= now_ns - self._start_ns:
+                self._pressed.append(self._script.pop().action)
         for action in self._pressed:
             self._take(action, now_ns)
         self._pressed.clear()
         command = OperatorCommand(
             mode_request=self._mode,
             arm=self._armed,
-            stop=now_ns < self._stop_until_ns,
-            reset=now_ns < self._reset_until_ns,
+            stop=now_ns < self._pressed_until_ns[Action.STOP],
+            reset=now_ns < self._pressed_until_ns[Action.RESET],
             acknowledge=False,
+            retune=now_ns < self._pressed_until_ns[Action.RETUNE],
+            undo=now_ns < self._pressed_until_ns[Action.UNDO],
+            forbid_retuning=self._forbidden,
         )
         frames = []
         if command != self._sent or self._ticks % 2 == 0:
@@ -111,13 +126,17 @@ class OperatorPanel:
         self._ticks += 1
         return frames
 
+    def _controller_is_ready(self) -> bool:
+        return self.status is not None and self.status.mode not in (None, Mode.INIT)
+
     def _take(self, action: Action, now_ns: int) -> None:
+        if action in _EDGES:
+            self._pressed_until_ns[action] = now_ns + EDGE_NS
         if action is Action.ARM:
             self._mode, self._armed = Mode.ACTIVE, True
-        elif action is Action.RESET:
-            self._reset_until_ns = now_ns + EDGE_NS
-        else:
-            self._armed = False
-            self._mode = Mode.PASSIVE if action in (Action.PASSIVE, Action.DISARM) else Mode.STANDBY
-            if action is Action.STOP:
-                self._stop_until_ns = now_ns + EDGE_NS
+        elif action in (Action.FORBID, Action.PERMIT):
+            self._forbidden = action is Action.FORBID
+        elif action in (Action.PASSIVE, Action.DISARM):
+            self._mode, self._armed = Mode.PASSIVE, False
+        elif action in (Action.STANDBY, Action.STOP):
+            self._mode, self._armed = Mode.STANDBY, False

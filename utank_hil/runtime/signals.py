@@ -17,4 +17,5 @@ SIGNALS: Final = (
     "wakeup_lateness_s",
     "tick_duration_s",
     "overruns",
+    "retuning",
 )

@@ -6,7 +6,8 @@ resets and arms again: arming needs a *rising* edge of the arm bit that this ver
 while ready, so neither a restart nor a fault is ever followed by pressure on its own.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 from enum import Enum
 
 from utank_hil.canbus.enumerations import Fault, Mode
@@ -15,10 +16,6 @@ from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 
 NEVER_NS = 1 << 62
 """Age of something that was never heard."""
-
-OVERRUNS_IN_TEN_LIMIT = 3
-"""So many late ticks among the last ten end in a ramp to zero."""
-
 
 class Demand(Enum):
     """What the rest of the tick has to do with the pump pressure."""
@@ -52,6 +49,13 @@ class SafetyLimits:
         Largest share of the bus in use over a second, 0 to 1.
     long_overrun_ms : float
         One tick this late cuts the pressure.
+    overruns_in_ten : int
+        So many late ticks among the last ten end in a ramp to zero.
+
+    Raises
+    ------
+    ValueError
+        If a threshold is not positive and finite, or the load limit above 1.
     """
 
     motion_age_ms: float = 30.0
@@ -68,6 +72,15 @@ class SafetyLimits:
     heel_limit_rad: float = 0.14
     bus_load_limit: float = 0.8
     long_overrun_ms: float = 50.0
+    overruns_in_ten: int = 3
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"safety {field.name} must be positive and finite, got {value}")
+        if self.bus_load_limit > 1:
+            raise ValueError(f"safety bus_load_limit must be 1 at most, got {self.bus_load_limit}")
 
 
 @dataclass(slots=True)
@@ -96,6 +109,8 @@ class Observations:
     heel_rad: float = 0.0
     tick_late_ns: int = 0
     overruns_in_ten: int = 0
+    law_failed: bool = False
+    command_pa: float = 0.0
     requested_mode: Mode = Mode.STANDBY
     arm_edge: bool = False
     armed: bool = False
@@ -200,7 +215,8 @@ class Supervisor:
         elif seen.requested_mode is Mode.ACTIVE and seen.arm_edge:
             self._begin_arming(seen, now_ns)
         elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
-            self._disarm(Mode.STANDBY)
+            if seen.command_pa == 0.0:  # the ramp down has come to its end
+                self._disarm(Mode.STANDBY)
         elif seen.requested_mode is Mode.PASSIVE and self.mode is Mode.STANDBY:
             self._disarm(Mode.PASSIVE)
 
@@ -277,6 +293,8 @@ class Supervisor:
             return faults.DRIVE_FAULT
         if seen.drive_age_ns > self._drive_age_ns or seen.echo_age_ns > self._echo_age_ns:
             return faults.DRIVE_SILENT
+        if seen.law_failed:
+            return faults.LAW_FAILED
         if seen.high_level:
             return faults.LEVEL_LIMIT
         if seen.bus_load > limits.bus_load_limit:
@@ -293,7 +311,7 @@ class Supervisor:
             return faults.PROTECTION
         if abs(seen.roll_rad) > limits.roll_limit_rad or abs(seen.heel_rad) > limits.heel_limit_rad:
             return faults.HEEL_LIMIT
-        if seen.overruns_in_ten >= OVERRUNS_IN_TEN_LIMIT:
+        if seen.overruns_in_ten >= limits.overruns_in_ten:
             return faults.REPEATED_OVERRUNS
         if seen.panel_age_ns > self._panel_age_ns:
             return faults.OPERATOR_SILENT

@@ -1,0 +1,347 @@
+"""The invariants of docs/safety.md, with the whole bench on a simulated bus."""
+
+from itertools import pairwise
+
+import pytest
+from fault_bench import (
+    ARMED,
+    CATALOGUE,
+    MS,
+    SECOND,
+    Babbler,
+    FaultBench,
+    corrupted,
+    doubled,
+    dropped,
+    frozen,
+    storm,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from utank_hil.canbus import (
+    ControlWord,
+    DriveState,
+    DriveStatus1,
+    DriveStatus2,
+    Fault,
+    Mode,
+    PumpCommand,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+)
+from utank_hil.runtime.panel import Action, TimedAction
+
+T0 = 6 * SECOND
+TICK = 10 * MS
+TIMEOUT = 50 * MS
+WIRE = 2 * MS  # a frame waits for at most a few others
+CYCLE = 20 * MS
+LIMITS = storm().controllers["gpc"].limits
+
+
+def armed_bench(**options) -> FaultBench:
+    bench = FaultBench(**options)
+    bench.run(T0 / SECOND)
+    assert bench.mode is Mode.ACTIVE
+    assert max(abs(command.pressure_pa) for _, command in bench.commands(4 * SECOND)) > 3e3
+    return bench
+
+
+def rate_limit_holds(bench: FaultBench) -> bool:
+    """Every step between two commands is a permitted one for its time, or ends at zero."""
+    return all(
+        after.pressure_pa == 0.0
+        or abs(after.pressure_pa - before.pressure_pa)
+        <= LIMITS.rate_pa_s * (later - earlier + WIRE) / SECOND + 8.0
+        for (earlier, before), (later, after) in pairwise(bench.heard.commands)
+    )
+
+
+def stays_at_zero_though_the_panel_keeps_its_arm_bit(bench: FaultBench, since_ns: int) -> bool:
+    assert bench.heard.orders[-1][1].arm
+    return all(command.pressure_pa == 0.0 for _, command in bench.commands(since_ns))
+
+
+@pytest.mark.parametrize("phase_ms", [0, 3, 10, 17])
+def test_silenced_controller_drive_is_off_within_its_timeout_and_a_tick(phase_ms: int) -> None:
+    bench = armed_bench()
+    bench.controller.begin_ns = T0 + phase_ms * MS
+    bench.controller.hangs = True
+    bench.run(8)
+    last_ns = bench.heard.commands[-1][0]
+    off_ns = bench.left_enabled_ns(last_ns)
+    assert TIMEOUT < off_ns - last_ns <= TIMEOUT + TICK + WIRE
+    assert off_ns - last_ns <= 100 * MS
+    after = {state for t, state in bench.heard.states if t >= off_ns}
+    assert after == {DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT}
+
+
+@pytest.mark.parametrize("pause_ms", [80, 200, 2000])
+def test_controller_that_hangs_and_goes_on_finds_itself_disarmed(pause_ms: int) -> None:
+    bench = armed_bench()
+    bench.controller.begin_ns = T0
+    bench.controller.end_ns = T0 + pause_ms * MS
+    bench.controller.hangs = True
+    bench.run(12)
+    assert bench.mode is Mode.FAULT
+    assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, bench.controller.end_ns + TICK)
+
+
+def test_restarted_controller_is_in_standby_and_never_arms_by_itself() -> None:
+    bench = armed_bench()
+    bench.controller.begin_ns, bench.controller.end_ns = T0, T0 + 2 * SECOND
+    bench.controller.hangs = True
+    bench.controller.restarted = bench.restarted_controller
+    bench.run(20)
+    assert bench.mode is Mode.STANDBY
+    assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, T0 + SECOND)
+    # nor does the drive
+    assert {state for t, state in bench.heard.states if t > T0 + SECOND} == {DriveState.FAULT}
+
+
+def test_reset_and_a_new_press_of_arm_bring_it_back() -> None:
+    script = (
+        *ARMED,
+        TimedAction(8.0, Action.DISARM),
+        TimedAction(8.5, Action.RESET),
+        TimedAction(10.0, Action.ARM),
+    )
+    bench = armed_bench(script=script)
+    bench.sensors.begin_ns, bench.sensors.end_ns = T0, T0 + SECOND
+    bench.sensors.spoil = dropped()
+    bench.run(9.9)
+    assert bench.mode is not Mode.ACTIVE
+    bench.run(20)
+    assert bench.mode is Mode.ACTIVE
+    assert any(command.pressure_pa != 0.0 for _, command in bench.commands(11 * SECOND))
+    assert bench.ship.drive.refused == 0
+
+
+R_MOTION = 250 * MS  # from the last good sample
+P_CLASS = 250 * MS  # from the fault
+
+FAULTS = [
+    # node, what happens to it, where it ends, by when
+    ("sensors", {"spoil": dropped()}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"hangs": True}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": dropped(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": corrupted(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": corrupted(SensorMotion, byte=0)}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": corrupted(SensorMotion, byte=1)}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": frozen(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"delay_ticks": 5}, Fault.MOTION_SILENT, R_MOTION),
+    ("sensors", {"spoil": dropped(SensorTank)}, Fault.TANK_SILENT, 2020 * MS),
+    ("sensors", {"spoil": corrupted(SensorTank)}, Fault.PROTECTION, 1100 * MS),
+    ("sensors", {"spoil": dropped(SensorPump)}, Fault.PUMP_SENSOR_SILENT, 2020 * MS),
+    ("drive", {"spoil": dropped()}, Fault.DRIVE_SILENT, P_CLASS),
+    ("drive", {"hangs": True}, Fault.DRIVE_SILENT, P_CLASS),
+    ("drive", {"spoil": dropped(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
+    ("drive", {"spoil": corrupted(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
+    ("drive", {"spoil": frozen(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
+    ("controller", {"spoil": dropped(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
+    ("controller", {"spoil": corrupted(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
+    ("controller", {"spoil": frozen(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
+    ("panel", {"hangs": True}, Fault.OPERATOR_SILENT, 6220 * MS),
+]
+
+
+@pytest.mark.parametrize(
+    ("victim", "failure", "fault", "within_ns"),
+    FAULTS,
+    ids=lambda value: value if isinstance(value, str) else getattr(value, "name", None),
+)
+def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(
+    victim: str, failure: dict, fault: Fault, within_ns: int
+) -> None:
+    bench = armed_bench()
+    node = getattr(bench, victim)
+    for name, value in failure.items():
+        setattr(node, name, value)
+    node.begin_ns = T0
+    end_ns = T0 + within_ns + SECOND
+    bench.run(end_ns / SECOND)
+    assert (bench.mode, bench.node.fault) == (Mode.FAULT, fault)
+    # what is on the bus, or if that is what fails, what the drive does
+    if failure.get("spoil") is not None and victim == "controller":
+        assert bench.left_enabled_ns(T0) - T0 <= TIMEOUT + TICK + CYCLE
+    else:
+        assert bench.zero_ns(T0) - T0 <= within_ns + CYCLE
+    assert rate_limit_holds(bench)
+    node.end_ns = end_ns  # all is well again, and nothing comes of it
+    bench.run(end_ns / SECOND + 4)
+    assert bench.mode is Mode.FAULT
+    assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, end_ns)
+    assert bench.heard.states[-1][1] is not DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+@pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
+def test_one_or_two_lost_ticks_do_not_disarm(victim: str, lost: int) -> None:
+    bench = armed_bench()
+    node = getattr(bench, victim)
+    node.spoil = dropped()
+    node.begin_ns, node.end_ns = T0, T0 + lost * node.period_ns
+    bench.run(8)
+    assert bench.mode is Mode.ACTIVE
+    assert bench.ship.drive.refused == 0
+    assert rate_limit_holds(bench)
+
+
+@pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
+def test_frames_sent_twice_are_taken_once(victim: str) -> None:
+    """The second of each is refused as a repetition; what the first said stands."""
+    once, twice = armed_bench(), armed_bench()
+    node = getattr(twice, victim)
+    node.spoil, node.begin_ns = doubled, T0
+    once.run(8)
+    twice.run(8)
+    assert twice.mode is Mode.ACTIVE
+    assert twice.ship.plant.roll_rad == pytest.approx(once.ship.plant.roll_rad, abs=1e-4)
+
+
+def test_second_node_with_the_controllers_address_stops_it_at_once() -> None:
+    claim = CATALOGUE.transmitter(PumpCommand).can_id
+    bench = armed_bench(extra=[Babbler(claim, 1, T0, T0 + MS)])
+    bench.run(7)
+    assert (bench.mode, bench.node.fault) == (Mode.FAULT, Fault.ADDRESS_CONFLICT)
+    assert bench.zero_ns(T0) - T0 <= TICK + CYCLE + WIRE
+
+
+def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
+    """Frames of the highest priority starve all others: nobody hears anybody."""
+    bench = armed_bench(extra=[Babbler(0, 2, T0, T0 + 2 * SECOND)])
+    bench.run(7)
+    assert bench.mode is Mode.FAULT
+    assert not bench.commands(T0 + CYCLE)
+    assert abs(bench.ship.plant.pressure_pa) < 5e3  # of the coasting rotor
+    bench.run(10)
+    assert {state for t, state in bench.heard.states if t > 9 * SECOND} == {DriveState.FAULT}
+    # what had waited in the queues came late; it found the drive tripped
+    assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, 9 * SECOND)
+
+
+def test_flood_that_starves_nobody_is_an_overload_all_the_same() -> None:
+    bench = armed_bench(extra=[Babbler(0x1FFFFFFF, 2, T0)])
+    bench.run(8.1)
+    assert (bench.mode, bench.node.fault) == (Mode.FAULT, Fault.BUS_OVERLOAD)
+    assert bench.pressure_at_zero_since(8 * SECOND)
+
+
+def test_version_of_another_ship_forbids_arming() -> None:
+    other = storm().vessel.model_copy(
+        update={"tank": storm().vessel.tank.__class__(17.1, 4.88, 17.11, 6.22, 0.0, 1.80)}
+    )
+    scenario = storm().model_copy(update={"vessel": other})
+    bench = FaultBench(scenario=scenario)
+    bench.run(4)
+    assert bench.mode is Mode.INIT
+    assert bench.node.fault is Fault.VERSION_MISMATCH
+    assert {command.pressure_pa for _, command in bench.heard.commands} == {0.0}
+
+
+def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
+    traces = []
+    for seed in (3, 3, 4):
+        bench = FaultBench(seed=seed)
+        bench.run(8)
+        traces.append(bench.heard.bytes())
+    assert traces[0] == traces[1]
+    assert traces[0] != traces[2]
+    assert len(traces[0].splitlines()) > 2500
+
+
+def test_same_seed_same_trace_with_a_fault_in_it() -> None:
+    traces = []
+    for _ in range(2):
+        bench = FaultBench(seed=5)
+        bench.sensors.spoil = dropped(SensorMotion)
+        bench.sensors.begin_ns, bench.sensors.end_ns = 4 * SECOND, 5 * SECOND
+        bench.run(7)
+        traces.append(bench.heard.bytes())
+    assert traces[0] == traces[1]
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
+def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
+    bench = FaultBench(seed=seed, controller=controller)
+    bench.run(30)
+    assert bench.mode is Mode.ACTIVE
+    assert bench.ship.drive.refused == 0
+    assert rate_limit_holds(bench)
+    assert max(abs(c.pressure_pa) for _, c in bench.heard.commands) <= LIMITS.pressure_pa
+
+
+scripts = st.lists(
+    st.tuples(st.integers(2, 70), st.sampled_from([*Action, Action.ARM, Action.ARM, Action.RESET])),
+    max_size=8,
+)
+failures = st.lists(
+    st.tuples(
+        st.sampled_from(["sensors", "drive", "controller", "panel"]),
+        st.sampled_from([
+            {"spoil": dropped()}, {"hangs": True}, {"spoil": doubled},
+            {"spoil": dropped(SensorMotion)}, {"spoil": corrupted(SensorMotion)},
+            {"spoil": dropped(SensorTank, SensorPump)}, {"spoil": frozen(SensorTank)},
+            {"spoil": corrupted(DriveStatus1)}, {"spoil": dropped(DriveStatus2)},
+            {"spoil": corrupted(PumpCommand)}, {"spoil": corrupted(PumpCommand, byte=1)},
+            {"delay_ticks": 1}, {"delay_ticks": 3},
+        ]),
+        st.integers(20, 60),
+        st.integers(1, 300),
+    ),
+    max_size=2,
+)  # fmt: skip
+
+
+@settings(max_examples=40)
+@given(script=scripts, failures=failures, seed=st.integers(0, 100))
+def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:
+    timed = tuple(TimedAction(tenths / 10, action) for tenths, action in script)
+    bench = FaultBench(seed=seed, script=(*ARMED, *timed))
+    for victim, failure, tenths, length_ticks in failures:
+        node = getattr(bench, victim)
+        for name, value in failure.items():
+            setattr(node, name, value)
+        node.begin_ns = tenths * 100 * MS
+        node.end_ns = node.begin_ns + length_ticks * TICK
+    bench.run(9)
+    heard = bench.heard
+    for time_ns, command in heard.commands:
+        assert abs(command.pressure_pa) <= LIMITS.pressure_pa + 4
+        if command.pressure_pa == 0.0:
+            continue
+        # 1. armed by the operator: now, or less than the longest ramp ago; a lost panel's last
+        # order stands for five seconds
+        orders = [(t, order) for t, order in heard.orders if t <= time_ns]
+        ramp_ns = time_ns - SECOND - 300 * MS
+        assert any(order.arm for t, order in orders if t >= ramp_ns) or orders[-1][1].arm
+        assert time_ns - orders[-1][0] <= 6220 * MS
+        # 1. fresh: at zero 250 ms after the last intact motion sample on the bus
+        fresh_ns = max(t for t in heard.motion_ns if t <= time_ns)
+        assert time_ns - fresh_ns <= R_MOTION + CYCLE
+        # a stop, once heard, leaves no time for anything else
+        assert not orders[-1][1].stop or time_ns - orders[-1][0] <= TICK + CYCLE
+    assert rate_limit_holds(bench)  # 3.
+    # 2. once at zero for half a second (a law's answer may round to zero for a sample time),
+    # pressure comes back only after the arm bit fell and rose again
+    zero_since_ns, zeros = 0, 25
+    for time_ns, command in heard.commands:
+        if command.pressure_pa == 0.0:
+            zero_since_ns = zero_since_ns if zeros else time_ns
+            zeros += 1
+            continue
+        if zeros >= 25:
+            bits = [(t, order.arm) for t, order in heard.orders if t <= time_ns]
+            risen_ns = max((t for (_, a), (t, b) in pairwise(bits) if b and not a), default=-1)
+            assert risen_ns >= zero_since_ns - SECOND - 300 * MS
+        zeros = 0
+
+
+def test_words_of_a_run_enable_only_after_the_sequence() -> None:
+    bench = armed_bench()
+    words = [command.control_word for _, command in bench.heard.commands]
+    first = words.index(ControlWord.ENABLE_OPERATION)
+    assert words.index(ControlWord.SHUTDOWN) < words.index(ControlWord.SWITCH_ON) < first

@@ -1,0 +1,202 @@
+import math
+from itertools import pairwise
+
+import pytest
+from drive_bench import CATALOGUE, ENABLE, MS, TICK_NS, DriveBench
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP, DriveLimits
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    ControlWord,
+    DriveFault,
+    DriveState,
+    Frame,
+    Heartbeat,
+    NodeState,
+    PumpCommand,
+)
+
+START_NS = 5_123_456_789
+
+
+def armed(pressure_pa: float = 20e3, start_ns: int = START_NS) -> DriveBench:
+    bench = DriveBench(start_ns=start_ns)
+    bench.enable()
+    bench.drive_at(pressure_pa)
+    assert bench.told.state is DriveState.OPERATION_ENABLED
+    return bench
+
+
+def test_enabled_drive_brings_the_pump_to_the_commanded_pressure() -> None:
+    bench = armed(20e3)
+    for _ in range(50):
+        bench.command(20e3)
+        bench.ticks(2)
+    assert bench.told.pressure_pa == pytest.approx(20e3, rel=0.02)
+    assert bench.told.speed_rad_s > 0
+
+
+def test_pressure_is_ignored_until_operation_is_enabled() -> None:
+    bench = DriveBench()
+    bench.tick()
+    for word in ENABLE[:2]:
+        for _ in range(20):
+            bench.command(2000.0, word)
+            bench.ticks(2)
+            assert abs(bench.told.pressure_pa) <= 8.0
+    assert bench.told.state is DriveState.SWITCHED_ON
+
+
+@pytest.mark.parametrize("timeout_ms", [20, 50, 100])
+@pytest.mark.parametrize("offset_ns", [0, 1, 4 * MS, TICK_NS - 1])
+def test_set_point_is_zero_within_the_frames_own_timeout_and_one_tick(
+    timeout_ms: int, offset_ns: int
+) -> None:
+    bench = armed()
+    bench.now_ns += offset_ns  # frames come between the ticks
+    bench.command(20e3, timeout_s=timeout_ms * 1e-3)
+    last_ns = bench.now_ns
+    bench.now_ns += TICK_NS - offset_ns
+    while bench.told.state is DriveState.OPERATION_ENABLED:
+        bench.tick()
+        assert bench.now_ns - last_ns < 200 * MS
+    tripped_ns = bench.sent_ns[-1]
+    assert timeout_ms * MS < tripped_ns - last_ns <= timeout_ms * MS + TICK_NS
+    assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
+    bench.ticks(10)
+    assert bench.told.state is DriveState.FAULT
+    assert bench.status_2 is not None
+    assert bench.status_2.fault is DriveFault.COMMAND_TIMEOUT
+
+
+def test_commands_after_a_timeout_do_not_start_the_pump_again() -> None:
+    bench = armed()
+    bench.ticks(10)
+    for _ in range(200):
+        bench.command(0.0, ControlWord.ENABLE_OPERATION)
+        bench.ticks(2)
+        assert bench.told.state is DriveState.FAULT
+    for word in (ControlWord.FAULT_RESET, *ENABLE[:2]):  # but an explicit reset and sequence do
+        bench.command(0.0, word)
+        bench.ticks(2)
+    assert bench.told.state is DriveState.SWITCHED_ON
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param((50.1e3, 0.05), id="over the pressure limit"),
+        pytest.param((-50.1e3, 0.05), id="under the pressure limit"),
+        pytest.param((20e3 + 250e3 * 0.03 + 16, 0.05), id="over the rate limit"),
+        pytest.param((-8.0, 0.05), id="through zero over the rate limit"),
+        pytest.param((math.nan, 0.05), id="pressure not available"),
+        pytest.param((20e3, math.nan), id="timeout not available"),
+        pytest.param((20e3, 0.105), id="timeout too long"),
+        pytest.param((20e3, 0.0), id="no timeout"),
+    ],
+)
+def test_refused_command_changes_nothing_and_is_not_echoed(command: tuple[float, float]) -> None:
+    bench = armed()
+    bench.command(20e3)
+    good = bench.commands.counter
+    bench.ticks(2)
+    pressure_pa, timeout_s = command
+    bench.command(pressure_pa, timeout_s=timeout_s)
+    bench.ticks(2)
+    assert bench.drive.refused == 1
+    assert bench.told.command_echo == good
+    assert bench.told.state is DriveState.OPERATION_ENABLED
+    # nor does it feed the timeout: 50 ms after the good one, 40 of which have passed
+    bench.ticks(3)
+    assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
+
+
+def test_steps_toward_zero_are_never_refused() -> None:
+    bench = armed(40e3)
+    bench.command(1e3)
+    bench.command(0.0)
+    assert bench.drive.refused == 0
+
+
+def test_refusals_in_a_row_trip_the_drive_and_one_good_command_forgives() -> None:
+    bench = armed()
+    for _ in range(MISCODED_COMMANDS_TO_TRIP - 1):
+        bench.command(60e3)
+    bench.command(20e3)
+    for _ in range(MISCODED_COMMANDS_TO_TRIP - 1):
+        bench.command(60e3)
+    bench.tick()
+    assert bench.told.state is DriveState.OPERATION_ENABLED
+    bench.command(60e3)
+    bench.ticks(10)
+    assert bench.told.state is DriveState.FAULT
+    assert bench.status_2 is not None
+    assert bench.status_2.fault is DriveFault.COMMAND_REFUSED
+    assert bench.drive.refused == 2 * MISCODED_COMMANDS_TO_TRIP - 1
+
+
+def test_corrupted_and_foreign_frames_are_as_if_never_sent() -> None:
+    bench = armed()
+    good = bench.commands.counter
+    frame = bench.commands.frame(PumpCommand(0.0, ControlWord.QUICK_STOP, 0.05))
+    for position in range(64):
+        data = bytearray(frame.data)
+        data[position // 8] ^= 1 << position % 8
+        bench.drive.receive(Frame(frame.can_id, bytes(data)), bench.now_ns)
+    bench.drive.receive(Frame(frame.can_id + 1, frame.data), bench.now_ns)
+    bench.ticks(2)
+    assert bench.told.state is DriveState.OPERATION_ENABLED
+    assert bench.told.command_echo == good
+    assert bench.drive.refused == 0
+
+
+def test_status_comes_every_20_ms_and_at_once_when_the_state_changes() -> None:
+    bench = DriveBench()
+    bench.enable()
+    bench.command(0.0)
+    bench.ticks(3)  # the next regular status is one tick away
+    bench.command(0.0, ControlWord.DISABLE_VOLTAGE)
+    sent = len(bench.sent_ns)
+    changed_ns = bench.now_ns
+    bench.tick()
+    assert bench.sent_ns[sent:] == [changed_ns]
+    assert bench.told.state is DriveState.SWITCH_ON_DISABLED
+    bench.sent_ns.clear()
+    bench.ticks(20)
+    assert len(bench.sent_ns) == 10
+    steps = {later - earlier for earlier, later in pairwise(bench.sent_ns)}
+    assert steps == {2 * TICK_NS}
+
+
+def test_drive_claims_its_address_and_tells_its_fault_in_the_heartbeat() -> None:
+    bench = DriveBench(start_ns=START_NS)
+    beats = CATALOGUE.receiver(Heartbeat, Address.DRIVE)
+    claim = CATALOGUE.receiver(AddressClaim, Address.DRIVE)
+    bench.tick()
+    assert [frame.can_id for frame in bench.frames].count(claim.can_id) == 1
+    bench.now_ns = START_NS + TICK_NS
+    states = []
+    bench.enable()
+    for _ in range(40):
+        bench.tick()
+        heard = [beats.accept(frame) for frame in bench.frames if frame.can_id == beats.can_id]
+        states += [beat.state for beat in heard if beat is not None]
+        assert claim.can_id not in [frame.can_id for frame in bench.frames]
+    assert NodeState.FAULT in states  # no command came
+
+
+@given(
+    limit_pa=st.floats(1e3, 200e3),
+    share=st.floats(-1, 1),
+)
+def test_rounding_on_the_bus_never_makes_a_permitted_pressure_a_refused_one(
+    limit_pa: float, share: float
+) -> None:
+    limits = DriveLimits(pressure_pa=limit_pa, pressure_rate_pa_s=1e9)
+    bench = DriveBench(limits)
+    bench.enable()
+    bench.command(share * limit_pa)
+    assert bench.drive.refused == 0

@@ -1,0 +1,72 @@
+import pytest
+
+from firmware_sim.drive_states import DriveStates
+from utank_hil.canbus import ControlWord, DriveFault, DriveState
+from utank_hil.runtime.drive_sequence import DriveSequence
+
+S, C = DriveState, ControlWord
+
+
+def led(
+    states: DriveStates, sequence: DriveSequence, *, wanted: bool, cycles: int = 6
+) -> list[DriveState]:
+    """States of a drive that hears each word and reports before the next."""
+    passed = [states.state]
+    for _ in range(cycles):
+        states.command(sequence.next_word(states.state, wanted=wanted))
+        passed.append(states.state)
+        states.tick()
+    return passed
+
+
+@pytest.mark.parametrize("state", [*DriveState, None])
+def test_nothing_but_a_wanted_drive_is_led_towards_enabled(state: DriveState | None) -> None:
+    word = DriveSequence().next_word(state, wanted=False)
+    assert word in (C.DISABLE_VOLTAGE, C.QUICK_STOP)
+    assert (word is C.QUICK_STOP) == (state is S.OPERATION_ENABLED)
+
+
+def test_wanted_drive_is_enabled_in_three_words_and_kept_there() -> None:
+    states = DriveStates()
+    states.tick()
+    assert led(states, DriveSequence(), wanted=True) == [
+        S.SWITCH_ON_DISABLED, S.READY_TO_SWITCH_ON, S.SWITCHED_ON, *[S.OPERATION_ENABLED] * 4,
+    ]  # fmt: skip
+
+
+def test_unwanted_drive_is_stopped_and_then_switched_off() -> None:
+    states, sequence = DriveStates(), DriveSequence()
+    states.tick()
+    led(states, sequence, wanted=True)
+    assert sequence.next_word(states.state, wanted=False) is C.QUICK_STOP
+    assert led(states, sequence, wanted=False)[-1] is S.SWITCH_ON_DISABLED
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_unknown_or_faulted_drive_is_never_enabled(wanted: bool) -> None:
+    for state in (None, S.FAULT, S.FAULT_REACTION_ACTIVE, S.NOT_READY_TO_SWITCH_ON):
+        assert DriveSequence().next_word(state, wanted=wanted) is C.DISABLE_VOLTAGE
+
+
+def test_fault_is_reset_once_and_only_on_request() -> None:
+    states, sequence = DriveStates(), DriveSequence()
+    states.tick()
+    led(states, sequence, wanted=True)
+    states.trip(DriveFault.STALL)
+    states.tick()
+    assert set(led(states, sequence, wanted=True)) == {S.FAULT}
+    sequence.request_reset()
+    assert led(states, sequence, wanted=False)[1] is S.SWITCH_ON_DISABLED
+    states.trip(DriveFault.STALL)  # a second fault needs a second request
+    states.tick()
+    assert set(led(states, sequence, wanted=False)) == {S.FAULT}
+
+
+def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later() -> None:
+    states, sequence = DriveStates(), DriveSequence()
+    states.tick()
+    sequence.request_reset()
+    led(states, sequence, wanted=True)
+    states.trip(DriveFault.STALL)
+    states.tick()
+    assert set(led(states, sequence, wanted=False)) == {S.FAULT}

@@ -1,0 +1,229 @@
+import math
+
+import pytest
+from controller_bench import CATALOGUE, VERSION
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    ControllerStatus,
+    DriveFault,
+    DriveState,
+    DriveStatus1,
+    DriveStatus2,
+    Frame,
+    Heartbeat,
+    Mode,
+    NodeState,
+    OperatorCommand,
+    PumpCommand,
+    Quality,
+    ResetCause,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    Switch,
+)
+from utank_hil.runtime.inbox import Inbox
+
+NAN = math.nan
+GOOD: dict[type, tuple[object, ...]] = {
+    SensorMotion: SensorMotion(0.1, -0.05, Quality.GOOD),
+    SensorTank: SensorTank(-0.5, 0.75, Switch.OFF, Switch.OFF, Quality.GOOD),
+    SensorPump: SensorPump(8e3, 3.0, Quality.GOOD),
+    DriveStatus1: DriveStatus1(8e3, 9.0, DriveState.OPERATION_ENABLED, 4, *(False,) * 4),
+    DriveStatus2: DriveStatus2(DriveFault.NONE, 1000.0, 20.0, 40.0, 40.0, *(False,) * 4),
+    OperatorCommand: OperatorCommand(Mode.ACTIVE, True, False, False, False),
+}
+TIMES = {
+    SensorMotion: "motion_ns",
+    SensorTank: "tank_ns",
+    SensorPump: "pump_ns",
+    DriveStatus1: "drive_ns",
+    OperatorCommand: "panel_ns",
+}
+
+
+class Line:
+    """An inbox and everybody who sends to it."""
+
+    def __init__(self) -> None:
+        self.inbox = Inbox(CATALOGUE, VERSION)
+        self.senders = {kind: CATALOGUE.transmitter(kind) for kind in GOOD}
+        self.now_ns = 1000
+
+    def frame(self, message: tuple[object, ...]) -> Frame:
+        return self.senders[type(message)].frame(message)  # type: ignore[arg-type]
+
+    def say(self, message: tuple[object, ...]) -> None:
+        self.hear(self.frame(message))
+
+    def hear(self, frame: Frame) -> None:
+        self.now_ns += 10
+        self.inbox.receive(frame, self.now_ns)
+
+    def beat(self, address: Address, catalogue: int, configuration: int) -> None:
+        beat = Heartbeat(
+            NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, catalogue, configuration, NAN, NAN
+        )
+        self.hear(CATALOGUE.transmitter(Heartbeat, address).frame(beat))
+
+    def content(self) -> tuple[object, ...]:
+        inbox = self.inbox
+        return (
+            inbox.roll_rad, inbox.roll_rate_rad_s, inbox.port_level_m, inbox.starboard_level_m,
+            inbox.level_m, inbox.pressure_pa, inbox.high_level, inbox.drive_state,
+            inbox.drive_fault, inbox.power_w, inbox.operator, inbox.motion_ns, inbox.tank_ns,
+            inbox.pump_ns, inbox.drive_ns, inbox.echo_ns, inbox.panel_ns, inbox.address_conflict,
+            inbox.versions_match, inbox.requested_mode(),
+        )  # fmt: skip
+
+
+def test_good_frames_are_kept_with_the_time_they_came() -> None:
+    line = Line()
+    for message in GOOD.values():
+        line.say(message)
+    inbox = line.inbox
+    assert (inbox.roll_rad, inbox.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
+    assert (inbox.port_level_m, inbox.starboard_level_m) == pytest.approx((-0.5, 0.75))
+    assert inbox.level_m == pytest.approx(0.625)
+    assert inbox.pressure_pa == 8e3
+    assert inbox.power_w == pytest.approx(20e3)
+    assert inbox.drive_state is DriveState.OPERATION_ENABLED
+    assert inbox.requested_mode() is Mode.ACTIVE
+    assert [getattr(inbox, name) for name in TIMES.values()] == [1010, 1020, 1030, 1040, 1060]
+    assert inbox.echo_ns == 1040
+    assert inbox.frames == 6
+    assert inbox.protection_valid
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        SensorMotion(NAN, 0.0, Quality.GOOD),
+        SensorMotion(0.0, NAN, Quality.GOOD),
+        SensorMotion(0.0, 0.0, Quality.BAD),
+        SensorMotion(0.0, 0.0, None),
+        SensorTank(NAN, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(0.0, NAN, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.BAD),
+        SensorPump(NAN, 0.0, Quality.GOOD),
+        SensorPump(0.0, 0.0, None),
+    ],
+)
+def test_what_is_no_measurement_changes_nothing(message: tuple[object, ...]) -> None:
+    line = Line()
+    for good in GOOD.values():
+        line.say(good)
+    before = line.content()
+    line.say(message)
+    assert line.content() == before
+
+
+@pytest.mark.parametrize("kind", GOOD)
+def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
+    line = Line()
+    for good in GOOD.values():
+        line.say(good)
+    line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
+    line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
+    repeated = line.frame(GOOD[kind])
+    line.hear(repeated)
+    before = line.content()
+    following = line.frame(GOOD[kind])
+    damaged = [repeated]
+    for bit in range(64):
+        data = bytearray(following.data)
+        data[bit // 8] ^= 1 << bit % 8
+        damaged.append(Frame(following.can_id, bytes(data)))
+    damaged += [
+        Frame(following.can_id, following.data[:7]),
+        Frame(following.can_id, b""),
+        Frame(0x18FF7782, following.data),
+    ]
+    for frame in damaged:
+        line.hear(frame)
+        assert line.content() == before
+    line.hear(following)  # and the good one is still taken
+    assert line.content() != before or kind is DriveStatus2
+
+
+OWN = {
+    CATALOGUE.transmitter(PumpCommand).can_id,
+    CATALOGUE.transmitter(ControllerStatus).can_id,
+    CATALOGUE.transmitter(Heartbeat, Address.CONTROLLER).can_id,
+    CATALOGUE.transmitter(AddressClaim, Address.CONTROLLER).can_id,
+}
+
+
+@given(
+    can_id=st.sampled_from(sorted(CATALOGUE.can_ids)) | st.integers(0, (1 << 29) - 1),
+    data=st.binary(min_size=8, max_size=8) | st.binary(max_size=8),
+    crc_error=st.integers(1, 255),
+)
+def test_noise_on_the_bus_is_never_a_measurement(can_id: int, data: bytes, crc_error: int) -> None:
+    line = Line()
+    before = line.content()
+    frames = [Frame(can_id, data)]
+    if len(data) == 8:  # of two frames that differ in the CRC alone, one is wrong for certain
+        frames.append(Frame(can_id, bytes([data[0] ^ crc_error]) + data[1:]))
+    unchanged = 0
+    for frame in frames:
+        twin = Line()
+        twin.hear(frame)
+        unchanged += twin.content() == before
+        assert twin.inbox.address_conflict == (can_id in OWN)
+    assert unchanged >= 1 or can_id in OWN
+
+
+def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed() -> None:
+    for port, starboard, closed in (
+        (Switch.OFF, Switch.OFF, False),
+        (Switch.ON, Switch.OFF, True),
+        (Switch.OFF, Switch.ON, True),
+        (None, Switch.OFF, True),
+        (Switch.OFF, None, True),
+    ):
+        for level_m, quality in ((0.0, Quality.GOOD), (NAN, Quality.GOOD), (0.0, Quality.BAD)):
+            line = Line()
+            line.say(SensorTank(level_m, 0.0, port, starboard, quality))
+            assert line.inbox.high_level == closed
+
+
+def test_echo_is_fresh_only_when_it_moves() -> None:
+    line = Line()
+    for echo, fresh in ((None, False), (3, True), (3, False), (4, True), (4, False), (3, True)):
+        before = line.inbox.echo_ns
+        line.say(GOOD[DriveStatus1]._replace(command_echo=echo))  # type: ignore[attr-defined]
+        assert (line.inbox.echo_ns != before) == fresh
+        assert line.inbox.drive_ns == line.now_ns
+
+
+def test_versions_match_only_when_drive_and_sensors_both_say_so() -> None:
+    line = Line()
+    assert not line.inbox.versions_match
+    line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
+    assert not line.inbox.versions_match
+    line.beat(Address.SENSORS, CATALOGUE.version ^ 1, VERSION)
+    assert not line.inbox.versions_match
+    line = Line()
+    line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
+    line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
+    assert line.inbox.versions_match
+
+
+def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None:
+    line = Line()
+    line.say(GOOD[DriveStatus1]._replace(state=None))  # type: ignore[attr-defined]
+    line.say(GOOD[DriveStatus2]._replace(fault=None))  # type: ignore[attr-defined]
+    assert line.inbox.drive_state is None
+    assert line.inbox.drive_fault is None
+
+
+def test_a_mode_nobody_asked_for_is_standby() -> None:
+    line = Line()
+    assert line.inbox.requested_mode() is Mode.STANDBY
+    line.say(OperatorCommand(None, True, False, False, False))
+    assert line.inbox.requested_mode() is Mode.STANDBY

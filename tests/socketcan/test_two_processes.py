@@ -1,0 +1,241 @@
+"""The deployed controller and the ship's side in two processes on a real SocketCAN interface."""
+
+import signal
+import time
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from two_processes import (
+    CHANNEL,
+    Candump,
+    Logged,
+    Program,
+    Watcher,
+    patient_controller,
+    running,
+    set_link,
+)
+
+from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
+from utank_hil.telemetry import read_recording
+
+pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+
+STORM = Path("configs/scenarios/storm.yaml")
+TIMEOUT_S = 0.05
+
+
+def ship_program(folder: Path) -> Program:
+    return Program(folder, "firmware-sim", STORM, "--bus", CHANNEL, "--duration", 1200, "--json")
+
+
+def controller_program(folder: Path, out: Path) -> Program:
+    config = patient_controller(folder)
+    return Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, "--out", out, "--json")
+
+
+@dataclass
+class Story:
+    """What happened on the bus, and what the programs left behind."""
+
+    log: list[Logged] = field(default_factory=list)
+    recordings: list[dict[str, np.ndarray]] = field(default_factory=list)
+    reports: list[dict[str, object]] = field(default_factory=list)
+    statuses_after_restart: int = 0
+    killed_states: set[DriveState | None] = field(default_factory=set)
+
+    def of(self, name: str) -> list[Logged]:
+        return [frame for frame in self.log if frame.name == name]
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
+    return tell_story(tmp_path_factory.mktemp("story"))
+
+
+def tell_story(folder: Path) -> Story:
+    """Arm, drive for a while, kill the controller, restart it, end both."""
+    told = Story()
+    again = folder / "again"
+    again.mkdir()
+    candump, watcher = Candump(folder), Watcher()
+    try:
+        with running(ship_program(folder)) as ship:
+            watcher.wait(lambda w: w.drive is not None)
+            with running(controller_program(folder, folder / "first")) as controller:
+                watcher.wait_for_mode(Mode.ACTIVE)
+                watcher.wait(lambda w: w.drive is not None and abs(w.drive.pressure_pa) > 15e3)
+                controller.signal(signal.SIGKILL)
+            watcher.forget()
+            watcher.watch(1.0)
+            assert watcher.drive is not None
+            told.killed_states = {watcher.drive.state}
+            with running(controller_program(again, folder / "second")) as controller:
+                watcher.wait(lambda w: w.statuses >= 50)  # five seconds of it
+                told.statuses_after_restart = watcher.statuses
+                told.reports.append(controller.end()[0])
+            told.reports.append(ship.end()[0])
+        told.log = candump.stop()
+        for name in ("first", "second"):
+            told.recordings.append(read_recording(folder / name / "run.rrd")["live"])
+    finally:
+        watcher.close()
+        candump.stop()
+    return told
+
+
+def test_every_frame_decodes_with_the_dbc_to_values_within_its_ranges(story: Story) -> None:
+    names = {frame.name for frame in story.log}
+    assert names >= {
+        "PUMP_CMD", "DRIVE_STATUS_1", "DRIVE_STATUS_2", "SENSOR_MOTION", "SENSOR_TANK",
+        "SENSOR_PUMP", "CTRL_STATUS", "OPERATOR_CMD", "HEARTBEAT_CONTROLLER", "HEARTBEAT_DRIVE",
+        "HEARTBEAT_SENSORS", "HEARTBEAT_OPERATOR", "ADDRESS_CLAIM_CONTROLLER",
+    }  # fmt: skip
+    assert len(story.of("SENSOR_MOTION")) > 1500
+    for frame in story.of("SENSOR_MOTION"):
+        assert abs(frame.signals["roll_rad"]) < 0.2
+        assert abs(frame.signals["roll_rate_rad_s"]) < 0.2
+        assert frame.signals["quality"] == 0
+    for frame in story.of("SENSOR_TANK"):
+        assert abs(frame.signals["starboard_level_m"] + frame.signals["port_level_m"]) < 0.1
+    for frame in story.of("PUMP_CMD"):
+        assert abs(frame.signals["pressure_pa"]) <= 50e3
+        assert frame.signals["timeout_s"] == TIMEOUT_S
+        assert frame.signals["control_word"] in set(ControlWord)
+    # the roll of one ship, not of many: it moves by its own rate
+    rolls = np.array([[f.time_s, f.signals["roll_rad"]] for f in story.of("SENSOR_MOTION")])
+    assert np.abs(np.diff(rolls[:, 1])).max() < 0.03
+
+
+def test_pressure_flows_once_the_controller_is_in_charge(story: Story) -> None:
+    modes = [frame.signals["mode"] for frame in story.of("CTRL_STATUS")]
+    assert Mode.ACTIVE in modes
+    assert max(abs(frame.signals["pressure_pa"]) for frame in story.of("PUMP_CMD")) > 15e3
+    assert max(abs(frame.signals["pressure_pa"]) for frame in story.of("SENSOR_PUMP")) > 15e3
+    armed_s = next(f.time_s for f in story.of("OPERATOR_CMD") if f.signals["arm"])
+    for frame in story.of("PUMP_CMD"):
+        if frame.time_s < armed_s:
+            assert frame.signals["pressure_pa"] == 0.0
+
+
+def restart_s(story: Story) -> float:
+    """When the second controller first spoke, after the longest pause between two commands."""
+    assert len(story.of("ADDRESS_CLAIM_CONTROLLER")) == 2
+    times = [frame.time_s for frame in story.of("PUMP_CMD")]
+    pause_s, second_s = max((later - earlier, later) for earlier, later in pairwise(times))
+    assert pause_s > 1.0
+    return second_s
+
+
+def test_commands_on_the_bus_are_those_in_the_controllers_telemetry(story: Story) -> None:
+    commands = [f for f in story.of("PUMP_CMD") if f.time_s < restart_s(story)]
+    on_bus = np.array([frame.signals["pressure_pa"] for frame in commands])
+    # a command leaves at every other tick; a killed recorder lacks the last rows
+    shown = story.recordings[0]["pressure_command_pa"][::2]
+    assert len(shown) > 150
+    assert 0 <= len(on_bus) - len(shown) < 100
+    np.testing.assert_allclose(on_bus[: len(shown)], shown, rtol=0, atol=4.0 + 1e-6)
+
+
+def test_killed_controllers_drive_is_at_zero_within_100_ms_of_its_last_command(
+    story: Story,
+) -> None:
+    last_s = max(f.time_s for f in story.of("PUMP_CMD") if f.time_s < restart_s(story))
+    states = [(f.time_s, f.signals["state"]) for f in story.of("DRIVE_STATUS_1")]
+    before = [state for time_s, state in states if time_s <= last_s]
+    assert before[-1] == DriveState.OPERATION_ENABLED
+    off_s = next(t for t, state in states if t > last_s and state != DriveState.OPERATION_ENABLED)
+    print(f"drive off {1e3 * (off_s - last_s):.1f} ms after the last command")
+    # were the drive's process held up by the machine, its 10 ms messages would be too
+    ticks = [f.time_s for f in story.of("SENSOR_MOTION") if last_s - 0.1 <= f.time_s <= off_s]
+    held_up_s = max(later - earlier for earlier, later in pairwise(ticks)) - 0.01
+    print(f"ship's process held up by {1e3 * held_up_s:.1f} ms meanwhile")
+    assert TIMEOUT_S - 0.01 < off_s - last_s <= 0.1 + max(held_up_s - 0.02, 0.0)
+    after = {state for time_s, state in states if time_s >= off_s}
+    assert after == {DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT}
+    assert story.killed_states == {DriveState.FAULT}
+    pressures = [(f.time_s - off_s, f.signals["pressure_pa"]) for f in story.of("SENSOR_PUMP")]
+    at_trip = next(abs(p) for t, p in pressures if t >= 0)
+    for wait_s in (0.1, 0.2, 0.5):
+        left = next(abs(p) for t, p in pressures if t >= wait_s)
+        print(f"pressure {wait_s} s after: {left:.0f} of {at_trip:.0f} Pa")
+    assert next(abs(p) for t, p in pressures if t >= 0.5) < 0.4 * at_trip
+
+
+def test_restarted_controller_waits_in_standby_for_the_operator(story: Story) -> None:
+    since_s = restart_s(story)
+    assert story.of("OPERATOR_CMD")[-1].signals["arm"]  # the panel still holds it
+    modes = {f.signals["mode"] for f in story.of("CTRL_STATUS") if f.time_s >= since_s}
+    assert story.statuses_after_restart >= 50
+    assert Mode.STANDBY in modes
+    assert modes <= {Mode.INIT, Mode.STANDBY}
+    commands = [f.signals for f in story.of("PUMP_CMD") if f.time_s >= since_s]
+    assert {signals["pressure_pa"] for signals in commands} == {0.0}
+    enabling = {ControlWord.SWITCH_ON, ControlWord.ENABLE_OPERATION, ControlWord.FAULT_RESET}
+    assert not {signals["control_word"] for signals in commands} & enabling
+
+
+def test_both_end_cleanly_with_the_pump_at_zero_and_readable_recordings(story: Story) -> None:
+    last = story.of("PUMP_CMD")[-1].signals
+    assert last["pressure_pa"] == 0.0
+    assert last["control_word"] in (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE)
+    controller, ship = story.reports
+    assert controller["mode"] == "STANDBY"
+    assert ship["refused_commands"] == 0
+    loop = controller["loop"]
+    assert isinstance(loop, dict)
+    assert loop["send_errors"] == loop["receive_errors"] == 0
+    killed, ended = story.recordings
+    assert killed["mode"][-1] == Mode.ACTIVE
+    assert ended["mode"][-1] == Mode.STANDBY
+    for recording in (killed, ended):
+        assert (np.diff(recording["time_s"]) > 0).all()
+        assert recording["time_s"][-1] > 3.0
+
+
+def test_counters_step_by_one_so_nothing_was_lost(story: Story) -> None:
+    for name in ("SENSOR_MOTION", "SENSOR_TANK", "DRIVE_STATUS_1"):
+        counters = [int(frame.signals["counter"]) for frame in story.of(name)]
+        assert {(b - a) % 16 for a, b in pairwise(counters)} == {1}
+
+
+def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
+    """Interface down for half a second under an armed controller; its report and recording."""
+    watcher = Watcher()
+    (folder / "ship").mkdir()
+    try:
+        with (
+            running(ship_program(folder / "ship")) as ship,
+            running(controller_program(folder, folder / "out")) as controller,
+        ):
+            watcher.wait_for_mode(Mode.ACTIVE)
+            set_link(up=False)
+            time.sleep(0.5)
+            set_link(up=True)
+            watcher.forget()
+            watcher.wait_for_mode(Mode.FAULT)
+            watcher.watch(2.0)  # the link is back, arming is not
+            assert watcher.status is not None
+            assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
+            assert watcher.drive is not None
+            assert watcher.drive.state is DriveState.FAULT
+            report, _ = controller.end()
+            ship.end()
+    finally:
+        set_link(up=True)
+        watcher.close()
+    return report, folder / "out" / "run.rrd"
+
+
+def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(
+    tmp_path: Path,
+) -> None:
+    report, file = take_the_link_down(tmp_path)
+    assert (report["mode"], report["fault"]) == ("FAULT", "BUS_LOST")
+    recording = read_recording(file)["live"]
+    faulted = recording["mode"] == Mode.FAULT
+    assert faulted.any()
+    assert (recording["pressure_command_pa"][faulted] == 0.0).all()

@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.telemetry.table import Table
+
+
+@given(
+    promised=st.integers(0, 60),
+    offered=st.integers(0, 90),
+    every=st.integers(1, 7),
+)
+def test_every_nth_row_is_kept_and_nothing_beyond_the_promised_length(
+    promised: int, offered: int, every: int
+) -> None:
+    table = Table(2, promised, every)
+    row = np.zeros(2)
+    for index in range(offered):
+        row[:] = index, -index
+        table.write(row)
+    expected = np.array([(i, -i) for i in range(0, min(offered, promised), every)])
+    np.testing.assert_array_equal(table.rows, expected.reshape(-1, 2))
+
+
+def test_rows_are_copied_and_of_the_tables_width() -> None:
+    table = Table(3, 2)
+    row = np.ones(3)
+    table.write(row)
+    row[:] = 7.0
+    assert table.rows.tolist() == [[1.0, 1.0, 1.0]]
+    with pytest.raises(ValueError, match="shape"):
+        table.write(np.ones(4))

@@ -1,0 +1,243 @@
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from firmware_sim.cli import app as ship_app
+from utank_hil.cli import app
+from utank_hil.telemetry import read_recording
+
+CONFIGS = Path("configs").resolve()
+SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
+BIN = Path(sys.executable).parent
+PLAIN = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
+
+
+def invoke(application: typer.Typer, *arguments: object):
+    return CliRunner(env=PLAIN).invoke(application, [str(argument) for argument in arguments])
+
+
+def said(result) -> str:
+    """Text without the lines and boxes that the help is framed in."""
+    return re.sub(r"[\s│]+", " ", result.output)
+
+
+def commands() -> list[tuple[typer.Typer, tuple[str, ...], str]]:
+    names = [command.name or command.callback.__name__ for command in app.registered_commands]
+    return [
+        (ship_app, (), "firmware-sim"),
+        *((app, (name,), f"utank-hil {name}") for name in names),
+    ]
+
+
+@pytest.mark.parametrize(("application", "words", "name"), commands(), ids=lambda v: str(v)[:20])
+def test_help_of_every_command_has_an_example_that_parses(application, words, name: str) -> None:
+    result = invoke(application, *words, "--help")
+    assert result.exit_code == 0
+    example = re.search(rf"Example: ({re.escape(name)} [^│]*?)(?= {{2}}| In real time|$| ╭|\n)",
+                        said(result).split("╭")[0])  # fmt: skip
+    assert example, said(result)
+    for word in example[1].split():
+        if word.startswith("configs/"):
+            assert Path(word).is_file()
+        if word.startswith("--"):
+            assert word in said(result).replace(example[0], "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_controllers_pass_their_check(path: Path) -> None:
+    result = invoke(app, "check", path, "--json")
+    assert result.exit_code == 0
+    report = json.loads(result.stdout)
+    assert report["accepted"]
+    assert report["failures"] == []
+    assert report["robustness"]["nominal"]["peak_sensitivity"] <= 2.0
+
+
+def controller_file(folder: Path, changes: str = "", law: str = "{kind: passive}") -> Path:
+    path = folder / "controller.yaml"
+    vessel = CONFIGS / "ships" / "thesis_first.yaml"
+    path.write_text(f"name: test\nvessel: {vessel}\nlaw: {law}\n{changes}", encoding="utf-8")
+    return path
+
+
+def test_check_lists_every_error_with_file_key_and_reason(tmp_path: Path) -> None:
+    ship = tmp_path / "ship.yaml"
+    good = (CONFIGS / "ships" / "thesis_first.yaml").read_text()
+    painted = good.replace("lag_s: 0.1", "lag_s: 0.1\n  colour: red")
+    ship.write_text(painted.replace("width_m: 17.1", "width_m: wide"))
+    path = tmp_path / "controller.yaml"
+    path.write_text(
+        "name: test\nvessel: ship.yaml\nlaw: {kind: gpc, control_horizon: many}\n"
+        "bit_rate: -5\nsafety: {roll_limit: 3}\nname_of_captain: nobody\n"
+    )
+    result = invoke(app, "check", path)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    errors = re.sub(r"\s+", " ", result.stderr)
+    for place in (
+        f"{ship}: tank.width_m: ",
+        f"{ship}: pump.colour: is not a known key",
+        f"{path}: law.predictor: is required but missing",
+        f"{path}: law.control_horizon: ",
+        f"{path}: bit_rate: ",
+        f"{path}: safety.roll_limit: is not a known key",
+        f"{path}: name_of_captain: is not a known key",
+    ):
+        assert place in errors
+    assert errors.count("error:") == result.stderr.count("error:") >= 7
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ("limits: {pressure_pa: 60000.0}", "the vessel's pump gives 50000 at most"),
+        ("limits: {level_m: 6.0}", "the vessel's tank is full or empty at 4.88"),
+        ("safety: {motion_age_ms: -1.0}", "motion_age_ms must be positive"),
+        ("safety: {motion_age_ms: .inf}", "finite"),
+        ("safety: {bus_load_limit: 80.0}", "bus_load_limit must be 1 at most"),
+        ("command_timeout_ms: 500", "100"),
+        ("bit_rate: '[/oops] [red]'", "[/oops] [red]"),
+    ],
+)
+def test_check_refuses_what_can_not_be_meant(tmp_path: Path, changes: str, reason: str) -> None:
+    result = invoke(app, "check", controller_file(tmp_path, changes))
+    assert result.exit_code == 2
+    assert reason in re.sub(r"\s+", " ", result.stderr)
+
+
+def test_check_of_the_passive_tank_has_no_margins(tmp_path: Path) -> None:
+    path = controller_file(tmp_path)
+    result = invoke(app, "check", path, "--json")
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["robustness"] is None
+    assert "no margins" in invoke(app, "check", path).stdout
+
+
+FRAGILE = (
+    "{kind: gpc, predictor: {measured: [roll_rad], measurement_std: [1.0e-6], order: 4, "
+    "wave_peak_rad_s: 0.6, wave_damping_ratio: 0.1, wave_slope_rad: 0.05, "
+    "pressure_noise_pa_rt_s: 1.0e-3}, control_horizon: 50, prediction_horizon: 50, "
+    "output_weight: [1.0e+16]}"
+)
+
+
+def test_law_without_margins_is_refused_unless_the_configuration_accepts_it(tmp_path: Path) -> None:
+    refused = invoke(app, "check", controller_file(tmp_path, law=FRAGILE), "--json")
+    assert refused.exit_code == 1
+    report = json.loads(refused.stdout)
+    assert report["failures"]
+    assert not report["accepted"]
+    path = controller_file(tmp_path, "accept_low_margins: true\n", law=FRAGILE)
+    accepted = invoke(app, "check", path)
+    assert accepted.exit_code == 0
+    assert "missed: " in accepted.stdout
+    assert "accepted by the configuration" in accepted.stdout
+
+
+def test_controller_without_margins_does_not_run(tmp_path: Path) -> None:
+    path = controller_file(tmp_path, law=FRAGILE)
+    result = invoke(app, "run", path, "--bus", "nowhere0")
+    assert result.exit_code == 2
+    assert "misses its margins" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("application", "arguments"),
+    [
+        (app, ("run", CONFIGS / "controllers" / "gpc.yaml", "--bus", "nowhere0")),
+        (app, ("panel", CONFIGS / "ships" / "thesis_first.yaml", "--bus", "nowhere0")),
+        (ship_app, (CONFIGS / "scenarios" / "storm.yaml", "--bus", "nowhere0")),
+    ],
+)
+def test_missing_interface_is_named_and_ends_with_code_2(application, arguments) -> None:
+    result = invoke(application, *arguments, *(() if "panel" in arguments else ("--json",)))
+    assert result.exit_code == 2
+    assert "nowhere0" in result.stderr
+    assert result.stdout == ""
+    assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("bench", "--bus", "vcan0"),
+        ("bench", "nowhere.yaml"),
+        ("bench", "--duration", "-3"),
+        ("check",),
+        ("check", "nowhere.yaml"),
+        ("conquer",),
+    ],
+)
+def test_wrong_use_ends_with_code_2_and_an_error(arguments: tuple[str, ...]) -> None:
+    result = invoke(app, *arguments)
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    assert re.search("error", result.stderr, re.IGNORECASE) or "Usage" in result.stderr
+
+
+def bench_process(*arguments: str) -> subprocess.Popen[str]:
+    """The command in a process group of its own, as a terminal would start it."""
+    return subprocess.Popen(
+        [BIN / "utank-hil", "bench", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for_workers(process: subprocess.Popen[str], cpu_s: float) -> None:
+    """Wait until the bench's processes have computed for so long."""
+    deadline = time.monotonic() + 120
+    tasks = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    used_s = -1.0
+    while used_s < cpu_s:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+        used_s = -1.0
+        for child in tasks.read_text().split():
+            try:
+                fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
+            except OSError:
+                continue
+            ticks = int(fields[11]) + int(fields[12])
+            used_s = max(used_s, ticks / os.sysconf("SC_CLK_TCK"))
+
+
+def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
+    tmp_path: Path,
+) -> None:
+    with bench_process("--duration", "36000", "--out", str(tmp_path), "--json") as process:
+        wait_for_workers(process, 6.0)
+        os.killpg(process.pid, signal.SIGINT)
+        output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
+    report = json.loads(output)
+    assert 0 < report["duration_s"] < 36000
+    recording = read_recording(tmp_path / "bench.rrd")
+    assert set(recording) <= {"passive", "gpc", "dpc"}
+    assert recording["passive"]["time_s"][-1] <= report["duration_s"]
+
+
+@pytest.mark.slow
+def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
+    with bench_process("--duration", "36000", "--out", str(tmp_path / "out")) as process:
+        wait_for_workers(process, 0.0)  # as soon as there is one
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 2
+    assert "Traceback" not in errors
+    assert "ended before the first sample" in errors
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,76 @@
+"""``utank-hil identify`` from a recording to a configuration, as a user runs it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.arrays import FloatArray
+from utank_hil.cli import app
+from utank_hil.config import ControllerConfig
+from utank_hil.config_files import load_config
+from utank_hil.control import pump_model
+from utank_hil.dynamics import RollShip
+from utank_hil.dynamics.sampling import sample
+from utank_hil.identification import random_pulses
+from utank_hil.telemetry import write_recording
+
+CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
+COLUMNS = ("time_s", "roll_rad", "port_level_m", "starboard_level_m", "pressure_command_pa")
+
+
+def _rows(period_s: float, duration_s: float = 300.0) -> FloatArray:
+    """20 Hz telemetry of a ship pushed by pulses in still water."""
+    config = load_config(CONFIG, ControllerConfig)
+    configured, tank = config.vessel.ship, config.vessel.tank
+    stiffness = configured.inertia_kg_m2 * (2 * np.pi / period_s) ** 2
+    ship = RollShip(configured.inertia_kg_m2, stiffness, configured.damping_nms_rad)
+    plant = sample(pump_model(ship, tank, ("roll_rad", "level_m")), 0.2, 0.05, 0.1)
+    pulses = random_pulses(duration_s, config.limits, 1)
+    state, y = np.zeros(len(plant.A)), np.zeros((len(pulses), 2))
+    for k, pressure_pa in enumerate(pulses):
+        y[k] = plant.C @ state + plant.D[:, 0] * pressure_pa
+        state = plant.A @ state + plant.B[:, 0] * pressure_pa
+    y += np.random.default_rng(1).standard_normal(y.shape) * [2e-4, 3.5e-3]
+    time_s = 0.05 * np.arange(4 * len(pulses))
+    seen = np.repeat(y, 4, axis=0)
+    # the command of sample k left in the 0.2 s before it
+    command = np.repeat(np.append(pulses[1:], 0.0), 4)
+    return np.column_stack([time_s, seen[:, 0], -seen[:, 1], seen[:, 1], command])
+
+
+def _identify(tmp_path: Path, period_s: float) -> tuple[int, dict[str, object]]:
+    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(period_s)})
+    arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--out", str(tmp_path / "out"), "--json"]
+    result = CliRunner().invoke(app, ["identify", *arguments, "--order", "60"])
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    return result.exit_code, json.loads(result.stdout)
+
+
+def test_recording_becomes_a_model_a_picture_and_a_configuration(tmp_path: Path) -> None:
+    code, figures = _identify(tmp_path, 9.0)
+    assert code == 0, figures
+    assert figures["accepted"] is True
+    assert figures["roll_period_s"] == pytest.approx(9.0, rel=0.01)
+    assert (tmp_path / "out" / "identification.png").stat().st_size > 10_000
+    config = load_config(tmp_path / "out" / "identified_controller.yaml", ControllerConfig)
+    given = load_config(CONFIG, ControllerConfig)
+    assert config.law == given.law
+    assert config.vessel.version != given.vessel.version
+    assert config.vessel.ship.natural_frequency_rad_s == pytest.approx(2 * np.pi / 9.0, rel=0.01)
+
+
+def test_refused_model_leaves_reasons_and_no_configuration(tmp_path: Path) -> None:
+    code, figures = _identify(tmp_path, 4.0)
+    assert code == 1
+    assert figures["accepted"] is False
+    assert figures["reasons"]
+    assert not (tmp_path / "out" / "identified_controller.yaml").exists()
+
+
+def test_file_that_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
+    (tmp_path / "log.rrd").write_bytes(b"not a recording")
+    result = CliRunner().invoke(app, ["identify", str(tmp_path / "log.rrd"), str(CONFIG)])
+    assert result.exit_code == 2

@@ -1,0 +1,167 @@
+"""The ship and tank behind an identified model, by what is known of their physics.
+
+In a storm the waves move the ship ten times as much as the pump does, and what is realized from a
+high-order ARX model alone is tens of per cent off. But the form of the model is known
+(`utank_hil.dynamics.linear`), and loading changes few of its numbers. With A(q) y = B(q) u + e from
+OKID and G(q, theta) the sampled ship and tank::
+
+    min over theta = log (I, k1, d1, tank damping ratio):
+        sum over w of |L (B - A G(theta))|^2 Phi_u + sum (theta / sigma)^2,   L^T L = cov(e)^-1
+
+These are the prediction errors of G(theta) with 1 / A for the spectrum of the waves, so the fit
+looks where the pump can be told from the sea (Wahlberg 1989; Ljung, System Identification, 10.4).
+Where it cannot be told, the given ship's numbers stand. When the misfit is larger than the errors
+explain, they are taken to be as much larger.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.ship_design import pump_model
+from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.identification.errors import IdentificationError
+from utank_hil.identification.okid import OkidResult
+
+_BAND_RAD_S = 2.5  # above it neither ship nor tank move
+_LINES = 64  # in the band; an ARX model of order 120 resolves no more
+_SPREAD = np.array([0.1, 0.7, 0.5, 0.2])  # sigma: how far loading changes each number
+_STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # stiffness to begin with
+_PASSES = 5
+_SETTLED = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShipFit:
+    """Ship and tank of a record.
+
+    Attributes
+    ----------
+    ship : RollShip
+        The given one with inertia, stiffness and linear damping of the record.
+    tank : Tank
+        The given one with the damping ratio of the record.
+    deviation : ndarray, shape (4,)
+        Standard deviations of inertia, stiffness, ship damping and tank damping ratio, each as a
+        part of its value.
+    period_deviation : float
+        Standard deviation of the ship's roll period, as a part of it.
+    dispersion : float
+        Root mean square of the misfit over what the prediction errors explain.
+    """
+
+    ship: RollShip
+    tank: Tank
+    deviation: FloatArray
+    period_deviation: float
+    dispersion: float
+
+
+def fit_ship(
+    result: OkidResult,
+    u: FloatArray,
+    ship: RollShip,
+    tank: Tank,
+    measured: tuple[str, ...],
+    delay_s: float = 0.05,
+    lag_s: float = 0.1,
+) -> ShipFit:
+    """Fit ship and tank to what OKID found.
+
+    Parameters
+    ----------
+    result : OkidResult
+        One input.
+    u : array_like, shape (N,)
+        The input it was found with, gaps included.
+    ship, tank : RollShip, Tank
+        To begin with; what is not fitted is theirs.
+    measured : tuple of str
+        Outputs of the model, by their names in `utank_hil.dynamics.linear.STATES`.
+    delay_s, lag_s : float
+        As in `utank_hil.dynamics.sampled_model`.
+
+    Returns
+    -------
+    ShipFit
+
+    Raises
+    ------
+    ValueError
+        If outputs or inputs do not fit the model.
+    IdentificationError
+        If no ship can be fitted.
+    """
+    arx = result.arx
+    if (arx.outputs, arx.inputs) != (len(measured), 1):
+        raise ValueError(
+            f"the model must have one input and the outputs {measured}, it has {arx.inputs} and "
+            f"{arx.outputs}"
+        )
+    lines = (np.arange(_LINES) + 0.5) * _BAND_RAD_S / _LINES
+    z = np.exp(1j * lines * arx.sample_time_s)
+    powers = z[:, None] ** -np.arange(arx.order + 1)
+    left = np.eye(arx.outputs) - np.einsum("wi,iab->wab", powers[:, 1:], arx.alpha)
+    right = np.einsum("wi,iab->wab", powers, arx.beta)
+    amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), arx.sample_time_s)
+
+    def changed(theta: FloatArray) -> tuple[RollShip, Tank]:
+        factor = np.exp(theta).tolist()
+        return (
+            dataclasses.replace(
+                ship,
+                inertia_kg_m2=ship.inertia_kg_m2 * factor[0],
+                stiffness_nm_rad=ship.stiffness_nm_rad * factor[1],
+                damping_nms_rad=ship.damping_nms_rad * factor[2],
+            ),
+            dataclasses.replace(tank, damping_ratio=tank.damping_ratio * factor[3]),
+        )
+
+    def response(theta: FloatArray) -> ComplexArray:
+        plant = sample(pump_model(*changed(theta), measured), arx.sample_time_s, delay_s, lag_s)
+        resolvent = z[:, None, None] * np.eye(len(plant.A)) - plant.A
+        found: ComplexArray = plant.C @ np.linalg.solve(resolvent, plant.B + 0j)
+        return found + plant.D
+
+    def misfit(theta: FloatArray, weight: FloatArray) -> FloatArray:
+        errors = weight @ (right - left @ response(theta)) * amplitude[:, None, None]
+        return np.concatenate([errors.real.ravel(), errors.imag.ravel(), theta / _SPREAD])
+
+    try:
+        weight = np.linalg.cholesky(np.linalg.inv(result.residual_covariance)).T
+        starts = [np.array([0.0, start, 0.0, 0.0]) for start in _STARTS]
+        theta = min(starts, key=lambda start: float(np.sum(misfit(start, weight) ** 2)))
+        dispersion = 1.0
+        for _ in range(_PASSES):
+            solution = least_squares(misfit, theta, x_scale=_SPREAD, args=(weight / dispersion,))
+            theta = solution.x
+            excess = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
+            dispersion = max(1.0, dispersion * excess)
+            if abs(excess - 1) < _SETTLED or dispersion == 1:
+                break
+        covariance = np.linalg.inv(solution.jac.T @ solution.jac)
+    except (np.linalg.LinAlgError, ValueError) as error:  # overflow on the way, or singular
+        raise IdentificationError(f"no ship fits the identified model: {error}") from None
+    of_period = np.array([0.5, -0.5, 0.0, 0.0])
+    return ShipFit(
+        *changed(theta),
+        np.sqrt(covariance.diagonal()),
+        float(np.sqrt(of_period @ covariance @ of_period)),
+        dispersion,
+    )
+
+
+def _amplitude(u: FloatArray, sample_time_s: float) -> FloatArray:
+    """Root of the input's energy in each line's band, negative frequencies too; shape (_LINES,)."""
+    here = np.isfinite(u)
+    energy = 2 * np.abs(np.fft.rfft(np.where(here, u - u[here].mean(), 0.0))) ** 2 / len(u)
+    frequency = 2 * np.pi * np.fft.rfftfreq(len(u), sample_time_s)
+    band = np.digitize(frequency, np.linspace(0, _BAND_RAD_S, _LINES + 1)) - 1
+    inside = band < _LINES
+    amplitude: FloatArray = np.sqrt(np.bincount(band[inside], energy[inside], minlength=_LINES))
+    return amplitude

@@ -1,0 +1,66 @@
+"""The latest samples of command and outputs, as the law saw them."""
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+
+
+class SampleHistory:
+    """Rows (command, outputs...), oldest first, the newest `capacity` of them.
+
+    Rows lie in a buffer of twice the capacity, so that the latest are always one piece of memory;
+    every `capacity` samples they are moved to its front.
+
+    Parameters
+    ----------
+    capacity : int
+    outputs : int
+
+    Attributes
+    ----------
+    outputs : int
+    count : int
+        Samples taken so far.
+    """
+
+    def __init__(self, capacity: int, outputs: int) -> None:
+        self._capacity = capacity
+        self.outputs = outputs
+        self._rows = np.zeros((2 * capacity, 1 + outputs))
+        self._fresh = np.zeros(2 * capacity, dtype=np.bool_)
+        self._end = 0
+        self.count = 0
+
+    def add(self, command_pa: float, y: FloatArray, *, fresh: bool) -> None:
+        """Take a sample.
+
+        Parameters
+        ----------
+        command_pa : float
+            Mean command since the sample before.
+        y : ndarray, shape (m,)
+            Outputs, held from before if nothing was measured.
+        fresh : bool
+            Whether it was measured.
+        """
+        if self._end == len(self._rows):
+            kept = self._capacity - 1
+            self._rows[:kept] = self._rows[self._end - kept :]
+            self._fresh[:kept] = self._fresh[self._end - kept :]
+            self._end = kept
+        row = self._rows[self._end]
+        row[0] = command_pa
+        row[1:] = y
+        self._fresh[self._end] = fresh
+        self._end += 1
+        self.count += 1
+
+    def latest(self, samples: int) -> FloatArray:
+        """The latest rows, at most `samples`; a view, good until the next `add`."""
+        return self._rows[max(0, self._end - min(samples, self._capacity)) : self._end]
+
+    def record(self, samples: int) -> FloatArray:
+        """The latest rows, at most `samples`, with gaps as NaN; a copy."""
+        rows = self.latest(samples).copy()
+        rows[~self._fresh[self._end - len(rows) : self._end], 1:] = np.nan
+        return rows
