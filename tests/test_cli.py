@@ -30,11 +30,17 @@ def said(result) -> str:
     return re.sub(r"[\s│]+", " ", result.output)
 
 
+def names(application: typer.Typer) -> list[str]:
+    return [c.name or c.callback.__name__ for c in application.registered_commands]
+
+
 def commands() -> list[tuple[typer.Typer, tuple[str, ...], str]]:
-    names = [command.name or command.callback.__name__ for command in app.registered_commands]
+    words = [(name,) for name in names(app)]
+    for group in app.registered_groups:
+        words += [(group.name, name) for name in names(group.typer_instance)]
     return [
         (ship_app, (), "firmware-sim"),
-        *((app, (name,), f"utank-hil {name}") for name in names),
+        *((app, each, " ".join(("utank-hil", *each))) for each in words),
     ]
 
 

@@ -11,6 +11,7 @@ what the machine itself does to the loop.
 
 import argparse
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
     MonotonicClock,
+    Node,
     RealTimeLoop,
     real_time_scheduling,
 )
@@ -35,7 +37,7 @@ from utank_hil.runtime.signals import SIGNALS
 
 SCENARIO = Path(__file__).resolve().parents[1] / "configs" / "scenarios" / "adaptive.yaml"
 CONTROLLER = "gpc-roll"
-ORDERED_S, REAL_TIME_S = 15.0, 15.0
+ORDERED_S, REAL_TIME_S = 15.0, 20.0
 SECOND_NS = 1_000_000_000
 
 
@@ -62,7 +64,7 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
     limits = replace(config.safety, motion_age_ms=90.0, long_overrun_ms=90.0, drive_age_ms=90.0)
     config = config.model_copy(update={"safety": limits})
     assert config.retuning is not None
-    script = (TimedAction(5.0, Action.ARM),)
+    script: tuple[TimedAction, ...] = (TimedAction(5.0, Action.ARM),)
     if retuning:
         script += (TimedAction(ORDERED_S, Action.RETUNE),)
     ship = build_ship_side(scenario, scenario.seed, script)
@@ -76,7 +78,7 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
             statistics=statistics,
             sink=lambda row: rows.append(row[[0, SIGNALS.index("pressure_command_pa")]]),
         )
-        nodes = [*ship.nodes, node]
+        nodes: list[Node] = [*ship.nodes, node]
         lockstep = Lockstep(nodes)
         lockstep.run_until(round((ORDERED_S + config.retuning.identification_s) * SECOND_NS))
         rows.clear()
@@ -85,6 +87,10 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
             loop.run(duration_ns=round(REAL_TIME_S * SECOND_NS))
     told = np.array(rows)
     steepest = np.abs(np.diff(told[:, 1])) / np.maximum(np.diff(told[:, 0]), 1e-9)
+    for event in node.retuning_events:
+        print(
+            f"{event.time_ns / SECOND_NS:8.2f} s", event.state.name, *event.reasons, file=sys.stderr
+        )
     swapped = any(event.state is RetuningState.TRIAL for event in node.retuning_events)
     return swapped, float(steepest.max())
 

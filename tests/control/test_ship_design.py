@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from utank_hil.control import ARX, PredictiveDesign, PredictiveLaw, Predictor, WashoutLaw, wave_arx
-from utank_hil.control.ship_design import _noise_covariance
 from utank_hil.dynamics import RollShip, Tank, coupled_model
-from utank_hil.dynamics.sampling import sampled_model
+from utank_hil.dynamics.sampling import noise_covariance, sampled_model
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
@@ -40,7 +39,7 @@ def test_noise_covariance_is_the_integral_of_the_noise_response():
     responses = [(vectors * np.exp(eigenvalues * t)) @ inverse @ noise for t in times]
     integrand = np.array([(response @ response.T).real for response in responses])
     expected = np.trapezoid(integrand, times, axis=0)
-    np.testing.assert_allclose(_noise_covariance(a, noise, 0.2), expected, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(noise_covariance(a, noise, 0.2), expected, rtol=1e-6, atol=1e-12)
 
 
 def test_predictor_errs_less_in_its_sea_than_one_that_knows_no_waves():

@@ -14,8 +14,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter, PumpLimits
-from utank_hil.control.ship_design import _first_order
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -76,7 +75,8 @@ def passive_motion(
     ndarray, shape (count, 4)
         `STATES` at 0, step_s, 2 step_s, ...
     """
-    a, _, wave = _first_order(ship, tank)
+    a, b = state_matrices(ship, tank)
+    wave = b[:, 1:]
     omega = wave_moment.frequency_rad_s
     resolvent = 1j * omega[:, None, None] * np.eye(len(a)) - a
     answer = np.linalg.solve(resolvent, wave.astype(complex)[None])[:, :, 0]
@@ -138,7 +138,8 @@ def simulate_loop(
     delay_ticks = _ticks("delay_s", delay_s)
     sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
     noise = noise or SensorNoise()
-    a, pressure_effect, _ = _first_order(ship, tank)
+    a, b = state_matrices(ship, tank)
+    pressure_effect = b[:, :1]
     n = len(STATES)
     lagged = np.block([[a, pressure_effect], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
     transition, step = transition_and_step(

@@ -1,6 +1,8 @@
 """Controllers: steppable objects, and the design functions they come from."""
 
 from utank_hil.control.arx import ARX
+from utank_hil.control.constrained_design import ConstrainedDesign
+from utank_hil.control.constrained_gpc import design_constrained_gpc
 from utank_hil.control.defaults import DPC_ROLL_LEVEL, GPC_ROLL
 from utank_hil.control.direct_fuzzy import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
@@ -21,6 +23,7 @@ from utank_hil.control.optimal_tank import (
 from utank_hil.control.passive import PassiveController
 from utank_hil.control.pd import PD_MEASURED, design_pd
 from utank_hil.control.predictive import design_dpc, design_gpc
+from utank_hil.control.sea_model import SeaModel
 from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
 from utank_hil.control.ship_design import PredictiveDesign, Predictor, pump_model, wave_arx
 from utank_hil.control.stimulate import Stimulation
@@ -35,6 +38,7 @@ __all__ = [
     "PD_MEASURED",
     "ClippedValve",
     "CommandLimiter",
+    "ConstrainedDesign",
     "Controller",
     "ErrorDynamics",
     "FeedbackLinearization",
@@ -53,12 +57,14 @@ __all__ = [
     "Predictor",
     "PumpLimits",
     "RobustFuzzy",
+    "SeaModel",
     "ShipTankRatios",
     "SmallGainFuzzy",
     "Stimulation",
     "ValveRange",
     "WashoutController",
     "WashoutLaw",
+    "design_constrained_gpc",
     "design_dpc",
     "design_gpc",
     "design_lqg",

@@ -11,13 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
-from utank_hil.control.ship_design import Predictor, _first_order, _noise_covariance
+from utank_hil.control.ship_design import Predictor, wave_plant
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
@@ -86,43 +84,6 @@ class LQGDesign:
             process,
             np.diag(np.square(self.predictor.measurement_std)),
         )
-
-
-def wave_plant(
-    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
-) -> tuple[LinearModel, FloatArray]:
-    """Sampled model of ship, tank, drive and wave moment, and its process noise.
-
-    Parameters
-    ----------
-    predictor : Predictor
-    ship : RollShip
-    tank : Tank
-    delay_s, lag_s : float
-        As in `sampled_model`.
-
-    Returns
-    -------
-    plant : LinearModel
-        From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
-    process_covariance : ndarray, shape (n, n)
-    """
-    a_ship, pressure, wave = _first_order(ship, tank)
-    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
-    n = len(STATES)
-    a = np.zeros((n + 2, n + 2))
-    a[:n, :n] = a_ship
-    a[:n, n : n + 1] = wave * ship.stiffness_nm_rad * predictor.wave_slope_rad
-    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
-    b = np.vstack([pressure, np.zeros((2, 1))])
-    noise = np.zeros((n + 2, 2))
-    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
-    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
-    model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
-    plant = sample(model, predictor.sample_time_s, delay_s, lag_s)
-    process = np.zeros(plant.A.shape)
-    process[: n + 2, : n + 2] = _noise_covariance(a, noise, predictor.sample_time_s)
-    return plant, process
 
 
 # Found as the predictive defaults were (`utank_hil.control.defaults`), by the linear loop's answer

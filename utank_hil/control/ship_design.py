@@ -22,8 +22,8 @@ from utank_hil.control.interface import LinearLaw
 from utank_hil.control.law import PredictiveLaw
 from utank_hil.control.predictive import design_dpc, design_gpc
 from utank_hil.control.washout import WashoutLaw
-from utank_hil.dynamics.linear import STATES, coupled_matrices
-from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.linear import STATES, state_matrices
+from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
@@ -163,9 +163,47 @@ class PredictiveDesign:
 
 def pump_model(ship: RollShip, tank: Tank, measured: tuple[str, ...]) -> LinearModel:
     """Continuous model from pump pressure to the `measured` outputs, without python-control."""
-    a, b, _ = _first_order(ship, tank)
+    a, b = state_matrices(ship, tank)
     c = np.eye(len(STATES))[[STATES.index(name) for name in measured]]
-    return LinearModel(a, b, c, np.zeros((len(measured), 1)), 0.0)
+    return LinearModel(a, b[:, :1], c, np.zeros((len(measured), 1)), 0.0)
+
+
+def wave_plant(
+    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
+) -> tuple[LinearModel, FloatArray]:
+    """Sampled model of ship, tank, drive and wave moment, and its process noise.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    ship : RollShip
+    tank : Tank
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Returns
+    -------
+    plant : LinearModel
+        From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
+    process_covariance : ndarray, shape (n, n)
+    """
+    a_ship, b_ship = state_matrices(ship, tank)
+    pressure, wave = b_ship[:, :1], b_ship[:, 1:]
+    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
+    n = len(STATES)
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n] = a_ship
+    a[:n, n : n + 1] = wave * ship.stiffness_nm_rad * predictor.wave_slope_rad
+    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
+    b = np.vstack([pressure, np.zeros((2, 1))])
+    noise = np.zeros((n + 2, 2))
+    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
+    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
+    model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
+    plant = sample(model, predictor.sample_time_s, delay_s, lag_s)
+    process = np.zeros(plant.A.shape)
+    process[: n + 2, : n + 2] = noise_covariance(a, noise, predictor.sample_time_s)
+    return plant, process
 
 
 def wave_arx(
@@ -181,47 +219,8 @@ def wave_arx(
     delay_s, lag_s : float
         As in `sampled_model`.
     """
-    pump = pump_model(ship, tank, predictor.measured)
-    wave_input = _first_order(ship, tank)[2]
-    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
-    n = len(STATES)
-    a = np.zeros((n + 2, n + 2))
-    a[:n, :n] = pump.A
-    a[:n, n : n + 1] = wave_input * ship.stiffness_nm_rad * predictor.wave_slope_rad
-    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
-    b = np.vstack([pump.B, np.zeros((2, 1))])
-    c = np.hstack([pump.C, np.zeros((len(pump.C), 2))])
-    noise = np.zeros((n + 2, 2))
-    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
-    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
-    plant = sample(LinearModel(a, b, c, pump.D, 0.0), predictor.sample_time_s, delay_s, lag_s)
-    process = np.zeros(plant.A.shape)
-    process[: n + 2, : n + 2] = _noise_covariance(a, noise, predictor.sample_time_s)
+    plant, process = wave_plant(predictor, ship, tank, delay_s, lag_s)
+    rows = [STATES.index(name) for name in predictor.measured]
     measurement = np.diag(np.square(predictor.measurement_std))
-    return finite_memory_arx(plant, process, measurement, predictor.order)
-
-
-def _first_order(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """State, pressure and wave-moment matrices of `coupled_model`, states in its order."""
-    mass, damping, stiffness = coupled_matrices(ship, tank)
-    inverse = np.linalg.inv(mass)
-    a = np.zeros((4, 4))
-    a[[0, 2], [1, 3]] = 1.0
-    a[np.ix_([1, 3], [0, 2])] = -inverse @ stiffness
-    a[np.ix_([1, 3], [1, 3])] = -inverse @ damping
-    pressure, wave = np.zeros((4, 1)), np.zeros((4, 1))
-    pressure[[1, 3], 0] = inverse @ [0.0, tank.reservoir_area_m2]
-    wave[[1, 3], 0] = inverse @ [1.0, 0.0]
-    return a, pressure, wave
-
-
-def _noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatArray:
-    """Covariance gathered over a time from unit white noise through `noise` (Van Loan 1978)."""
-    from scipy.linalg import expm
-
-    n = len(a)
-    block = np.zeros((2 * n, 2 * n))
-    block[:n, :n], block[:n, n:], block[n:, n:] = -a, noise @ noise.T, a.T
-    whole = expm(block * time_s)
-    covariance: FloatArray = whole[n:, n:].T @ whole[:n, n:]
-    return (covariance + covariance.T) / 2
+    seen = plant._replace(C=plant.C[rows], D=plant.D[rows])
+    return finite_memory_arx(seen, process, measurement, predictor.order)

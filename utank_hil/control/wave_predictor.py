@@ -8,9 +8,8 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.control.ship_design import _first_order, _noise_covariance
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.linear import STATES, state_matrices
+from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
@@ -51,8 +50,8 @@ def sea_plant(
         command), lag and past commands, waves, and last the heel.
     process_covariance : ndarray, shape (n, n)
     """
-    a, pressure, wave = _first_order(ship, tank)
-    slope = wave * ship.stiffness_nm_rad
+    a, b = state_matrices(ship, tank)
+    pressure, slope = b[:, :1], b[:, 1:] * ship.stiffness_nm_rad
     count = len(STATES)
     pump = sample(
         LinearModel(a, pressure, np.eye(count), np.zeros((count, 1)), 0.0),
@@ -79,7 +78,7 @@ def sea_plant(
     noise[:count, 1] = after[:, 0] * noise[heel, 1]
     covariance = noise @ noise.T
     white = np.hstack([pressure * pressure_noise_pa_rt_s, slope * slope_noise_rad_rt_s])
-    covariance[:count, :count] += _noise_covariance(a, white, sample_time_s)
+    covariance[:count, :count] += noise_covariance(a, white, sample_time_s)
     rest = np.zeros((n - inner, 1))
     plant = LinearModel(
         whole,

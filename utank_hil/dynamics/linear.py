@@ -56,6 +56,26 @@ def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray
     return mass, damping, stiffness
 
 
+def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
+    """State and input matrix of `coupled_model`, for processes that do without python-control.
+
+    Returns
+    -------
+    a : ndarray, shape (4, 4)
+        Between `STATES`.
+    b : ndarray, shape (4, 2)
+        From `INPUTS`.
+    """
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    inverse = np.linalg.inv(mass)
+    effort = np.array([[0.0, 1.0], [tank.reservoir_area_m2, 0.0]])
+    # first order in q and q', then sorted into (phi, phi', h, h')
+    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
+    b = np.vstack([np.zeros((2, 2)), inverse @ effort])
+    order = [0, 2, 1, 3]
+    return a[np.ix_(order, order)], b[order]
+
+
 def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
     """Continuous linear model of ship and tank.
 
@@ -71,16 +91,10 @@ def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
     """
     from control import ss  # here, because importing it brings plotting into the process
 
-    mass, damping, stiffness = coupled_matrices(ship, tank)
-    inverse = np.linalg.inv(mass)
-    effort = np.array([[0.0, 1.0], [tank.reservoir_area_m2, 0.0]])
-    # first order in q and q', then sorted into (phi, phi', h, h')
-    a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
-    b = np.vstack([np.zeros((2, 2)), inverse @ effort])
-    order = [0, 2, 1, 3]
+    a, b = state_matrices(ship, tank)
     return ss(
-        a[np.ix_(order, order)],
-        b[order],
+        a,
+        b,
         np.eye(4),
         np.zeros((4, 2)),
         states=list(STATES),

@@ -144,3 +144,29 @@ def _shifted(
         b = np.vstack([np.zeros((states, inputs)), np.eye(inputs)])
         d = np.zeros((c.shape[0], inputs))
     return a, b, c, d
+
+
+def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatArray:
+    """Covariance gathered over a time from continuous white noise of unit density.
+
+    Parameters
+    ----------
+    a : ndarray, shape (n, n)
+        State matrix.
+    noise : ndarray, shape (n, k)
+        How the k noises enter.
+    time_s : float
+
+    References
+    ----------
+    C. F. Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on
+    Automatic Control 23 (1978) 395-404.
+    """
+    from scipy.linalg import expm
+
+    n = len(a)
+    block = np.zeros((2 * n, 2 * n))
+    block[:n, :n], block[:n, n:], block[n:, n:] = -a, noise @ noise.T, a.T
+    whole = expm(block * time_s)
+    covariance: FloatArray = whole[n:, n:].T @ whole[:n, n:]
+    return (covariance + covariance.T) / 2

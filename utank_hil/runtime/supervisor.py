@@ -17,6 +17,7 @@ from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 NEVER_NS = 1 << 62
 """Age of something that was never heard."""
 
+
 class Demand(Enum):
     """What the rest of the tick has to do with the pump pressure."""
 

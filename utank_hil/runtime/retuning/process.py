@@ -9,6 +9,8 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Final, Self
 
@@ -23,6 +25,7 @@ _ANSWER_BYTES: Final = 1 << 20
 _LOOK_S: Final = 0.1
 _NICENESS: Final = 10
 _END_S: Final = 2.0
+_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class RetunerProcess:
@@ -48,7 +51,8 @@ class RetunerProcess:
         self._process = multiprocessing.get_context("spawn").Process(
             target=serve, args=(work, self._orders, self._answers, os.getpid()), daemon=True
         )
-        self._process.start()
+        with _one_thread():
+            self._process.start()
         assert self._process.pid is not None
         self.pid: int = self._process.pid
 
@@ -82,6 +86,25 @@ class RetunerProcess:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Have a process that is started meanwhile compute in one thread.
+
+    Linear algebra spread over all cores takes them from the loop; and on a busy machine its threads,
+    waiting for one another, take twenty times as long.
+    """
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def serve(work: Work, orders: Mailbox, answers: Mailbox, parent_pid: int) -> None:
