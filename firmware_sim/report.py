@@ -131,7 +131,6 @@ def pump_table(result: BenchResult) -> RichTable:
         "power\npeak MW",
         "level\npeak m",
         "bus\nload",
-        "mode at\nthe end",
     )
     for run in figures(result)[1]:
         pump = run.pump
@@ -143,9 +142,17 @@ def pump_table(result: BenchResult) -> RichTable:
             f"{pump.power_peak_w / 1e6:.2f}",
             f"{pump.level_peak_m:.2f}",
             f"{run.bus_load:.1%}",
-            run.mode,
         )
     return table
+
+
+def endings(result: BenchResult) -> list[str]:
+    """What is to be said of how runs ended; nothing where all went as the operator wanted."""
+    return [
+        f"{run.name}: the controller ended in {run.mode}, fault {run.fault}"
+        for run in figures(result)[1]
+        if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name
+    ]
 
 
 def _percent(share: float | None) -> str:

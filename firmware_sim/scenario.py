@@ -16,6 +16,9 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap, load_ndbc
 
+MOST_CONTROLLERS = 7
+"""More runs than these and the passive one can't be told apart in a picture."""
+
 PASSIVE = "passive"
 """Name of the run with the tank alone."""
 
@@ -91,7 +94,9 @@ class Scenario(Section):
     sea: Annotated[MeasuredSea | JonswapSea | RegularSea, Field(discriminator="kind")]
     sensors: SensorErrors = SensorErrors()
     drive: DriveLimits = DriveLimits()
-    controllers: Annotated[dict[str, ControllerConfig], Field(min_length=1)]
+    controllers: Annotated[
+        dict[str, ControllerConfig], Field(min_length=1, max_length=MOST_CONTROLLERS)
+    ]
     operator: tuple[TimedAction, ...]
     """What the operator does in the runs with a controller; in the passive run nobody arms."""
     duration_s: Annotated[float, Field(gt=0)]

@@ -66,7 +66,8 @@ def test_shipped_controllers_pass_their_check(path: Path) -> None:
     report = json.loads(result.stdout)
     assert report["accepted"]
     assert report["failures"] == []
-    assert report["robustness"]["nominal"]["peak_sensitivity"] <= 2.0
+    if report["robustness"] is not None:  # a law that is not linear has none
+        assert report["robustness"]["nominal"]["peak_sensitivity"] <= 2.0
 
 
 def controller_file(folder: Path, changes: str = "", law: str = "{kind: passive}") -> Path:

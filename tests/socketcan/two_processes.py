@@ -46,7 +46,7 @@ def set_link(*, up: bool) -> None:
         fcntl.ioctl(channel, _SET_FLAGS, struct.pack("16sH14x", CHANNEL.encode(), flags))
 
 
-def patient_controller(folder: Path) -> Path:
+def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
     """The shipped GPC with thresholds for a busy machine: these tests judge function, not timing.
 
     A user-mode kernel shares its one processor with whatever the machine does besides; its ticks
@@ -54,6 +54,7 @@ def patient_controller(folder: Path) -> Path:
     """
     content = yaml.safe_load((CONFIGS / "controllers" / "gpc.yaml").read_text())
     content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
+    content["command_timeout_ms"] = command_timeout_ms
     content["safety"] = {
         "overruns_in_ten": 11,
         "long_overrun_ms": 1000,

@@ -54,7 +54,7 @@ def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
 
 
 def test_more_runs_than_colours_are_refused(tmp_path: Path) -> None:
-    for number in (0, 6):
+    for number in (0, len(COLORS) + 1):
         with pytest.raises(ValueError, match=f"got {number}"):
             draw_bench([curve("a", 10.0, 0.1, 5.0)] * number, tmp_path / "a.png", "None")
 

@@ -48,7 +48,7 @@ def bench(
     """
     # the ship's side stands above this package: loaded only where a scenario is needed
     from firmware_sim.bench import BenchOptions, run_bench
-    from firmware_sim.report import as_json, motion_table, pump_table, write_report
+    from firmware_sim.report import as_json, endings, motion_table, pump_table, write_report
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
@@ -84,6 +84,8 @@ def bench(
         console = Console()
         console.print(motion_table(result))
         console.print(pump_table(result))
+        for ending in endings(result):
+            console.print(f"[red]{ending}[/red]")
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:
             console.print(timing_table(loops))

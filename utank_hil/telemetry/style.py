@@ -10,7 +10,16 @@ if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 # Dark grey for the reference, then Okabe and Ito's colours, told apart by colour-blind eyes
-COLORS: Final = ("#555555", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
+COLORS: Final = (
+    "#555555",
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#E69F00",
+    "#000000",
+)
 HIGHLIGHT: Final = "#F0E442"
 STYLE: "Final[dict[RcKeyType, Any]]" = {
     "font.size": 10.0,

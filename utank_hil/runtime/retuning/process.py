@@ -92,8 +92,8 @@ class RetunerProcess:
 def _one_thread() -> Iterator[None]:
     """Have a process that is started meanwhile compute in one thread.
 
-    Linear algebra spread over all cores takes them from the loop; and on a busy machine its threads,
-    waiting for one another, take twenty times as long.
+    Linear algebra spread over all cores takes them from the loop; and on a busy machine its
+    threads wait for one another and take twenty times as long.
     """
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
