@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from utank_hil.telemetry import BenchCurve, draw_bench
+from utank_hil.telemetry.style import COLORS
 
 BLUE = np.array([0x00, 0x72, 0xB2]) / 255
 YELLOW_BAND = np.array([0xF0, 0xE4, 0x42]) / 255 * 0.35 + 0.65
