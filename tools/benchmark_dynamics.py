@@ -22,6 +22,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +142,7 @@ def compare(components: int) -> list[dict[str, Any]]:
     def compiled(duration_s: float) -> FloatArray:
         every = round(duration_s / STEP_S)
         run = simulate(MODEL, duration_s, wave=wave, record_every=every)
-        return run.state[-1]
+        return np.asarray(run.state[-1])
 
     library = build_c()
     ours = error(compiled(span))
@@ -212,7 +213,7 @@ def scaling(ships: list[int], components: int) -> list[dict[str, Any]]:
         simulate_batch(MODEL, STEP_S, initial, wave=wave)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         taken = seconds(
-            lambda d=duration_s, w=wave, i=initial: simulate_batch(MODEL, d, i, wave=w),
+            partial(simulate_batch, MODEL, duration_s, initial, wave=wave),
             2,
         )
         rows.append(

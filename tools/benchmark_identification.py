@@ -79,7 +79,9 @@ def record(
         else:
             storm = load_ndbc(SEAS / "ndbc_41010_2019-02_spectral_density.txt")
             waves = Sea.irregular(storm.at("2019-02-10T05:40"), seed)
-            moment = waves.roll_moment(SHIP.stiffness_nm_rad).at(time_s)
+            moment = waves.roll_moment(SHIP.stiffness_nm_rad).at(
+                np.asarray(time_s, dtype=np.float64)
+            )
         wave = respond(np.zeros(samples), moment)
         y = y + wave * np.std(y[:, 0]) / np.std(wave[:, 0])
     return pressure, y + noise * np.std(y, axis=0) * np.random.default_rng(seed).standard_normal(

@@ -210,8 +210,10 @@ def worst_difference(
 ) -> float:
     """Largest relative difference between the derivation and `tank_wrench`."""
     rng = np.random.default_rng(11)
-    names = (rho, At, Ap, L, H, Lx, Lz, g, h, hd, hdd, u, v, w, p, q, r)
-    names += (ud, vd, wd, pd, qd, rd, sf, cf, st, ct)
+    names = (
+        *(rho, At, Ap, L, H, Lx, Lz, g, h, hd, hdd, u, v, w, p, q, r),
+        *(ud, vd, wd, pd, qd, rd, sf, cf, st, ct),
+    )
     evaluate = sp.lambdify(names, [*force, *moment, residual], "numpy")
     worst = 0.0
     for _ in range(states):
@@ -230,7 +232,10 @@ def worst_difference(
                 np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch),
             )
         )  # fmt: skip
-        values = tank_wrench(tank, level, speed, bend, *motion, roll, pitch)
+        velocity, rate, acceleration, rate_dot = motion
+        values = tank_wrench(
+            tank, level, speed, bend, velocity, rate, acceleration, rate_dot, roll, pitch
+        )
         for ours, theirs in zip(values, np.split(expected, [3, 6]), strict=True):
             error = np.linalg.norm(ours - theirs) / np.linalg.norm(theirs)
             worst = max(worst, float(error))

@@ -56,7 +56,8 @@ def main() -> None:
         rms.setdefault("no tank", []).append(math.degrees(bare.rms_rad))
         for run in runs:
             rms.setdefault(run.name, []).append(math.degrees(run.roll.rms_rad))
-            below.setdefault(run.name, []).append(run.roll_below_passive)
+            if run.roll_below_passive is not None:
+                below.setdefault(run.name, []).append(run.roll_below_passive)
             level.setdefault(run.name, []).append(run.pump.level_peak_m)
     table = Table(title=f"{scenario.name}, {arguments.seeds} seeds, mean ± 95 % of the mean")
     for heading in ("", "roll RMS °", "below passive", "least", "level peak m"):
