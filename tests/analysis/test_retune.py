@@ -129,6 +129,7 @@ KINDS = (
 @example("late", 0.0, 1.0, 7.5)
 @example("scaled", 1.0, 1.0, 10.0)
 @example("infinite", 0.0, 0.0, 7.5)
+@example("holes", 0.7694335699241333, 0.7694335699241333, 10.0)
 @example("saturated", 0.0, 7.6e-308, 7.5)
 def test_any_record_ends_in_a_law_that_is_stable_on_the_real_ship_or_in_a_refusal(
     kind: str, at: float, much: float, period_s: float

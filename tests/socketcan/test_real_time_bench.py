@@ -19,7 +19,7 @@ from utank_hil.telemetry import read_recording
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
-DURATION_S = 40.0
+DURATION_S = 30.0
 ENOUGH_S = 15.0
 ATTEMPTS = 3
 

@@ -15,6 +15,7 @@ from two_processes import (
     Program,
     Watcher,
     patient_controller,
+    persistent,
     running,
     set_link,
 )
@@ -53,7 +54,7 @@ class Story:
 
 @pytest.fixture(scope="module")
 def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
-    return tell_story(tmp_path_factory.mktemp("story"))
+    return persistent(tell_story, tmp_path_factory.mktemp("story"))
 
 
 def tell_story(folder: Path) -> Story:
@@ -66,8 +67,7 @@ def tell_story(folder: Path) -> Story:
         with running(ship_program(folder)) as ship:
             watcher.wait(lambda w: w.drive is not None)
             with running(controller_program(folder, folder / "first")) as controller:
-                watcher.wait_for_mode(Mode.ACTIVE)
-                watcher.wait(lambda w: w.drive is not None and abs(w.drive.pressure_pa) > 15e3)
+                watcher.wait_in_charge(15e3)
                 controller.signal(signal.SIGKILL)
             watcher.forget()
             watcher.watch(1.0)
@@ -211,12 +211,12 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
             running(ship_program(folder / "ship")) as ship,
             running(controller_program(folder, folder / "out")) as controller,
         ):
-            watcher.wait_for_mode(Mode.ACTIVE)
+            watcher.wait_in_charge()
             set_link(up=False)
             time.sleep(0.5)
             set_link(up=True)
             watcher.forget()
-            watcher.wait_for_mode(Mode.FAULT)
+            watcher.wait(lambda w: w.mode is Mode.FAULT)
             watcher.watch(2.0)  # the link is back, arming is not
             assert watcher.status is not None
             assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
@@ -233,7 +233,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
 def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(
     tmp_path: Path,
 ) -> None:
-    report, file = take_the_link_down(tmp_path)
+    report, file = persistent(take_the_link_down, tmp_path)
     assert (report["mode"], report["fault"]) == ("FAULT", "BUS_LOST")
     recording = read_recording(file)["live"]
     faulted = recording["mode"] == Mode.FAULT

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import cantools
 import yaml
@@ -30,6 +30,7 @@ CHANNEL = "vcan0"
 BIN = Path(sys.executable).parent
 CONFIGS = Path("configs").resolve()
 DBC = Path("utank_hil/canbus/utank.dbc")
+T = TypeVar("T")
 START_S = 180.0  # imports take long in a user-mode kernel
 LINE = re.compile(r"\((?P<s>\d+)\.(?P<us>\d{6})\) \S+ (?P<id>[0-9A-F]{8})#(?P<data>[0-9A-F]*)")
 
@@ -67,6 +68,22 @@ def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
     path = folder / "patient.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
+
+
+class HeldUpError(Exception):
+    """The machine held a process up for longer than the drive's command timeout."""
+
+
+def persistent(attempt: Callable[[Path], T], folder: Path) -> T:
+    """Try again when the machine was too busy."""
+    for number in range(2):
+        try:
+            (folder / str(number)).mkdir()
+            return attempt(folder / str(number))
+        except HeldUpError:
+            continue
+    (folder / "last").mkdir()
+    return attempt(folder / "last")
 
 
 class Logged(NamedTuple):
@@ -141,9 +158,28 @@ class Watcher:
             time.sleep(0.02)
             self.look()
 
-    def wait_for_mode(self, mode: Mode) -> None:
-        """Look until the controller is in a mode."""
-        self.wait(lambda watcher: watcher.status is not None and watcher.status.mode is mode)
+    @property
+    def mode(self) -> Mode | None:
+        """Mode of the controller."""
+        return None if self.status is None else self.status.mode
+
+    def wait_in_charge(self, pressure_pa: float = 0.0) -> None:
+        """Look until the controller is active and the pump gives so much pressure.
+
+        Raises
+        ------
+        HeldUpError
+            If it has faulted by then.
+        """
+
+        def done(watcher: Watcher) -> bool:
+            if watcher.mode is Mode.FAULT:
+                raise HeldUpError
+            drive = watcher.drive
+            driven = drive is not None and abs(drive.pressure_pa) >= pressure_pa
+            return driven and watcher.mode is Mode.ACTIVE
+
+        self.wait(done)
 
     def watch(self, seconds: float) -> None:
         """Look for so long."""

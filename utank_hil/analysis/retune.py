@@ -29,6 +29,7 @@ from utank_hil.identification import (
     validate,
 )
 from utank_hil.identification.acceptance import ModelLimits, model_objections
+from utank_hil.identification.lag_regression import unbroken
 from utank_hil.identification.ship_fit import ShipFit, fit_ship
 from utank_hil.runtime.retuning import Answer, Candidate, ModelSummary, Refusal, Work
 
@@ -38,6 +39,10 @@ MOST_MISSING = 0.2
 """Part of the samples that may be missing."""
 LEAST_MOTION = (10.0, 1e-6)
 """Spread of the command in Pa, and of each output in its unit, below which nothing happened."""
+LEAST_PREDICTIONS = 100
+"""On held-out data, for a verdict on the model."""
+LAGS = 25
+"""Samples over which prediction errors are to be uncorrelated."""
 LARGEST = 1e9
 """No command or output of a ship is as large in SI units."""
 ROLL_PART = 1.02
@@ -163,6 +168,12 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
     split = round((1 - HELD_OUT) * len(record))
     _refuse_empty(record[:split])
     _refuse_empty(record[split:])
+    stretches = [stop - start for start, stop in unbroken(record[split:])]
+    predictions = sum(max(0, length - max(task.order, LAGS)) for length in stretches)
+    if predictions < LEAST_PREDICTIONS:
+        raise IdentificationError(
+            f"gaps leave {predictions} predictions on held-out data, {LEAST_PREDICTIONS} are needed"
+        )
     u, y = record[:split, :1], record[:split, 1:]
     waves = find_disturbance_frequencies(u, y, predictor.sample_time_s)
     result = okid(
@@ -173,7 +184,7 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         disturbance_frequencies_rad_s=waves,
         disturbance_polynomial_degree=0,
     )
-    validation = validate(result.arx, record[split:, :1], record[split:, 1:], waves)
+    validation = validate(result.arx, record[split:, :1], record[split:, 1:], waves, LAGS)
     fit = fit_ship(result, u, task.ship, task.tank, predictor.measured, task.delay_s, task.lag_s)
     return Identification(result, waves, validation, fit)
 
