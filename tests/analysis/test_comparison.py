@@ -15,6 +15,7 @@ from utank_hil.analysis.record_pictures import draw_phase, draw_time
 from utank_hil.control import GPC_ROLL, PD_MEASURED, PredictiveLaw, design_pd
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.sea import Harmonics
+from utank_hil.telemetry.style import COLORS
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
@@ -84,8 +85,8 @@ def test_bode_of_a_ship_with_hardly_any_water_peaks_at_her_roll_frequency(tmp_pa
 
 def test_more_laws_than_colours_are_refused(tmp_path: Path):
     for draw in (draw_bode, draw_nyquist):
-        with pytest.raises(ValueError, match="got 5"):
-            draw([GPC] * 5, SHIP, TANK, tmp_path / "many.png", "Many")
+        with pytest.raises(ValueError, match=f"got {len(COLORS)}"):
+            draw([GPC] * len(COLORS), SHIP, TANK, tmp_path / "many.png", "Many")
 
 
 def test_records_are_drawn_over_time_and_in_the_plane(tmp_path: Path):
@@ -103,7 +104,7 @@ def test_records_are_drawn_over_time_and_in_the_plane(tmp_path: Path):
 
 def test_no_record_and_too_many_are_refused(tmp_path: Path):
     time = np.zeros(2)
-    for number in (0, 6):
+    for number in (0, len(COLORS) + 1):
         records = {str(n): time for n in range(number)}
         with pytest.raises(ValueError, match=f"got {number}"):
             draw_time(time, {"x": records}, tmp_path / "t.png", "None")
