@@ -12,6 +12,7 @@ from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     Address,
     Catalogue,
+    ControlWord,
     DriveFault,
     DriveState,
     DriveStatus1,
@@ -24,6 +25,7 @@ from utank_hil.runtime.housekeeping import Housekeeping
 
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
+_STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN)
 # half a step of the set-point on the bus: a command at the limit may have been rounded up by it
 ROUNDING_PA = 4.0
 
@@ -113,6 +115,9 @@ class PumpDrive:
         if command is None:
             return
         if not self._permitted(command, now_ns):
+            if command.control_word in _STOP_WORDS:
+                # whatever else is wrong with it, it says stop
+                self._states.command(command.control_word)
             self.refused += 1
             self._refused_in_a_row += 1
             if self._refused_in_a_row >= MISCODED_COMMANDS_TO_TRIP:

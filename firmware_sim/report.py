@@ -11,6 +11,7 @@ from rich.table import Table as RichTable
 from firmware_sim.bench import BenchResult
 from firmware_sim.retuning_figures import retuning_figures
 from firmware_sim.run import COLUMNS, RECORD_S, Run
+from firmware_sim.scenario import PASSIVE
 from utank_hil.analysis.metrics import (
     PumpStatistics,
     RollStatistics,
@@ -148,11 +149,13 @@ def pump_table(result: BenchResult) -> RichTable:
 
 def endings(result: BenchResult) -> list[str]:
     """What is to be said of how runs ended; nothing where all went as the operator wanted."""
-    return [
-        f"{run.name}: the controller ended in {run.mode}, fault {run.fault}"
-        for run in figures(result)[1]
-        if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name
-    ]
+    said = []
+    for run in figures(result)[1]:
+        if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
+            said.append(f"{run.name}: the controller ended in {run.mode}, fault {run.fault}")
+        elif run.name != PASSIVE and run.active_share == 0:
+            said.append(f"{run.name}: the controller was never in charge")
+    return said
 
 
 def _percent(share: float | None) -> str:

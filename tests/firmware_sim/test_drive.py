@@ -114,6 +114,15 @@ def test_refused_command_changes_nothing_and_is_not_echoed(command: tuple[float,
     assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
 
 
+@pytest.mark.parametrize("word", [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE])
+def test_a_word_that_says_stop_stops_whatever_pressure_came_with_it(word: ControlWord) -> None:
+    bench = armed(20e3)
+    bench.command(math.nan, word)
+    bench.tick()
+    assert bench.told.state is not DriveState.OPERATION_ENABLED
+    assert bench.drive.refused == 1
+
+
 def test_steps_toward_zero_are_never_refused() -> None:
     bench = armed(40e3)
     bench.command(1e3)

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from utank_hil.analysis.retune import retuner_work
-from utank_hil.canbus import SocketCanPort
+from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.config import ControllerConfig
@@ -73,6 +73,8 @@ def run(
         work = retuner_work(loaded)
         retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
         node = build_controller_node(loaded, retuner=retuner, statistics=statistics, sink=sink)
+        with suppress(PortError):  # the loop meets it too, and its node reacts
+            port.receive()  # what came while the law was designed is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
