@@ -248,3 +248,17 @@ def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
     assert "Traceback" not in errors
     assert "ended before the first sample" in errors
     assert not (tmp_path / "out").exists()
+
+
+def test_bench_refuses_a_controller_without_margins(tmp_path: Path) -> None:
+    controller_file(tmp_path, law=FRAGILE)
+    storm = Path("configs/scenarios/storm.yaml").resolve()
+    scenario = tmp_path / "scenario.yaml"
+    text = storm.read_text().replace("../", f"{storm.parent.parent}/")
+    kept = [line for line in text.splitlines() if not line.startswith("  gpc:")]
+    scenario.write_text(
+        "\n".join(kept).replace(f"{storm.parent.parent}/controllers/dpc.yaml", "controller.yaml")
+    )
+    result = invoke(app, "bench", scenario, "--duration", "5", "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "misses its margins" in said(result)

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import CONFIGS, OUT, Duration, Json, View, fail, load, notes, shown
 from utank_hil.commands.timing import timing_table
 
@@ -54,6 +55,8 @@ def bench(
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = load(scenario, Scenario)
+    for controller in loaded.controllers.values():
+        refuse_low_margins(controller)
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
     options = BenchOptions(real_time, bus, seed, duration)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from utank_hil.analysis.robustness import Robustness, robustness
-from utank_hil.commands.common import Json, load
+from utank_hil.commands.common import Json, fail, load, notes
 from utank_hil.config import ControllerConfig
 from utank_hil.config_laws import build_law
 
@@ -53,6 +53,19 @@ def judge(config: ControllerConfig) -> Robustness | None:
         config.delay_s,
         vessel.pump.lag_s,
     )
+
+
+def refuse_low_margins(config: ControllerConfig) -> None:
+    """End the command if the law misses its margins and the configuration does not accept that."""
+    report = judge(config)
+    failures = () if report is None else report.failures()
+    for failure in failures:
+        notes.print(f"[yellow]{config.name}, margins:[/yellow]", failure, soft_wrap=True)
+    if failures and not config.accept_low_margins:
+        fail(
+            f"{config.name}: the law misses its margins; redesign it, or set "
+            "accept_low_margins: true"
+        )
 
 
 def _as_json(config: ControllerConfig, report: Robustness | None) -> dict[str, Any]:

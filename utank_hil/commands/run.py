@@ -11,6 +11,7 @@ from rich.console import Console
 
 from utank_hil.analysis.retune import retuner_work
 from utank_hil.canbus import PortError, SocketCanPort
+from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.config import ControllerConfig
@@ -45,7 +46,7 @@ def run(
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
     loaded = load(config, ControllerConfig)
-    _refuse_low_margins(loaded)
+    refuse_low_margins(loaded)
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
@@ -109,14 +110,3 @@ def run(
     console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
     if file is not None:
         console.print(f"recording: {shown(file)}", soft_wrap=True)
-
-
-def _refuse_low_margins(config: ControllerConfig) -> None:
-    from utank_hil.commands.check import judge
-
-    report = judge(config)
-    failures = () if report is None else report.failures()
-    for failure in failures:
-        notes.print(f"[yellow]margins:[/yellow] {failure}", soft_wrap=True)
-    if failures and not config.accept_low_margins:
-        fail("the law misses its margins; redesign it, or set accept_low_margins: true")
