@@ -66,6 +66,26 @@ def test_law_is_stepped_every_sample_time_with_the_newest_sample_armed_or_not() 
     np.testing.assert_allclose(stepped[:, 1], np.arange(0, 200, 20) * 2e-3, atol=1e-3)
 
 
+def test_lost_ticks_make_one_answer_late_and_do_not_stretch_the_sample_time() -> None:
+    bench = ControllerBench(START_NS)
+    rng = np.random.default_rng(5)
+    stepped_ns, lost = [], 0
+    for _ in range(600):
+        lost_now = int(rng.choice([0, 0, 0, 0, 1, 3]))
+        lost += lost_now
+        answers = len(bench.law.seen)
+        bench.tick(late_ticks=lost_now)
+        if len(bench.law.seen) > answers:
+            stepped_ns.append(bench.now_ns - TICK_NS - bench.node.start_ns)
+    assert lost > 200
+    # one answer for each of the sample's own points, at the first tick that follows it
+    samples = np.array(stepped_ns) // (20 * TICK_NS)
+    assert (np.diff(samples) == 1).all()
+    assert max(np.array(stepped_ns) % (20 * TICK_NS)) <= 3 * TICK_NS
+    commands = np.diff([time_ns for time_ns, _ in bench.commands]) / TICK_NS
+    assert np.mean(commands) < 2.5
+
+
 def test_law_is_told_the_mean_of_what_left_before_each_answer() -> None:
     bench = ControllerBench(START_NS)
     bench.arm()
@@ -166,12 +186,12 @@ def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
     bench = ControllerBench(START_NS)
     bench.run(2000)
     # sent a second: 100 + 50 + 50 + 50 + 10 + 2 x 10 + 5 by the others, 50 + 10 + 10 by the node
-    expected = 355 * 143 / 250e3
-    assert bench.column("bus_load")[-1] == pytest.approx(expected, rel=0.02)
-    for _ in range(100):  # every other tick is skipped, so that a window takes two seconds
+    assert bench.column("bus_load")[-1] == pytest.approx(355 * 143 / 250e3, rel=0.02)
+    # every other tick is lost to both: the others send half as often, the node still in time
+    for _ in range(110):
         bench.tick(late_ticks=1)
-    bench.tick()
-    assert bench.column("bus_load")[-1] == pytest.approx(expected / 2, rel=0.05)
+    heard_and_said = 285 / 2 + 70
+    assert bench.column("bus_load")[-1] == pytest.approx(heard_and_said * 143 / 250e3, rel=0.02)
 
 
 @pytest.mark.parametrize("index", range(len(SIGNALS)))

@@ -102,6 +102,25 @@ def test_every_point_of_the_grid_was_ticked_or_counted_as_skipped(disturbances):
     assert (statistics.overruns > 0) == (statistics.skipped > 0)
 
 
+@given(delays, st.integers(1, 40))
+def test_run_of_given_length_accounts_for_each_of_its_points_and_no_other(disturbances, points):
+    clock = FakeClock()
+    late = iter([late_us for late_us, _ in disturbances])
+    busy = iter([busy_us for _, busy_us in disturbances])
+    clock.late_ns = lambda: 1000 * next(late, 0)
+
+    def says(_now_ns):
+        clock.time_ns += 1000 * next(busy, 0)
+        return ()
+
+    base = ToyNode("base", says=says)
+    loop = RealTimeLoop([base], clock=clock)
+    loop.run(duration_ns=points * 10 * MS - 1)
+    assert loop.statistics.ticks == len(base.ticked)
+    assert loop.statistics.ticks + loop.statistics.skipped == points
+    assert base.ticked[-1] < START_NS + points * 10 * MS
+
+
 @given(delays)
 def test_lateness_and_duration_are_what_happened(disturbances):
     _, begun, statistics, clock = run_disturbed(disturbances)
@@ -242,7 +261,7 @@ def test_half_a_second_on_the_real_clock():
     began = time.monotonic()
     loop.run(duration_ns=500 * MS)
     assert time.monotonic() - began > 0.49
-    assert loop.statistics.ticks + loop.statistics.skipped >= 50
+    assert loop.statistics.ticks + loop.statistics.skipped == 50
     assert all((now - node.ticked[0]) % (10 * MS) == 0 for now in node.ticked)
 
 

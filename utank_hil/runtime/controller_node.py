@@ -29,15 +29,16 @@ from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.retuning.adaptive import AdaptiveController, RetuningEvent
+from utank_hil.runtime.schedule import Schedule
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Observations, Supervisor
 
 NANOSECONDS: Final = 1e-9
 TICK_NS: Final = 10_000_000
-COMMAND_TICKS: Final = 2
-STATUS_TICKS: Final = 10
-LOAD_WINDOW_TICKS: Final = 100
+COMMAND_NS: Final = 2 * TICK_NS
+STATUS_NS: Final = 10 * TICK_NS
+LOAD_WINDOW_NS: Final = 100 * TICK_NS
 # an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
@@ -118,8 +119,7 @@ class ControllerNode:
         sink: Callable[[FloatArray], None] | None = None,
     ) -> None:
         sample_ticks = controller.sample_time_s / (TICK_NS * NANOSECONDS)
-        self._sample_ticks = round(sample_ticks)
-        if self._sample_ticks < 1 or abs(sample_ticks - self._sample_ticks) > 1e-6:
+        if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
             raise ValueError(
                 f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
                 f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
@@ -144,7 +144,11 @@ class ControllerNode:
         self._seen = Observations()
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
-        self._ticks = 0
+        self._samples = Schedule(round(sample_ticks) * TICK_NS)
+        self._command_schedule = Schedule(COMMAND_NS)
+        self._status_schedule = Schedule(STATUS_NS)
+        self._load_schedule = Schedule(LOAD_WINDOW_NS)
+        self._started = self._answered = False
         self.start_ns = 0
         self._last_ns = 0
         self._late_history = 0
@@ -185,7 +189,8 @@ class ControllerNode:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
-        if self._ticks == 0:
+        if not self._started:
+            self._started = True
             self.start_ns = self._last_ns = self._load_since_ns = now_ns
         self._estimate()
         self._observe(now_ns)
@@ -195,7 +200,6 @@ class ControllerNode:
         frames = self._encode(now_ns)
         self._show(now_ns)
         self._last_ns = now_ns
-        self._ticks += 1
         self._frames_sent += len(frames)
         return frames
 
@@ -240,7 +244,7 @@ class ControllerNode:
         seen.high_level = inbox.high_level
         seen.roll_rad = inbox.roll_rad
         seen.heel_rad = self._heel_rad
-        if self._ticks % LOAD_WINDOW_TICKS == 0:
+        if self._load_schedule.due(now_ns):
             heard = inbox.frames + self._frames_sent
             # at the first tick nothing but a backlog was heard
             window_s = (now_ns - self._load_since_ns) * NANOSECONDS
@@ -266,10 +270,10 @@ class ControllerNode:
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
-        if self._ticks % self._sample_ticks:
+        if not self._samples.due(now_ns):
             return
         # the law hears what really left since its last answer: anti-windup and bumpless take-over
-        if self._ticks:
+        if self._answered:
             self._applied[0] = self._limiter.mean_since_last_call()
             self._controller.applied(self._applied)
         if self._retuning is not None:
@@ -280,6 +284,7 @@ class ControllerNode:
                 engaged=self._supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ns, seen.tank_age_ns) <= FRESH_NS,
             )
+        self._answered = True
         answer = self._controller.step(self._measure(self._inbox, self._level))
         self._law_pa = float(answer[0])
         self._law_failed = not math.isfinite(self._law_pa)
@@ -300,14 +305,18 @@ class ControllerNode:
 
     def _encode(self, now_ns: int) -> list[Frame]:
         """Protected frames for what is due."""
-        frames: list[Frame] = []
         supervisor = self._supervisor
-        if self._ticks % COMMAND_TICKS == 0:
+        faulted = supervisor.mode is Mode.FAULT
+        # first, because an address is claimed before anything is said from it
+        frames = self._housekeeping.frames(
+            now_ns, NodeState.FAULT if faulted else NodeState.OPERATIONAL
+        )
+        if self._command_schedule.due(now_ns):
             word = self._drive_sequence.next_word(
                 self._inbox.drive_state, wanted=supervisor.drive_wanted
             )
             frames.append(self._command_frame(word))
-        if self._ticks % STATUS_TICKS == 0:
+        if self._status_schedule.due(now_ns):
             frames.append(
                 self._status.frame(
                     ControllerStatus(
@@ -325,10 +334,6 @@ class ControllerNode:
                     )
                 )
             )
-        faulted = supervisor.mode is Mode.FAULT
-        frames += self._housekeeping.frames(
-            now_ns, NodeState.FAULT if faulted else NodeState.OPERATIONAL
-        )
         return frames
 
     def _command_frame(self, word: ControlWord) -> Frame:

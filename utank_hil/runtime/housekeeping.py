@@ -9,6 +9,7 @@ from utank_hil.canbus import (
     NodeState,
     ResetCause,
 )
+from utank_hil.runtime.schedule import Schedule
 
 HEARTBEAT_PERIOD_NS = 100_000_000
 NANOSECONDS = 1e-9
@@ -33,28 +34,25 @@ class Housekeeping:
         self._catalogue_version = catalogue.version
         self._configuration_version = configuration_version
         self._boot_ns: int | None = None
-        self._next_ns = 0
+        self._beats = Schedule(HEARTBEAT_PERIOD_NS)
 
     def frames(self, now_ns: int, state: NodeState = NodeState.OPERATIONAL) -> list[Frame]:
         """Return what is due at `now_ns`, mostly nothing."""
+        if not self._beats.due(now_ns):
+            return []
         if self._boot_ns is None:
             self._boot_ns = now_ns
-            self._next_ns = now_ns
             # arbitrary address capable 0, function and identity by address: unique on this bus
-            return [self._claim.frame(AddressClaim(int(self._address))), self._beat(now_ns, state)]
-        if now_ns < self._next_ns:
-            return []
-        return [self._beat(now_ns, state)]
+            claim = self._claim.frame(AddressClaim(int(self._address)))
+            return [claim, self._beat(0.0, state)]
+        return [self._beat((now_ns - self._boot_ns) * NANOSECONDS, state)]
 
-    def _beat(self, now_ns: int, state: NodeState) -> Frame:
-        assert self._boot_ns is not None
-        while self._next_ns <= now_ns:
-            self._next_ns += HEARTBEAT_PERIOD_NS
+    def _beat(self, uptime_s: float, state: NodeState) -> Frame:
         return self._heartbeat.frame(
             Heartbeat(
                 state=state,
                 reset_cause=ResetCause.POWER_ON,
-                uptime_s=(now_ns - self._boot_ns) * NANOSECONDS,
+                uptime_s=uptime_s,
                 catalogue_version=self._catalogue_version,
                 configuration_version=self._configuration_version,
                 transmit_error_count=float("nan"),

@@ -5,6 +5,7 @@ the start of the run: a late tick neither shifts the grid nor is caught up.
 """
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.port import Port, PortError
@@ -12,6 +13,8 @@ from utank_hil.runtime.clock import Clock, MonotonicClock
 from utank_hil.runtime.group import OUTSIDE, NodeGroup
 from utank_hil.runtime.node import Node
 from utank_hil.runtime.statistics import LoopStatistics
+
+_NEVER_NS: Final = 1 << 63
 
 
 def _never() -> bool:
@@ -72,7 +75,8 @@ class RealTimeLoop:
         stop : callable
             Asked before every tick.
         duration_ns : int, optional
-            Ticks at the start and at every grid point less than this later.
+            Ticks at the start and at every grid point less than this later; those of them that
+            passed without a tick are counted as skipped, however late the last one was.
 
         Raises
         ------
@@ -81,17 +85,17 @@ class RealTimeLoop:
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
         deadline_ns = clock.now_ns()
-        end_ns = None if duration_ns is None else deadline_ns + duration_ns
+        end_ns = _NEVER_NS if duration_ns is None else deadline_ns + duration_ns
         self._group.start(deadline_ns)
         try:
-            while end_ns is None or deadline_ns < end_ns:
+            while deadline_ns < end_ns:
                 clock.sleep_until(deadline_ns)
                 if stop():
                     break
                 woken_ns = clock.now_ns()
                 late_ns = woken_ns - deadline_ns
                 # Woken after one or more further points: this is the tick of the latest of them.
-                deadline_ns += self._skip(late_ns // period_ns)
+                deadline_ns += self._skip((min(woken_ns, end_ns - 1) - deadline_ns) // period_ns)
                 self._tick(deadline_ns)
                 done_ns = clock.now_ns()
                 statistics.ticks += 1
@@ -99,7 +103,7 @@ class RealTimeLoop:
                 statistics.duration.add(done_ns - woken_ns)
                 deadline_ns += period_ns
                 # Points that passed while the tick ran: wait for the first that has not.
-                deadline_ns += self._skip(-((deadline_ns - done_ns) // period_ns))
+                deadline_ns += self._skip(-((deadline_ns - min(done_ns, end_ns)) // period_ns))
         finally:
             self._group.stop(clock.now_ns(), self._send)
 
