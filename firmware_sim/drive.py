@@ -25,6 +25,10 @@ from utank_hil.runtime.housekeeping import Housekeeping
 
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
+STOPPED_SHARE = 0.02
+"""Of the drive's pressure limit: less is as good as none."""
+LONGEST_STOP_NS = 500_000_000
+"""A motor that can't take the pressure away in this time is switched off all the same."""
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN)
 # half a step of the set-point on the bus: a command at the limit may have been rounded up by it
 ROUNDING_PA = 4.0
@@ -100,6 +104,7 @@ class PumpDrive:
         self._housekeeping = Housekeeping(Address.DRIVE, catalogue, configuration_version)
         self._accepted_ns = 0
         self._timeout_ns = 0
+        self._moving_ns = 0
         self._echo: int | None = None
         self._setpoint_pa = 0.0
         self._refused_in_a_row = 0
@@ -149,15 +154,20 @@ class PumpDrive:
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Watch over the commands, drive the pump, report."""
         states, plant = self._states, self._plant
-        states.tick()
+        plant.advance(now_ns)
+        states.tick(stopped=self._stopped(now_ns))
         enabled = states.state is DriveState.OPERATION_ENABLED
         if enabled and now_ns - self._accepted_ns > self._timeout_ns:
             states.trip(DriveFault.COMMAND_TIMEOUT)
             enabled = False
         if not enabled:
             self._setpoint_pa = 0.0
-        plant.advance(now_ns)
-        plant.drive_pump(self._setpoint_pa, enabled=enabled)
+        if states.stopping:
+            # a rotor that merely ran down would go on pressing for half a second
+            plant.brake_pump()
+        else:
+            self._moving_ns = now_ns
+            plant.drive_pump(self._setpoint_pa, enabled=enabled)
         frames = []
         if self._ticks % 2 == 0 or states.state is not self._shown_state:
             frames.append(self._status_1_frame())
@@ -170,6 +180,11 @@ class PumpDrive:
         )
         self._ticks += 1
         return frames
+
+    def _stopped(self, now_ns: int) -> bool:
+        """Say whether a stop has taken the pressure away, or had its time."""
+        share = abs(self._plant.pressure_pa) / self._limits.pressure_pa
+        return share < STOPPED_SHARE or now_ns - self._moving_ns > LONGEST_STOP_NS
 
     def _status_1_frame(self) -> Frame:
         plant = self._plant

@@ -43,12 +43,24 @@ class DriveStates:
         self.fault = DriveFault.NONE
         self._word: ControlWord | None = None
 
-    def tick(self) -> None:
-        """Take the transitions that need no command: self-test, stop and fault reaction done."""
-        if self.state is _S.NOT_READY_TO_SWITCH_ON or self.state is _S.QUICK_STOP_ACTIVE:
+    @property
+    def stopping(self) -> bool:
+        """Whether a quick stop or the reaction to a fault is under way."""
+        return self.state is _S.QUICK_STOP_ACTIVE or self.state is _S.FAULT_REACTION_ACTIVE
+
+    def tick(self, *, stopped: bool = True) -> None:
+        """Take the transitions that need no command.
+
+        Parameters
+        ----------
+        stopped : bool
+            Whether a stop that is under way has come to its end.
+        """
+        if self.state is _S.NOT_READY_TO_SWITCH_ON:
             self.state = _S.SWITCH_ON_DISABLED
-        elif self.state is _S.FAULT_REACTION_ACTIVE:
-            self.state = _S.FAULT
+        elif self.stopping and stopped:
+            faulted = self.state is _S.FAULT_REACTION_ACTIVE
+            self.state = _S.FAULT if faulted else _S.SWITCH_ON_DISABLED
 
     def command(self, word: ControlWord | None) -> None:
         """Follow a control word; None, an unknown word, disables the voltage."""
@@ -59,6 +71,8 @@ class DriveStates:
             if word is _C.FAULT_RESET and rising:
                 self.state, self.fault = _S.SWITCH_ON_DISABLED, DriveFault.NONE
             return
+        if word is _C.FAULT_RESET:
+            word = _C.DISABLE_VOLTAGE  # which it is where there is no fault: bit 1 is not set
         self.state = _TRANSITIONS.get(self.state, {}).get(word, self.state)
 
     def trip(self, fault: DriveFault) -> None:

@@ -105,6 +105,11 @@ class Plant:
         self._state[kernel.SETPOINT] = setpoint_pa
         self._state[kernel.ENABLED] = enabled
 
+    def brake_pump(self) -> None:
+        """Take the pressure away as fast as the motor can, past the loop's lag and rate limit."""
+        self.drive_pump(0.0, enabled=True)
+        self._state[kernel.REFERENCE] = 0.0
+
     @property
     def roll_rad(self) -> float:
         """Roll angle, positive to starboard."""

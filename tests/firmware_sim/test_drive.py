@@ -72,6 +72,44 @@ def test_set_point_is_zero_within_the_frames_own_timeout_and_one_tick(
     assert bench.status_2.fault is DriveFault.COMMAND_TIMEOUT
 
 
+@pytest.mark.parametrize("pressure_pa", [5e3, 20e3, 45e3, -50e3])
+@pytest.mark.parametrize("cause", ["silence", "quick stop"])
+def test_stop_takes_the_pressure_away_with_the_motor(pressure_pa: float, cause: str) -> None:
+    bench = armed(pressure_pa)
+    for _ in range(100):
+        bench.command(pressure_pa)
+        bench.ticks(2)
+    at_stop_pa = bench.plant.pressure_pa
+    last_ns = bench.now_ns - 2 * TICK_NS
+    if cause == "quick stop":
+        bench.command(0.0, ControlWord.QUICK_STOP)
+        last_ns = bench.now_ns
+    left_pa = {}
+    while bench.now_ns - last_ns < 600 * MS:
+        bench.tick()
+        left_pa[(bench.now_ns - TICK_NS - last_ns) // MS] = abs(bench.plant.pressure_pa)
+    print(cause, [round(left_pa[ms]) for ms in (50, 80, 100, 110, 120, 130, 150, 200, 400)])
+    # after a silence the timeout of 50 ms goes first; then a tick passes until the drive looks
+    begun_ms = 60 if cause == "silence" else 0
+    for braked_ms, share in ((0, 1.01), (20, 0.6), (40, 0.3), (60, 0.12), (80, 0.04)):
+        left = left_pa[begun_ms + braked_ms]
+        assert left < max(share * abs(at_stop_pa), 0.02 * DriveLimits().pressure_pa)
+    # off, the rotor's inertia presses against the water, whose flow changes in seconds
+    assert all(left < 3e3 for ms, left in left_pa.items() if ms > begun_ms + 80)
+    assert bench.told.state in (DriveState.FAULT, DriveState.SWITCH_ON_DISABLED)
+
+
+def test_motor_that_can_not_take_the_pressure_away_is_switched_off_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = armed(20e3)
+    monkeypatch.setattr(bench.plant, "brake_pump", lambda: None)
+    bench.ticks(40)
+    assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
+    bench.ticks(20)
+    assert bench.told.state is DriveState.FAULT
+
+
 def test_commands_after_a_timeout_do_not_start_the_pump_again() -> None:
     bench = armed()
     bench.ticks(10)

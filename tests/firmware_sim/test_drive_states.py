@@ -32,6 +32,10 @@ STANDARD = [
     (12, S.QUICK_STOP_ACTIVE, C.DISABLE_VOLTAGE, S.SWITCH_ON_DISABLED),
 ]
 TABLE = {(start, word): end for _, start, word, end in STANDARD}
+# the word that resets a fault has the bits of "disable voltage" where there is none
+TABLE |= {
+    (start, C.FAULT_RESET): end for _, start, word, end in STANDARD if word is C.DISABLE_VOLTAGE
+}
 
 
 def states_in(state: DriveState) -> DriveStates:
@@ -64,7 +68,11 @@ def test_power_up_goes_through_self_test_to_switch_on_disabled() -> None:
 
 def test_finished_quick_stop_switches_off() -> None:
     states = states_in(S.QUICK_STOP_ACTIVE)
+    states.tick(stopped=False)
+    assert states.stopping
+    assert states.state is S.QUICK_STOP_ACTIVE
     states.tick()
+    assert not states.stopping
     assert states.state is S.SWITCH_ON_DISABLED  # transition 12
 
 
@@ -75,8 +83,11 @@ def test_fault_from_any_state_goes_through_its_reaction_to_fault(start: DriveSta
     assert states.state is S.FAULT_REACTION_ACTIVE  # transition 13
     states.command(C.ENABLE_OPERATION)
     states.command(C.FAULT_RESET)
+    states.tick(stopped=False)
+    assert states.stopping
     assert states.state is S.FAULT_REACTION_ACTIVE
     states.tick()
+    assert not states.stopping
     assert states.state is S.FAULT  # transition 14
     for word in ControlWord:
         if word is not C.FAULT_RESET:

@@ -35,6 +35,7 @@ from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
 from utank_hil.runtime.assembly import measure_of
 from utank_hil.runtime.controller_node import TICK_NS, ControllerNode, ControllerSettings
 from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import SafetyLimits, Supervisor
 
 CATALOGUE = load_catalogue()
@@ -80,7 +81,12 @@ class ControllerBench:
     applied to every frame on its way, which may return none or several).
     """
 
-    def __init__(self, start_ns: int = 0, law: ToyLaw | None = None) -> None:
+    def __init__(
+        self,
+        start_ns: int = 0,
+        law: ToyLaw | None = None,
+        statistics: LoopStatistics | None = None,
+    ) -> None:
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
         self.node = ControllerNode(
@@ -91,6 +97,7 @@ class ControllerBench:
             Supervisor(SafetyLimits()),
             ControllerSettings(configuration_version=VERSION),
             CATALOGUE,
+            statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),
         )
         self.start_ns = self.now_ns = start_ns

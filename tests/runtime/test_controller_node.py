@@ -29,6 +29,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.runtime.controller_node import TICK_NS
 from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.statistics import LoopStatistics
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit
@@ -192,6 +193,19 @@ def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
         bench.tick(late_ticks=1)
     heard_and_said = 285 / 2 + 70
     assert bench.column("bus_load")[-1] == pytest.approx(heard_and_said * 143 / 250e3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("statistics", "told"),
+    [(None, False), (LoopStatistics(real_time=True), False), (LoopStatistics(), True)],
+)
+def test_status_tells_of_a_loop_without_real_time_scheduling(
+    statistics: LoopStatistics | None, told: bool
+) -> None:
+    bench = ControllerBench(statistics=statistics)
+    bench.run(200)
+    assert bench.status is not None
+    assert bench.status.not_realtime is told
 
 
 @pytest.mark.parametrize("index", range(len(SIGNALS)))

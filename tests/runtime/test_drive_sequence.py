@@ -23,7 +23,8 @@ def led(
 def test_nothing_but_a_wanted_drive_is_led_towards_enabled(state: DriveState | None) -> None:
     word = DriveSequence().next_word(state, wanted=False)
     assert word in (C.DISABLE_VOLTAGE, C.QUICK_STOP)
-    assert (word is C.QUICK_STOP) == (state is S.OPERATION_ENABLED)
+    # while it drives or brakes; the voltage is taken away when it has stopped
+    assert (word is C.QUICK_STOP) == (state in (S.OPERATION_ENABLED, S.QUICK_STOP_ACTIVE))
 
 
 def test_wanted_drive_is_enabled_in_three_words_and_kept_there() -> None:

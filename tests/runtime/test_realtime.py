@@ -233,6 +233,22 @@ def test_counts_into_the_statistics_handed_in():
     assert statistics.ticks == 2
 
 
+@pytest.mark.parametrize(
+    ("policy", "real_time"),
+    [
+        (os.SCHED_OTHER, False),
+        (os.SCHED_RR, True),
+        (os.SCHED_FIFO, True),
+        (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, True),
+    ],
+)
+def test_counts_whether_the_system_runs_the_loop_in_real_time(monkeypatch, policy, real_time):
+    monkeypatch.setattr(os, "sched_getscheduler", lambda _pid: policy)
+    loop = RealTimeLoop([ToyNode("a")], clock=FakeClock())
+    loop.run(duration_ns=MS)
+    assert loop.statistics.real_time is real_time
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_ends_the_loop_and_the_handlers_are_put_back(number):
     found = signal.getsignal(number)

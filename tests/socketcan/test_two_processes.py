@@ -159,10 +159,11 @@ def test_killed_controllers_drive_is_at_zero_within_100_ms_of_its_last_command(
     assert story.killed_states == {DriveState.FAULT}
     pressures = [(f.time_s - off_s, f.signals["pressure_pa"]) for f in story.of("SENSOR_PUMP")]
     at_trip = next(abs(p) for t, p in pressures if t >= 0)
-    for wait_s in (0.1, 0.2, 0.5):
-        left = next(abs(p) for t, p in pressures if t >= wait_s)
-        print(f"pressure {wait_s} s after: {left:.0f} of {at_trip:.0f} Pa")
-    assert next(abs(p) for t, p in pressures if t >= 0.5) < 0.4 * at_trip
+    left = {wait_s: next(abs(p) for t, p in pressures if t >= wait_s) for wait_s in (0.1, 0.2, 0.5)}
+    print("pressure at the trip", at_trip, "and after", left)
+    # the motor brakes; the ship's process may be held up here, too
+    assert left[0.2] < max(0.1 * at_trip, 2.5e3)
+    assert left[0.5] < 2.5e3
 
 
 def test_restarted_controller_waits_in_standby_for_the_operator(story: Story) -> None:

@@ -305,7 +305,7 @@ class ControllerNode:
 
     def _encode(self, now_ns: int) -> list[Frame]:
         """Protected frames for what is due."""
-        supervisor = self._supervisor
+        supervisor, statistics = self._supervisor, self._statistics
         faulted = supervisor.mode is Mode.FAULT
         # first, because an address is claimed before anything is said from it
         frames = self._housekeeping.frames(
@@ -326,7 +326,7 @@ class ControllerNode:
                         alarm=supervisor.mode is Mode.FAULT,
                         degraded=supervisor.degraded,
                         saturated=self._limiter.limiting,
-                        not_realtime=False,
+                        not_realtime=statistics is not None and not statistics.real_time,
                         bus_load=self._bus_load,
                         catalogue_version=self._catalogue_version,
                         configuration_version=self._settings.configuration_version,

@@ -7,7 +7,10 @@ _TOWARDS_ENABLED = {
     DriveState.READY_TO_SWITCH_ON: ControlWord.SWITCH_ON,
     DriveState.SWITCHED_ON: ControlWord.ENABLE_OPERATION,
     DriveState.OPERATION_ENABLED: ControlWord.ENABLE_OPERATION,
+    DriveState.QUICK_STOP_ACTIVE: ControlWord.QUICK_STOP,
 }
+_STOPPING = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+"""Here the motor brakes; to disable the voltage would leave the rotor running down."""
 
 
 class DriveSequence:
@@ -35,6 +38,6 @@ class DriveSequence:
         self._resetting = False
         if wanted and state is not None:
             return _TOWARDS_ENABLED.get(state, ControlWord.DISABLE_VOLTAGE)
-        if state is DriveState.OPERATION_ENABLED:
+        if state in _STOPPING:
             return ControlWord.QUICK_STOP
         return ControlWord.DISABLE_VOLTAGE

@@ -7,7 +7,6 @@ from utank_hil.canbus import (
     Frame,
     Heartbeat,
     NodeState,
-    ResetCause,
 )
 from utank_hil.runtime.schedule import Schedule
 
@@ -51,7 +50,7 @@ class Housekeeping:
         return self._heartbeat.frame(
             Heartbeat(
                 state=state,
-                reset_cause=ResetCause.POWER_ON,
+                reset_cause=None,  # nothing tells a process why it was started
                 uptime_s=uptime_s,
                 catalogue_version=self._catalogue_version,
                 configuration_version=self._configuration_version,

@@ -4,6 +4,7 @@ The tick does no I/O but the port's, takes no lock, logs nothing. Deadlines lie 
 the start of the run: a late tick neither shifts the grid nor is caught up.
 """
 
+import os
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -15,6 +16,7 @@ from utank_hil.runtime.node import Node
 from utank_hil.runtime.statistics import LoopStatistics
 
 _NEVER_NS: Final = 1 << 63
+_REAL_TIME: Final = (os.SCHED_FIFO, os.SCHED_RR)
 
 
 def _never() -> bool:
@@ -84,6 +86,7 @@ class RealTimeLoop:
             If a node raises; `stop` of those that have it is called all the same.
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
+        statistics.real_time = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in _REAL_TIME
         deadline_ns = clock.now_ns()
         end_ns = _NEVER_NS if duration_ns is None else deadline_ns + duration_ns
         self._group.start(deadline_ns)

@@ -96,6 +96,8 @@ class LoopStatistics:
         Frames that the port took, and handed out.
     send_errors, receive_errors : int
         `PortError`s.
+    real_time : bool
+        Whether the operating system ran the loop with a real-time policy.
     """
 
     lateness: Histogram = field(default_factory=Histogram)
@@ -107,6 +109,7 @@ class LoopStatistics:
     frames_received: int = 0
     send_errors: int = 0
     receive_errors: int = 0
+    real_time: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Return every counter and the summaries of both histograms, ready for JSON."""
