@@ -2,11 +2,15 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
+PEERS := .cache/peers
+PEERS_READY := $(PEERS)/.ready
+COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-header --no-annotate --no-emit-index-url
 
 # the matrices here are small: threads of the linear-algebra library only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help setup bench test test-fast check format benchmark docs lock clean
+.PHONY: help setup bench test test-fast check format benchmark peers docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -14,7 +18,8 @@ help:
 	@echo "make test       lint, types and all tests, those on a real CAN bus included"
 	@echo "make test-fast  the tests that take seconds, without CAN"
 	@echo "make check      lint, format, strict types, generated documents"
-	@echo "make benchmark  speed, as ratios to something else in the same run"
+	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
+	@echo "make peers      the environment of those packages, 480 MB, for tools/compare_*.py"
 	@echo "make docs       write the generated documents anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
@@ -52,15 +57,29 @@ format: setup
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
-benchmark: setup
+benchmark: setup peers
 	@for script in tools/benchmark_*.py; do echo; echo "== $$script"; $(PYTHON) $$script || exit 1; done
+	@for script in tools/compare_*.py; do echo; echo "== $$script"; $(PEERS)/bin/python $$script || exit 1; done
+
+peers: $(PEERS_READY)
+
+# its packages come on top of the project's (the .pth file), whose versions its lock repeats
+$(PEERS_READY): tools/peers/requirements.lock | $(READY)
+	rm -rf $(PEERS)
+	python3 -m venv $(PEERS)
+	$(PYTHON) -c "import sysconfig; print('import site; site.addsitedir(%r)' % sysconfig.get_path('purelib'))" \
+		> "$$($(PEERS)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/project.pth"
+	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
+		-r tools/peers/requirements.lock
+	@touch $@
 
 docs: setup
 	$(PYTHON) tools/document_catalogue.py
 
 lock: setup
-	$(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-		--no-header --no-annotate --no-emit-index-url --extra dev pyproject.toml -o requirements.lock
+	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
+	$(COMPILE) --constraints requirements.lock --excludes tools/peers/excludes.txt \
+		tools/peers/requirements.in -o tools/peers/requirements.lock
 
 clean:
 	rm -rf $(VENV) .cache build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

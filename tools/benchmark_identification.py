@@ -1,92 +1,48 @@
-"""Identification side by side: speed, memory, growth, and accuracy under waves.
+"""Identification on its own: speed beside `numpy.linalg.lstsq`, memory, growth, recursive update.
 
-Run ``python tools/benchmark_identification.py``; ``--json`` prints one JSON object instead of the
-tables, ``--quick`` measures less. The packages sippy_unipi, nfoursid and mdof are compared when
-they are installed. Times are the least of several interleaved runs; set OMP_NUM_THREADS=1 on a busy
-machine.
+Times are the least of several interleaved runs. tools/compare_identification.py has the accuracy,
+beside published packages.
+
+Example: OPENBLAS_NUM_THREADS=1 .venv/bin/python tools/benchmark_identification.py --quick
 """
 
 import argparse
-import contextlib
-import io
 import json
 import time
 import tracemalloc
-import warnings
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
-from published_identification import published
+from peers.identification_records import (
+    SAMPLE_TIME_S,
+    SEAS,
+    SHIP,
+    SLOW,
+    TANK,
+    record,
+    respond,
+    response,
+    sampled_plant,
+)
 from scipy.linalg import cho_factor, cho_solve
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control.limits import PumpLimits
-from utank_hil.dynamics import RollShip, Tank, coupled_model
-from utank_hil.identification import (
-    RecursiveArx,
-    era,
-    find_disturbance_frequencies,
-    okid,
-    random_pulses,
-    refine,
-)
+from utank_hil.identification import RecursiveArx, okid
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import fit
-from utank_hil.sea import Sea, load_ndbc
 
-SAMPLE_TIME_S = 0.2
-FAST = PumpLimits(pressure_pa=50e3, rate_pa_s=500e3)
-SLOW = PumpLimits(pressure_pa=50e3, rate_pa_s=50e3)
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
-BAND_RAD_S = np.linspace(0.2, 1.2, 101)
-WAVE_RAD_S = 0.6
-SEAS = Path(__file__).parent.parent / "configs" / "seas"
-
-
-def sampled_plant() -> control.StateSpace:
-    """First ship and tank of the thesis: (pressure, wave moment) to (roll, level), sampled."""
-    full = coupled_model(SHIP, TANK)
-    chosen = control.ss(full.A, full.B, full.C[[0, 2]], np.zeros((2, 2)))
-    return control.c2d(chosen, SAMPLE_TIME_S)
-
-
-def respond(pressure_pa: FloatArray, moment_nm: FloatArray) -> FloatArray:
-    """Roll and level from rest, shape (N, 2)."""
-    plant = sampled_plant()
-    inputs = np.vstack([pressure_pa, moment_nm])
-    return np.asarray(control.forced_response(plant, inputs=inputs).outputs.T)
-
-
-def record(
-    samples: int = 2500,
-    noise: float = 0.01,
-    limits: PumpLimits = FAST,
-    sea: str = "calm",
-    seed: int = 1,
-) -> tuple[FloatArray, FloatArray]:
-    """Pressure and noisy outputs; a sea rolls the ship as much as the pump does."""
-    pressure = random_pulses(samples * SAMPLE_TIME_S, limits, seed)
-    y = respond(pressure, np.zeros(samples))
-    time_s = np.arange(samples) * SAMPLE_TIME_S
-    if sea != "calm":
-        if sea == "one wave":
-            moment = np.cos(WAVE_RAD_S * time_s + seed)
-        else:
-            storm = load_ndbc(SEAS / "ndbc_41010_2019-02_spectral_density.txt")
-            waves = Sea.irregular(storm.at("2019-02-10T05:40"), seed)
-            moment = waves.roll_moment(SHIP.stiffness_nm_rad).at(
-                np.asarray(time_s, dtype=np.float64)
-            )
-        wave = respond(np.zeros(samples), moment)
-        y = y + wave * np.std(y[:, 0]) / np.std(wave[:, 0])
-    return pressure, y + noise * np.std(y, axis=0) * np.random.default_rng(seed).standard_normal(
-        y.shape
-    )
+__all__ = [
+    "SAMPLE_TIME_S",
+    "SEAS",
+    "SHIP",
+    "TANK",
+    "record",
+    "respond",
+    "response",
+    "sampled_plant",
+]
 
 
 def best_of(repeats: int, *tasks: Callable[[], object]) -> list[float]:
@@ -213,67 +169,6 @@ def recursive() -> list[dict[str, Any]]:
     return rows
 
 
-def ours(order: int, refined: bool) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]:
-    """OKID with frequencies found from the data, ERA, and refinement."""
-
-    def identify(u: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
-        waves = find_disturbance_frequencies(u, y)
-        result = okid(u, y, order, disturbance_frequencies_rad_s=waves)
-        system = era(result.markov, 4)
-        if refined:
-            system = refine(system, result, u, y).system
-        return tuple(np.asarray(part) for part in (system.A, system.B, system.C, system.D))
-
-    return identify
-
-
-def response(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """Frequency response over the band, shape (101, 2)."""
-    turns = np.exp(1j * BAND_RAD_S * SAMPLE_TIME_S)
-    values = [c @ np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]) + d[:, :1] for z in turns]
-    return np.array(values)[:, :, 0]
-
-
-def accuracy(quick: bool) -> list[dict[str, Any]]:
-    """Relative error of the frequency response from pressure to roll over 0.2-1.2 rad/s."""
-    plant = sampled_plant()
-    right = response(*(np.asarray(m) for m in (plant.A, plant.B, plant.C, plant.D)))
-    methods = {
-        "okid, era p = 120": ours(120, refined=False),
-        "okid, era p = 200": ours(200, refined=False),
-        "okid, era, refine p = 120": ours(120, refined=True),
-        **published(),
-    }
-    rows = []
-    for name, noise, sea in (
-        ("clean", 0.0, "calm"),
-        ("1 % noise", 0.01, "calm"),
-        ("noise, one wave", 0.01, "one wave"),
-        ("noise, measured sea", 0.01, "storm"),
-    ):
-        for method, identify in methods.items():
-            errors, times = [], []
-            for seed in range(2 if quick else 5):
-                u, y = record(noise=noise, sea=sea, seed=seed)
-                start = time.perf_counter()
-                with contextlib.redirect_stdout(io.StringIO()):  # some of the packages talk
-                    found = identify(u, y)
-                times.append(time.perf_counter() - start)
-                wrong = response(*found) - right
-                errors.append(np.linalg.norm(wrong, axis=0) / np.linalg.norm(right, axis=0))
-            roll, level = np.median(errors, axis=0)
-            rows.append(
-                {
-                    "data": name,
-                    "method": method,
-                    "roll_error": float(roll),
-                    "level_error": float(level),
-                    "time_ms": min(times) * 1e3,
-                }
-            )
-    return rows
-
-
 def table(rows: list[dict[str, Any]]) -> None:
     """Print rows under the first one's keys."""
     keys = list(rows[0])
@@ -289,15 +184,14 @@ def table(rows: list[dict[str, Any]]) -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--quick", action="store_true", help="fewer and shorter measurements")
     arguments = parser.parse_args()
     first = speed(arguments.quick)
     rows = {"growth": growth(arguments.quick), "recursive": recursive()}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the packages compared with
-        rows["accuracy"] = accuracy(arguments.quick)
     if arguments.json:
         print(json.dumps({"speed": first, **rows}))
         return
