@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.sharedctypes import Synchronized
+from multiprocessing.context import SpawnContext
 from typing import Any, Final
 
 from firmware_sim.assembly import PASSIVE_SCRIPT
@@ -28,6 +28,14 @@ from utank_hil.config_laws import PassiveLaw
 from utank_hil.runtime import stop_on_signals
 
 POLL_S: Final = 0.1
+BEGIN_AFTER_NS: Final = 200_000_000
+"""From the moment when both sides are ready to the first tick of both: they look every 10 ms."""
+READY_POLL_S: Final = 0.01
+
+LEAST_REACH: Final = 0.5
+"""A run that came less far than this share of the longest does not shorten what is compared."""
+LEAST_ROWS: Final = 0.9
+"""A run with less than this share of its rows in the time compared is not compared."""
 
 Progress = Callable[[str, float], None]
 """Told a run's name and the seconds of it that are done."""
@@ -37,18 +45,27 @@ Progress = Callable[[str, float], None]
 class BenchResult:
     """Everything a bench measured.
 
+    All runs are compared over one window of the ship's time, which is the time of the waves.
+
     Attributes
     ----------
     scenario : Scenario
     mode : str
         "lockstep", "real time" or "real time on" and the interface.
     seed : int
-    duration_s, settle_s : float
-        Length of each run, and what the statistics leave out at its start.
+    duration_s : float
+        Length asked for of each run.
+    settle_s, end_s : float
+        The window: what is left out at the start, and where the shortest run ended that came at
+        least `LEAST_REACH` as far as the longest.
     without_tank_rad : ndarray, shape (n,)
-        Roll of the bare ship in the same waves, every `RECORD_S`.
+        Roll of the bare ship in the same waves, every `RECORD_S` up to `end_s`.
     runs : tuple of Run
-        The passive tank first.
+        Those with at least one row; the passive tank first.
+    not_run : tuple of str
+        Names of the others.
+    interrupted : bool
+        Whether it was ended from outside.
     wall_s : float
         Time all of it took.
     """
@@ -58,9 +75,25 @@ class BenchResult:
     seed: int
     duration_s: float
     settle_s: float
+    end_s: float
     without_tank_rad: FloatArray
     runs: tuple[Run, ...]
+    not_run: tuple[str, ...]
+    interrupted: bool
     wall_s: float
+
+    @property
+    def expected_rows(self) -> int:
+        """Rows that a run has in the window if none is left out."""
+        return max(1, round((self.end_s - self.settle_s) / RECORD_S))
+
+    def rows_compared(self, run: Run) -> int:
+        """Rows that a run has in the window."""
+        return int(run.between(self.settle_s, self.end_s).sum())
+
+    def compares(self, run: Run) -> bool:
+        """Whether a run has enough rows in the window to stand beside the others."""
+        return self.rows_compared(run) >= LEAST_ROWS * self.expected_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,27 +118,45 @@ class BenchOptions:
     duration_s: float | None = None
 
 
-class _Watch:
-    """Progress and end of a run, shared with the process that shows it."""
+class _Board:
+    """What the bench and the processes of its runs tell each other, in shared memory."""
 
-    def __init__(self, done_s: "Synchronized[float]", stop: "Synchronized[bool]") -> None:
-        self._done_s = done_s
-        self._stop = stop
+    def __init__(self, context: SpawnContext, runs: int) -> None:
+        self.done_s = [context.Value("d", 0.0, lock=False) for _ in range(runs)]
+        self.stop = context.Value("b", False, lock=False)
+        self.ready = context.Value("i", 0)
+        self.begin_ns = context.Value("q", 0, lock=False)
+
+
+class _Watch:
+    """The board as one run sees it."""
+
+    def __init__(self, board: _Board, index: int) -> None:
+        self._board = board
+        self._done_s = board.done_s[index]
 
     def stopped(self, done_s: float) -> bool:
         self._done_s.value = done_s
-        return bool(self._stop.value)
+        return bool(self._board.stop.value)
+
+    def begin_ns(self) -> int:
+        board = self._board
+        with board.ready.get_lock():
+            board.ready.value += 1
+        while not board.begin_ns.value and not board.stop.value:
+            time.sleep(READY_POLL_S)
+        return int(board.begin_ns.value)
 
 
 # what the processes of the pool inherit: shared values can't be sent along with a job
-_watches: list[_Watch] = []
+_boards: list[_Board] = []
 
 
-def _prepare(done_s: "list[Synchronized[float]]", stop: "Synchronized[bool]") -> None:
+def _prepare(board: _Board) -> None:
     # Ctrl-C reaches the whole process group; the parent alone decides what it means
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    _watches[:] = [_Watch(done, stop) for done in done_s]
+    _boards[:] = [board]
 
 
 @contextmanager
@@ -119,7 +170,7 @@ def _interrupts_waiting() -> Iterator[None]:
 
 
 def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
-    return function(*arguments, _watches[index])
+    return function(*arguments, _Watch(_boards[0], index))
 
 
 def jobs_of(scenario: Scenario, seed: int, duration_s: float) -> list[Job]:
@@ -151,7 +202,6 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     Returns
     -------
     BenchResult
-        Without the runs that were ended before their first sample.
 
     Raises
     ------
@@ -163,40 +213,58 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     jobs = jobs_of(scenario, seed, duration_s)
     started = time.monotonic()
     context = multiprocessing.get_context("spawn")
-    done_s = [context.Value("d", 0.0, lock=False) for _ in jobs]
-    stop = context.Value("b", False, lock=False)
     workers = 2 if options.channel is not None or not options.real_time else 1
-    with (
-        stop_on_signals() as stopped,
-        ProcessPoolExecutor(
-            workers, mp_context=context, initializer=_prepare, initargs=(done_s, stop)
-        ) as pool,
-    ):
-        runs = list(_run_all(pool, jobs, options, done_s, stop, stopped, progress))
-    if len(runs[0].rows) == 0:
+    with stop_on_signals() as stopped:
+        board = _Board(context, len(jobs))
+        with ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_prepare, initargs=(board,)
+        ) as pool:
+            runs = list(_run_all(pool, jobs, options, board, stopped, progress))
+        interrupted = stopped()
+    if not runs or len(runs[0].rows) == 0:
         raise InterruptedError("ended before the first sample")
-    runs = [run for run in runs if len(run.rows)]
-    moment = scenario.wave_moment(seed)
-    count = max(len(run.rows) for run in runs)
-    shortest = min(len(run.rows) for run in runs)
+    done = tuple(run for run in runs if len(run.rows))
+    settle_s, end_s = window_s(done, scenario.settle_s)
     return BenchResult(
         scenario,
         _mode(options),
         seed,
-        count * RECORD_S,
-        min(scenario.settle_s, shortest * RECORD_S / 2),
-        roll_without_tank(scenario.sailing_ship, moment, RECORD_S, count),
-        tuple(runs),
+        duration_s,
+        settle_s,
+        end_s,
+        roll_without_tank(
+            scenario.vessel.ship,
+            scenario.wave_moment(seed),
+            RECORD_S,
+            round(end_s / RECORD_S),
+            later_ship=scenario.sailing_ship,
+            later_from_s=scenario.actual_from_s,
+        ),
+        done,
+        tuple(job.name for job in jobs if job.name not in {run.name for run in done}),
+        interrupted,
         time.monotonic() - started,
     )
+
+
+def window_s(runs: tuple[Run, ...], settle_s: float) -> tuple[float, float]:
+    """Start and end of what is compared of runs, on the ship's time and on the grid of the rows.
+
+    The end is that of the shortest run; but a run counts only if it came at least `LEAST_REACH` as
+    far as the longest, so that one that was ended early doesn't leave too little of the others. At
+    least half of what there is lies in the window, however short that is.
+    """
+    longest_s = max(run.end_s for run in runs)
+    end_s = min(run.end_s for run in runs if run.end_s >= LEAST_REACH * longest_s)
+    start_s = min(settle_s, end_s / 2)
+    return RECORD_S * round(start_s / RECORD_S), RECORD_S * round(end_s / RECORD_S)
 
 
 def _run_all(
     pool: ProcessPoolExecutor,
     jobs: list[Job],
     options: BenchOptions,
-    done_s: "list[Synchronized[float]]",
-    stop: "Synchronized[bool]",
+    board: _Board,
     stopped: Callable[[], bool],
     progress: Progress,
 ) -> Iterable[Run]:
@@ -207,8 +275,12 @@ def _run_all(
     def wait(futures: list[Future[Any]]) -> list[Any]:
         while not all(future.done() for future in futures):
             time.sleep(POLL_S)
-            stop.value = stopped()
-            for job, done in zip(jobs, done_s, strict=True):
+            # where one side has failed, the other must not wait for it
+            failed = any(future.done() and future.exception() for future in futures)
+            board.stop.value = stopped() or failed
+            if board.ready.value == len(futures) and not board.begin_ns.value:
+                board.begin_ns.value = time.monotonic_ns() + BEGIN_AFTER_NS
+            for job, done in zip(jobs, board.done_s, strict=True):
                 progress(job.name, done.value)
         return [future.result() for future in futures]
 
@@ -216,9 +288,12 @@ def _run_all(
         yield from wait([start(run_lockstep, index, job) for index, job in enumerate(jobs)])
         return
     for index, job in enumerate(jobs):
+        if stopped():
+            return
         if options.channel is None:
             yield from wait([start(run_in_one_process, index, job)])
         else:
+            board.ready.value = board.begin_ns.value = 0
             ship, controller = wait(
                 [
                     start(run_ship, index, job, options.channel),

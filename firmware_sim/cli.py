@@ -1,31 +1,35 @@
 """Command line ``firmware-sim``: the ship's side alone."""
 
-import json
-import sys
-from dataclasses import asdict
-from pathlib import Path
-from typing import Annotated
+from utank_hil.commands.loading import quietly_interruptible
 
-import typer
-from rich.console import Console
+with quietly_interruptible():
+    import json
+    import sys
+    from dataclasses import asdict
+    from pathlib import Path
+    from typing import Annotated
 
-import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-from firmware_sim.assembly import build_ship_side
-from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
-from firmware_sim.scenario import Scenario
-from firmware_sim.truth import TRUTH, TruthRecorder
-from utank_hil.analysis.metrics import pump_statistics, roll_statistics
-from utank_hil.canbus import SocketCanPort
-from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
-from utank_hil.commands.timing import timing_table
-from utank_hil.runtime import (
-    LoopStatistics,
-    Node,
-    RealTimeLoop,
-    real_time_scheduling,
-    stop_on_signals,
-)
-from utank_hil.telemetry.table import Table
+    import typer
+    from rich.console import Console
+
+    import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
+    from firmware_sim.assembly import build_ship_side
+    from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
+    from firmware_sim.scenario import Scenario
+    from firmware_sim.truth import TRUTH, TruthRecorder
+    from utank_hil.analysis.metrics import pump_statistics, roll_statistics
+    from utank_hil.canbus import SocketCanPort
+    from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
+    from utank_hil.commands.tables import print_table
+    from utank_hil.commands.timing import timing_table
+    from utank_hil.runtime import (
+        LoopStatistics,
+        Node,
+        RealTimeLoop,
+        real_time_scheduling,
+        stop_on_signals,
+    )
+    from utank_hil.telemetry.table import Table
 
 app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 
@@ -89,7 +93,7 @@ def firmware_sim(
         sys.stdout.write(json.dumps(summary) + "\n")
         return
     console = Console(highlight=False)
-    console.print(timing_table({"ship": statistics}))
+    print_table(console, timing_table({"ship": statistics}))
     console.print(
         f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "
         f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; "

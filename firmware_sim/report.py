@@ -18,18 +18,19 @@ from utank_hil.analysis.metrics import (
     pump_statistics,
     roll_statistics,
 )
-from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.telemetry import BenchCurve, draw_bench, write_recording
 
 NO_TANK: Final = "no tank"
+PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
+REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES)
 LEAST_ROLL_RAD: Final = 1e-6
 """Less roll than this is none: a share of it says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """One run in figures.
+    """One run in figures, over the window of the bench.
 
     Attributes
     ----------
@@ -37,14 +38,14 @@ class RunFigures:
     roll : RollStatistics
     roll_below_no_tank, roll_below_passive : float or None
         Share by which the roll RMS is less than without a tank, and than with the passive tank;
-        None where there is no roll to be below, on still water.
+        None where there is no roll to be below, on still water, or no passive run to compare with.
     pump : PumpStatistics
     bus_load : float
     refused_commands : int
     mode, fault : str
         Of the controller at the end of the run.
     active_share : float
-        Share of the judged time in which the controller was in charge.
+        Share of the window in which the controller was in charge.
     """
 
     name: str
@@ -60,43 +61,43 @@ class RunFigures:
 
 
 def figures(result: BenchResult) -> tuple[RollStatistics, tuple[RunFigures, ...]]:
-    """Figures of the bare ship, and of each run."""
-    skip = int(result.settle_s / RECORD_S)
-    bare_rad, passive = result.without_tank_rad, result.runs[0]
-    return roll_statistics(bare_rad[skip:]), tuple(
-        _figures(run, skip, bare_rad, passive) for run in result.runs
-    )
+    """Figures of the bare ship, and of each run that can be compared with it."""
+    bare = roll_statistics(result.without_tank_rad[round(result.settle_s / RECORD_S) :])
+    compared = [run for run in result.runs if result.compares(run)]
+    passive = next((_roll(result, run) for run in compared if run.name == PASSIVE), None)
+    return bare, tuple(_figures(result, run, bare, passive) for run in compared)
 
 
-def _figures(run: Run, skip: int, bare_rad: FloatArray, passive: Run) -> RunFigures:
-    # a run that was ended early is compared over the time it had
-    count = min(len(run.rows), len(passive.rows))
-    compared_rad, without_tank_rad, passive_rad = (
-        roll_statistics(roll_rad[skip:count]).rms_rad
-        for roll_rad in (run.column("true_roll_rad"), bare_rad, passive.column("true_roll_rad"))
-    )
-    roll = roll_statistics(run.column("true_roll_rad")[skip:])
-    mode = run.column("mode")
+def _roll(result: BenchResult, run: Run) -> RollStatistics:
+    window = run.between(result.settle_s, result.end_s)
+    return roll_statistics(run.column("true_roll_rad")[window])
+
+
+def _figures(
+    result: BenchResult, run: Run, bare: RollStatistics, passive: RollStatistics | None
+) -> RunFigures:
+    window = run.between(result.settle_s, result.end_s)
+    roll, mode = _roll(result, run), run.column("mode")
     return RunFigures(
         name=run.name,
         roll=roll,
-        roll_below_no_tank=_share_below(compared_rad, without_tank_rad),
-        roll_below_passive=_share_below(compared_rad, passive_rad),
+        roll_below_no_tank=_share_below(roll, bare),
+        roll_below_passive=None if passive is None else _share_below(roll, passive),
         pump=pump_statistics(
-            run.column("true_pressure_pa")[skip:],
-            run.column("true_shaft_power_w")[skip:],
-            run.column("true_level_m")[skip:],
+            run.column("true_pressure_pa")[window],
+            run.column("true_shaft_power_w")[window],
+            run.column("true_level_m")[window],
         ),
         bus_load=run.bus_load,
         refused_commands=run.refused_commands,
         mode=Mode(int(mode[-1])).name,
         fault=Fault(int(run.column("fault")[-1])).name,
-        active_share=float((mode[skip:] == Mode.ACTIVE).mean()),
+        active_share=float((mode[window] == Mode.ACTIVE).mean()),
     )
 
 
-def _share_below(value: float, reference: float) -> float | None:
-    return None if reference < LEAST_ROLL_RAD else 1.0 - value / reference
+def _share_below(roll: RollStatistics, reference: RollStatistics) -> float | None:
+    return None if reference.rms_rad < LEAST_ROLL_RAD else 1.0 - roll.rms_rad / reference.rms_rad
 
 
 def motion_table(result: BenchResult) -> RichTable:
@@ -110,14 +111,14 @@ def motion_table(result: BenchResult) -> RichTable:
         "RMS below\nno tank",
         "RMS below\npassive",
     )
+    table.caption = f"{result.settle_s:g} s to {result.end_s:g} s of the same waves"
     table.add_row(NO_TANK, *_roll_cells(bare))
     for run in runs:
-        first = run is runs[0]
         table.add_row(
             run.name,
             *_roll_cells(run.roll),
             _percent(run.roll_below_no_tank),
-            "" if first else _percent(run.roll_below_passive),
+            "" if run.name == PASSIVE else _percent(run.roll_below_passive),
         )
     return table
 
@@ -150,12 +151,24 @@ def pump_table(result: BenchResult) -> RichTable:
 def endings(result: BenchResult) -> list[str]:
     """What is to be said of how runs ended; nothing where all went as the operator wanted."""
     said = []
+    if result.interrupted:
+        said.append(f"ended at {result.end_s:g} of {result.duration_s:g} s")
+    if result.not_run:
+        said.append(f"not run: {', '.join(result.not_run)}")
+    said += [_why_not_compared(result, run) for run in result.runs if not result.compares(run)]
     for run in figures(result)[1]:
         if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
             said.append(f"{run.name}: the controller ended in {run.mode}, fault {run.fault}")
         elif run.name != PASSIVE and run.active_share == 0:
             said.append(f"{run.name}: the controller was never in charge")
     return said
+
+
+def _why_not_compared(result: BenchResult, run: Run) -> str:
+    return (
+        f"{run.name}: not compared, ended at {run.end_s:g} s with {result.rows_compared(run)} of "
+        f"the {result.expected_rows} rows from {result.settle_s:g} s to {result.end_s:g} s"
+    )
 
 
 def _percent(share: float | None) -> str:
@@ -173,52 +186,85 @@ def _table(title: str, *headings: str) -> RichTable:
 def _roll_cells(roll: RollStatistics) -> tuple[str, str, str]:
     return (
         f"{math.degrees(roll.rms_rad):.2f}",
-        f"{math.degrees(roll.significant_rad):.2f}",
+        "" if roll.significant_rad is None else f"{math.degrees(roll.significant_rad):.2f}",
         f"{math.degrees(roll.maximum_rad):.2f}",
     )
 
 
 def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
-    """Everything in the tables, in SI units, ready for `json.dumps`."""
-    bare, runs = figures(result)
+    """Everything in the tables, in SI units, ready for `json.dumps`.
+
+    A run that is not compared has no figures, but the rest.
+    """
+    bare, compared = figures(result)
+    by_name = {run.name: asdict(run) for run in compared}
     return {
         "scenario": result.scenario.name,
         "mode": result.mode,
         "seed": result.seed,
         "duration_s": result.duration_s,
         "settle_s": result.settle_s,
+        "end_s": result.end_s,
+        "interrupted": result.interrupted,
+        "not_run": list(result.not_run),
         "wall_s": result.wall_s,
         "no_tank": asdict(bare),
         "runs": [
             {
-                **asdict(run),
-                "loop": None if done.loop is None else done.loop.statistics.summary(),
-                "retuning": retuning_figures(done, result.settle_s),
+                "name": run.name,
+                "compared": run.name in by_name,
+                "rows": result.rows_compared(run),
+                "expected_rows": result.expected_rows,
+                "end_s": run.end_s,
+                "bus_load": run.bus_load,
+                "refused_commands": run.refused_commands,
+                **by_name.get(run.name, {}),
+                "loop": None if run.loop is None else run.loop.statistics.summary(),
+                "retuning": retuning_figures(run, result.settle_s),
             }
-            for run, done in zip(runs, result.runs, strict=True)
+            for run in result.runs
         ],
         "files": {name: str(path) for name, path in files.items()},
     }
 
 
-def write_report(result: BenchResult, folder: Path) -> dict[str, Path]:
+def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], list[str]]:
     """Write picture, recording and figures of a bench.
 
     Returns
     -------
-    dict
-        Path of each: "picture", "recording", "figures".
+    files : dict
+        Path of each that was written: "picture", "recording", "figures".
+    failures : list of str
+        What could not be written, and why.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    files = {
-        "picture": folder / "bench.png",
-        "recording": folder / "bench.rrd",
-        "figures": folder / "bench.json",
-    }
+    files: dict[str, Path] = {}
+    failures = []
+
+    def write_figures(result: BenchResult, path: Path) -> None:
+        told = as_json(result, files | {"figures": path})
+        path.write_text(json.dumps(told, indent=2) + "\n")
+
+    for name, file, write in (
+        ("picture", PICTURE, _draw),
+        ("recording", RECORDING, _record),
+        ("figures", FIGURES, write_figures),  # last, because they name the others
+    ):
+        try:
+            write(result, folder / file)
+        except (OSError, RuntimeError) as error:
+            failures.append(f"the {name} could not be written: {error}")
+        else:
+            files[name] = folder / file
+    return files, failures
+
+
+def _draw(result: BenchResult, path: Path) -> None:
+    told = {run.name: run for run in figures(result)[1]}
     draw_bench(
         [
             BenchCurve(
-                run.name,
+                _legend(run.name, told.get(run.name)),
                 run.column("time_s"),
                 run.column("true_roll_rad"),
                 run.column("true_level_m"),
@@ -226,9 +272,19 @@ def write_report(result: BenchResult, folder: Path) -> dict[str, Path]:
             )
             for run in result.runs
         ],
-        files["picture"],
+        path,
         title=f"{result.scenario.name}, seed {result.seed}, {result.mode}",
     )
-    write_recording(files["recording"], COLUMNS, {run.name: run.rows for run in result.runs})
-    files["figures"].write_text(json.dumps(as_json(result, files), indent=2) + "\n")
-    return files
+
+
+def _legend(name: str, told: RunFigures | None) -> str:
+    """Name of a run with the roll that the table shows, and what that is against the passive."""
+    if told is None:
+        return f"{name}: not compared"
+    below = None if name == PASSIVE else told.roll_below_passive
+    change = "" if below is None else f" ({-below:+.0%})".replace("-", "−")
+    return f"{name}: roll {math.degrees(told.roll.rms_rad):.2f}° RMS{change}"
+
+
+def _record(result: BenchResult, path: Path) -> None:
+    write_recording(path, COLUMNS, {run.name: run.rows for run in result.runs})

@@ -1,11 +1,12 @@
 """One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from firmware_sim.assembly import ShipSide, build_ship_side
 from firmware_sim.scenario import Scenario
@@ -17,6 +18,7 @@ from utank_hil.config import ControllerConfig
 from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
+    MonotonicClock,
     Node,
     RealTimeLoop,
     SchedulingReport,
@@ -48,6 +50,13 @@ class Watch(Protocol):
 
     def stopped(self, done_s: float) -> bool:
         """Take note of the progress; say whether the run shall end now."""
+
+
+class Meeting(Watch, Protocol):
+    """Watches a run of two processes, and has both begin together."""
+
+    def begin_ns(self) -> int:
+        """Tell that this side is ready; when both shall begin, on the monotonic clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +103,9 @@ class Run:
     ----------
     name : str
     rows : ndarray, shape (n, len(COLUMNS))
-        Controller's telemetry and the truth, every `RECORD_S`.
+        Controller's telemetry and the truth, every `RECORD_S`, on the ship's time: `time_s` counts
+        from the moment at which she began to move in the waves. In real time rows are left out
+        that a late ship did not write, or for which the controller said nothing.
     bus_load : float
         Mean share of the bus in use.
     refused_commands : int
@@ -118,6 +129,16 @@ class Run:
     def column(self, name: str) -> FloatArray:
         """One column of `rows`, shape (n,)."""
         return self.rows[:, COLUMNS.index(name)]
+
+    @property
+    def end_s(self) -> float:
+        """The ship's time at the end of the last row; 0 if there is none."""
+        return float(self.rows[-1, 0]) + RECORD_S if len(self.rows) else 0.0
+
+    def between(self, start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
+        """Which rows lie in a span of the ship's time, shape (n,)."""
+        time_s, half_s = self.column("time_s"), RECORD_S / 2
+        return (time_s > start_s - half_s) & (time_s < end_s - half_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +185,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
 
 def run_in_one_process(job: Job, watch: Watch) -> Run:
     """Run in real time with all nodes in one loop and no bus but the loop itself."""
+    _load_kernel(job)
     ship, truth, truth_table = _ship(job)
     statistics = LoopStatistics()
     with _retuner(job.controller) as retuner:
@@ -181,24 +203,26 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
     )
 
 
-def run_ship(job: Job, channel: str, watch: Watch) -> ShipRun:
+def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     """Run the ship's side on a SocketCAN interface."""
+    _load_kernel(job)
     ship, truth, truth_table = _ship(job)
-    _run_loop(job, [*ship.nodes, truth], channel, LoopStatistics(), watch)
+    nodes: list[Node] = [*ship.nodes, truth]
+    _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
     return ShipRun(truth_table.rows, truth.start_ns, ship.drive.refused, ship.plant.pump_energy_j)
 
 
-def run_controller(job: Job, channel: str, watch: Watch) -> ControllerRun:
+def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
     with _retuner(job.controller) as retuner:
         controller, table = _controller(job, retuner, statistics)
-        loop = _run_loop(job, [controller], channel, statistics, watch)
+        loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(table.rows, controller.start_ns, loop, controller.retuning_events)
 
 
 def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
-    """Put the halves of a run on a real bus side by side, on the controller's time."""
+    """Put the halves of a run on a real bus side by side, on the ship's time."""
     shift_s = (controller.start_ns - ship.start_ns) / SECOND_NS
     rows = _side_by_side(controller.rows, ship.rows, shift_s)
     return Run(
@@ -210,6 +234,13 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         controller.loop,
         controller.retuning,
     )
+
+
+def _load_kernel(job: Job) -> None:
+    """Have the plant's compiled code loaded, which would cost the first ticks of a run."""
+    plant = build_ship_side(job.scenario, job.seed, ()).plant
+    for now_ns in (0, TICK_NS):
+        plant.advance(now_ns)
 
 
 def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, Table]:
@@ -245,6 +276,7 @@ def _run_loop(
     channel: str | None,
     statistics: LoopStatistics,
     watch: Watch,
+    begin_ns: Callable[[], int] | None = None,
 ) -> LoopResult:
     port = None if channel is None else SocketCanPort(channel)
     loop = RealTimeLoop(nodes, port, statistics=statistics)
@@ -255,6 +287,8 @@ def _run_loop(
 
     try:
         with real_time_scheduling() as scheduling:
+            if begin_ns is not None:  # asked last: from here on nothing is left to load or build
+                MonotonicClock().sleep_until(begin_ns())
             loop.run(stop, job.ticks * TICK_NS)
     finally:
         if port is not None:
@@ -263,16 +297,16 @@ def _run_loop(
 
 
 def _side_by_side(told: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:
-    """Join rows of controller and ship, both of which begin with their time, by that time.
+    """Join rows of controller and ship, both of which begin with their time, on the ship's time.
 
-    Not by their numbers: in real time a late tick leaves a row out, on one side or on both.
-    `shift_s` is the time from the ship's start to the controller's.
+    Beside each row of the truth stands the controller's row that is nearest in time: not the one of
+    the same number, because in real time a late tick leaves a row out, on one side or on both. A
+    row is left out that the controller has none for within `RECORD_S`. `shift_s` is the time from
+    the ship's start to the controller's.
     """
-    if len(truth) == 0:
+    if len(truth) == 0 or len(told) == 0:
         return np.empty((0, len(COLUMNS)))
-    when_s = told[:, 0] + shift_s
-    half_s = RECORD_S / 2
-    told = told[(when_s > truth[0, 0] - half_s) & (when_s < truth[-1, 0] + half_s)]
-    middles_s = (truth[1:, 0] + truth[:-1, 0]) / 2
-    nearest = np.searchsorted(middles_s, told[:, 0] + shift_s)
-    return np.hstack([told, truth[nearest, 1:]])
+    told_s = told[:, 0] + shift_s
+    nearest = np.searchsorted((told_s[1:] + told_s[:-1]) / 2, truth[:, 0])
+    shown = np.abs(told_s[nearest] - truth[:, 0]) <= RECORD_S
+    return np.hstack([truth[shown, :1], told[nearest[shown], 1:], truth[shown, 1:]])

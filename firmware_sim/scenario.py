@@ -1,20 +1,20 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
-import math
-from dataclasses import replace
-from datetime import datetime
-from pathlib import Path
-from typing import Annotated, Literal
+from dataclasses import fields, replace
+from typing import Annotated, Any, Final
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from firmware_sim.drive import DriveLimits
+from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
-from utank_hil.config import ControllerConfig, Vessel
+from utank_hil.config import ControllerConfig, Vessel, tank_problems
 from utank_hil.config_files import Section
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.parameters import ParameterError, Problem, refuse
 from utank_hil.runtime.panel import TimedAction
-from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap, load_ndbc
+from utank_hil.sea import Harmonics
 
 MOST_CONTROLLERS = 7
 """More runs than these and the passive one can't be told apart in a picture."""
@@ -22,68 +22,12 @@ MOST_CONTROLLERS = 7
 PASSIVE = "passive"
 """Name of the run with the tank alone."""
 
+LONGEST_S: Final = 86_400.0
+"""Longest run: its rows are kept in memory."""
 
-class MeasuredSea(Section):
-    """One hour of a buoy's record."""
-
-    kind: Literal["measured"]
-    file: Path
-    time: datetime
-    """Start of the record's hour, UTC, as written in the file."""
-    heading_deg: float = 90.0
-    effective_slope: EffectiveSlope = EffectiveSlope()
-
-    @model_validator(mode="after")
-    def _hour_is_there(self) -> "MeasuredSea":
-        try:
-            self.sea(0)
-        except OSError as error:  # pydantic lists ValueErrors with their place, and nothing else
-            raise ValueError(f"file {self.file} can't be read: {error.strerror}") from error
-        return self
-
-    def sea(self, seed: int) -> Sea:
-        """A realisation of the hour's spectrum."""
-        spectrum = load_ndbc(self.file).at(self.time.isoformat())
-        return Sea.irregular(spectrum, seed, heading_rad=math.radians(self.heading_deg))
-
-
-class JonswapSea(Section):
-    """A model spectrum of a growing sea."""
-
-    kind: Literal["jonswap"]
-    hs_m: Annotated[float, Field(gt=0)]
-    tp_s: Annotated[float, Field(gt=0)]
-    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
-    heading_deg: float = 90.0
-    speed_m_s: Annotated[float, Field(ge=0)] = 0.0
-    effective_slope: EffectiveSlope = EffectiveSlope()
-
-    def sea(self, seed: int) -> Sea:
-        """A realisation of the spectrum."""
-        return Sea.irregular(
-            jonswap(self.hs_m, self.tp_s, self.gamma),
-            seed,
-            heading_rad=math.radians(self.heading_deg),
-            speed_m_s=self.speed_m_s,
-        )
-
-
-class RegularSea(Section):
-    """One wave."""
-
-    kind: Literal["regular"]
-    amplitude_m: Annotated[float, Field(ge=0)]
-    period_s: Annotated[float, Field(gt=0)]
-    heading_deg: float = 90.0
-    effective_slope: EffectiveSlope = EffectiveSlope()
-
-    def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw
-        """The wave."""
-        return Sea.regular(
-            self.amplitude_m,
-            2 * math.pi / self.period_s,
-            heading_rad=math.radians(self.heading_deg),
-        )
+# where the user sets none, drive and high-level switch are as the first ship's to her pump and tank
+_DRIVE_RATE_PER_PRESSURE: Final = 5.0
+_HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
 
 
 class Scenario(Section):
@@ -91,15 +35,16 @@ class Scenario(Section):
 
     name: str
     vessel: Vessel
-    sea: Annotated[MeasuredSea | JonswapSea | RegularSea, Field(discriminator="kind")]
-    sensors: SensorErrors = SensorErrors()
-    drive: DriveLimits = DriveLimits()
+    sea: ScenarioSea
+    sensors: Annotated[SensorErrors, Field(default_factory=dict, validate_default=True)]
+    drive: Annotated[DriveLimits, Field(default_factory=dict, validate_default=True)]
+    """Limits not given follow from the vessel's pump."""
     controllers: Annotated[
         dict[str, ControllerConfig], Field(min_length=1, max_length=MOST_CONTROLLERS)
     ]
     operator: tuple[TimedAction, ...]
     """What the operator does in the runs with a controller; in the passive run nobody arms."""
-    duration_s: Annotated[float, Field(gt=0)]
+    duration_s: Annotated[float, Field(gt=0, le=LONGEST_S)]
     settle_s: Annotated[float, Field(ge=0)]
     """Left out of the statistics at the start."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -110,18 +55,38 @@ class Scenario(Section):
     retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
     """Time that identification and design take in simulated time."""
 
+    @field_validator("sensors", mode="before")
+    @classmethod
+    def _switch_below_the_roof(cls, sensors: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        if vessel is None or not isinstance(sensors, dict):
+            return sensors
+        return {"high_level_m": vessel.tank.level_limit_m * _HIGH_LEVEL_SHARE, **sensors}
+
+    @field_validator("drive", mode="before")
+    @classmethod
+    def _as_the_pump_can(cls, drive: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        if vessel is None or not isinstance(drive, dict):
+            return drive
+        pressure_pa = vessel.pump.max_pressure_pa
+        rate_pa_s = min(_DRIVE_RATE_PER_PRESSURE * pressure_pa, vessel.pump.max_pressure_rate_pa_s)
+        return {"pressure_pa": pressure_pa, "pressure_rate_pa_s": rate_pa_s, **drive}
+
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
+        problems = []
         if self.settle_s >= self.duration_s:
-            raise ValueError("settle_s must be less than duration_s, else nothing is left to judge")
+            reason = "must be less than duration_s, else nothing is left to judge"
+            problems.append(("settle_s", reason))
         if PASSIVE in self.controllers:
-            raise ValueError("controllers must not name one 'passive': that run is always made")
+            reason = (
+                "names one 'passive', the run without a controller that is always made: rename it"
+            )
+            problems.append(("controllers", reason))
         for name, controller in self.controllers.items():
-            self._check_drive_takes(name, controller)
-        try:
-            _ = self.sailing_ship
-        except TypeError as error:  # an unknown key; a wrong value is a ValueError already
-            raise ValueError(f"actual_ship: {error}") from error
+            problems += self._controller_problems(name, controller)
+        refuse("", [*problems, *self._ship_problems(), *self._sea_problems()])
         return self
 
     @property
@@ -129,18 +94,61 @@ class Scenario(Section):
         """The ship as she is from `actual_from_s` on."""
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
 
-    def _check_drive_takes(self, name: str, controller: ControllerConfig) -> None:
-        """Raise if the drive would refuse what a controller may send."""
+    def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
+        """Why a controller would never arm, or the drive would refuse what it may send."""
+        problems = []
+        if controller.vessel.version != self.vessel.version:
+            problems.append(
+                (
+                    f"controllers.{name}",
+                    f"is for another ship, {controller.vessel.name}: it would never arm on "
+                    f"{self.vessel.name}; name the same ship file in both",
+                )
+            )
         limits, drive = controller.limits, self.drive
-        for key, sent, taken in (
-            ("limits.pressure_pa", limits.pressure_pa, drive.pressure_pa),
-            ("limits.rate_pa_s", limits.rate_pa_s, drive.pressure_rate_pa_s),
-            ("command_timeout_ms", controller.command_timeout_ms, drive.longest_timeout_ms),
+        for key, taken, sender, sent in (
+            ("pressure_pa", drive.pressure_pa, "limits.pressure_pa", limits.pressure_pa),
+            ("pressure_rate_pa_s", drive.pressure_rate_pa_s, "limits.rate_pa_s", limits.rate_pa_s),
+            (
+                "longest_timeout_ms",
+                drive.longest_timeout_ms,
+                "command_timeout_ms",
+                controller.command_timeout_ms,
+            ),
         ):
             if sent > taken:
-                raise ValueError(
-                    f"controllers.{name}.{key} is {sent:g}, but the drive takes {taken:g} at most"
+                problems.append(
+                    (
+                        f"drive.{key}",
+                        f"takes {taken:g} at most, but controllers.{name}.{sender} is {sent:g}: "
+                        "lower that, or raise this",
+                    )
                 )
+        return problems
+
+    def _ship_problems(self) -> list[Problem]:
+        known = [field.name for field in fields(RollShip)]
+        unknown = [key for key in self.actual_ship if key not in known]
+        if unknown:
+            reason = f"is not a known key; a ship has {', '.join(known)}"
+            return [(f"actual_ship.{key}", reason) for key in unknown]
+        try:
+            wrong = tank_problems(self.sailing_ship, self.vessel.tank)
+        except ParameterError as error:
+            return [(f"actual_ship.{name}", reason) for name, reason in error.problems]
+        except TypeError as error:  # a single number where the ship has several
+            return [("actual_ship", str(error))]
+        return [("actual_ship", f"with it, the tank {reason}") for _, reason in wrong]
+
+    def _sea_problems(self) -> list[Problem]:
+        try:
+            with np.errstate(all="ignore"):
+                amplitudes = self.wave_moment(self.seed).amplitude
+        except (ValueError, ArithmeticError, MemoryError) as error:
+            return [("sea", f"can't be made: {error}")]
+        if not np.isfinite(amplitudes).all():
+            return [("sea", "has waves beyond all scale: check height, period and slope")]
+        return []
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the sea on the ship."""

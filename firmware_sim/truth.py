@@ -37,6 +37,7 @@ class TruthRecorder:
     """
 
     name = "truth"
+    hears: frozenset[int] = frozenset()
 
     def __init__(self, plant: Plant, table: Table, period_ns: int) -> None:
         self.period_ns = period_ns

@@ -1,17 +1,22 @@
+import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench
-from firmware_sim.report import as_json, figures, write_report
-from firmware_sim.run import COLUMNS, RECORD_S, run_lockstep
+from firmware_sim import report
+from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
+from firmware_sim.report import as_json, endings, figures, motion_table, write_report
+from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
+from utank_hil.analysis.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode
 from utank_hil.config_files import load_config
-from utank_hil.telemetry import read_recording
+from utank_hil.config_laws import PassiveLaw
+from utank_hil.telemetry import BenchCurve, read_recording
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 DURATION_S = 120.0
@@ -37,7 +42,10 @@ def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(stor
         np.testing.assert_allclose(np.diff(run.column("time_s")), RECORD_S, atol=1e-9)
         assert np.isfinite(run.rows).all()
         assert run.refused_commands == 0
-    assert result.duration_s == DURATION_S
+    assert (result.duration_s, result.not_run, result.interrupted) == (DURATION_S, (), False)
+    assert (result.settle_s, result.end_s) == pytest.approx((SETTLE_S, DURATION_S))
+    assert len(result.without_tank_rad) == len(result.runs[0].rows)
+    assert endings(result) == []
     assert {name for name, _ in progress} == {run.name for run in result.runs}
     assert max(done_s for _, done_s in progress) <= DURATION_S
 
@@ -102,7 +110,8 @@ def test_figures_follow_from_the_rows(storm) -> None:
 
 def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Path) -> None:
     result, _ = storm
-    files = write_report(result, tmp_path / "out")
+    files, failures = write_report(result, tmp_path)
+    assert failures == []
     assert files["picture"].read_bytes().startswith(b"\x89PNG")
     recording = read_recording(files["recording"])
     assert list(recording) == [run.name for run in result.runs]
@@ -115,6 +124,34 @@ def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Pat
     assert told == json.loads(json.dumps(as_json(result, files), allow_nan=False))
     assert [run["name"] for run in told["runs"]] == list(recording)
     assert told["files"]["picture"] == str(files["picture"])
+    assert all(run["compared"] and run["rows"] == run["expected_rows"] for run in told["runs"])
+
+
+def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monkeypatch) -> None:
+    result, _ = storm
+    drawn: list[BenchCurve] = []
+    monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
+    write_report(result, tmp_path)
+    cells = [list(column.cells) for column in motion_table(result).columns]
+    table = {row[0]: row for row in zip(*cells, strict=True)}
+    for run, curve in zip(result.runs, drawn, strict=True):
+        name, rms, *_, below = table[run.name]
+        assert f"{name}: roll {rms}° RMS" in curve.label
+        if below:
+            share = re.search(r"\((−|\+)(\d+)%\)", curve.label)
+            assert share
+            sign = -1 if share[1] == "+" else 1
+            assert sign * int(share[2]) == pytest.approx(float(below.rstrip("%")), abs=0.51)
+
+
+def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path: Path) -> None:
+    result, _ = storm
+    (tmp_path / "bench.rrd").mkdir()
+    files, failures = write_report(result, tmp_path)
+    assert set(files) == {"picture", "figures"}
+    assert len(failures) == 1
+    assert "recording" in failures[0]
+    assert set(json.loads(files["figures"].read_text())["files"]) == {"picture", "figures"}
 
 
 class Unwatched:
@@ -133,16 +170,126 @@ def test_same_seed_same_rows_in_any_process_and_another_seed_another_sea(storm) 
     )
 
 
-def test_unfinished_runs_are_compared_over_the_time_they_had(storm) -> None:
+def cut(run: Run, rows: slice) -> Run:
+    return dataclasses.replace(run, rows=run.rows[rows])
+
+
+def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> None:
     result, _ = storm
     *whole, last = result.runs
-    cut = last.__class__(last.name, last.rows[:1200], last.bus_load, 0, last.energy_j)
-    shortened = BenchResult(
-        result.scenario, result.mode, result.seed, result.duration_s, result.settle_s,
-        result.without_tank_rad, (*whole, cut), result.wall_s,
-    )  # fmt: skip
+    runs = (*whole, cut(last, slice(1800)))
+    settle_s, end_s = window_s(runs, SETTLE_S)
+    assert (settle_s, end_s) == pytest.approx((SETTLE_S, 90.0))
+    shortened = dataclasses.replace(
+        result,
+        runs=runs,
+        end_s=end_s,
+        without_tank_rad=result.without_tank_rad[:1800],
+        interrupted=True,
+        not_run=("lqg",),
+    )
     skip = round(SETTLE_S / RECORD_S)
-    passive = result.runs[0].column("true_roll_rad")[skip:1200]
-    told = figures(shortened)[1][-1]
-    expected = 1 - told.roll.rms_rad / math.sqrt(np.mean(passive**2))
-    assert told.roll_below_passive == pytest.approx(expected, rel=1e-9)
+    bare, told = figures(shortened)
+    rms = [
+        math.sqrt(np.mean(roll[skip:1800] ** 2))
+        for roll in (result.without_tank_rad, *(run.column("true_roll_rad") for run in runs))
+    ]
+    assert bare.rms_rad == pytest.approx(rms[0], rel=1e-12)
+    for run, own in zip(told, rms[1:], strict=True):
+        assert run.roll.rms_rad == pytest.approx(own, rel=1e-12)
+        assert run.roll_below_no_tank == pytest.approx(1 - own / rms[0], rel=1e-9)
+        assert run.roll_below_passive == pytest.approx(1 - own / rms[1], abs=1e-9)
+    assert endings(shortened) == ["ended at 90 of 120 s", "not run: lqg"]
+    assert "40 s to 90 s" in str(motion_table(shortened).caption)
+    as_told = as_json(shortened, {})
+    assert (as_told["interrupted"], as_told["not_run"]) == (True, ["lqg"])
+    assert (as_told["duration_s"], as_told["end_s"]) == (DURATION_S, pytest.approx(90.0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "why"),
+    [
+        (slice(200), "ended at 10 s with 0 of the 1600 rows from 40 s to 120 s"),
+        (slice(None, None, 2), "ended at 119.95 s with 800 of the 1600 rows from 40 s to 120 s"),
+        (slice(1000, None), "ended at 120 s with 1400 of the 1600 rows from 40 s to 120 s"),
+    ],
+)
+def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why: str) -> None:
+    result, _ = storm
+    *whole, last = result.runs
+    runs = (*whole, cut(last, rows))
+    assert window_s(runs, SETTLE_S) == pytest.approx((SETTLE_S, DURATION_S), abs=RECORD_S)
+    some = dataclasses.replace(result, runs=runs)
+    assert [run.name for run in figures(some)[1]] == [run.name for run in whole]
+    said = endings(some)
+    assert len(said) == 1
+    assert said[0].startswith(f"{last.name}: not compared, ")
+    assert why in said[0]
+    told = as_json(some, {})["runs"][-1]
+    assert (told["name"], told["compared"]) == (last.name, False)
+    assert "roll" not in told
+    # without the passive run, nothing is said to be below it
+    lone = dataclasses.replace(result, runs=(cut(whole[0], rows), *whole[1:], last))
+    assert all(run.roll_below_passive is None for run in figures(lone)[1])
+    assert all(run.roll_below_no_tank is not None for run in figures(lone)[1])
+
+
+def test_one_run_that_is_ended_early_does_not_leave_too_little_of_the_others(storm) -> None:
+    result, _ = storm
+    for reach_s, end_s in ((59.0, DURATION_S), (61.0, 61.0)):
+        runs = (*result.runs[:-1], cut(result.runs[-1], slice(round(reach_s / RECORD_S))))
+        assert window_s(runs, 10.0) == pytest.approx((10.0, end_s))
+    assert window_s(result.runs, 500.0) == pytest.approx((DURATION_S / 2, DURATION_S))
+
+
+def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
+    result, _ = storm
+    count = 40  # two seconds hold no cycle of the roll
+    short = dataclasses.replace(
+        result,
+        runs=tuple(cut(run, slice(count)) for run in result.runs),
+        settle_s=1.0,
+        end_s=2.0,
+        without_tank_rad=result.without_tank_rad[:count],
+    )
+    significant = list(motion_table(short).columns[2].cells)
+    assert significant == [""] * (1 + len(result.runs))
+    told = json.loads(json.dumps(as_json(short, {}), allow_nan=False))
+    assert told["no_tank"]["significant_rad"] is None
+
+
+def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
+    first = next(iter(STORM.controllers.values()))
+    passive = first.model_copy(update={"law": PassiveLaw(kind="passive")})
+    change_s = 8.0
+    changing = STORM.model_copy(
+        update={
+            "controllers": {"none": passive},
+            "actual_ship": {"inertia_kg_m2": 1.2e9, "stiffness_nm_rad": 6.7e8},
+            "actual_from_s": change_s,
+        }
+    )
+    result = run_bench(changing, BenchOptions(duration_s=20.0), lambda _name, _done: None)
+    bare = result.without_tank_rad
+    ship, moment = STORM.vessel.ship, STORM.wave_moment(STORM.seed)
+    before = RECORD_S * np.arange(len(bare)) <= change_s
+    alone = roll_without_tank(ship, moment, RECORD_S, len(bare))
+    np.testing.assert_allclose(bare[before], alone[before], rtol=0, atol=1e-9)
+    # after it, the equation of motion holds with the other ship: inertia times acceleration
+    step_s = 0.001
+    fine = roll_without_tank(
+        ship, moment, step_s, 20_000,
+        later_ship=changing.sailing_ship, later_from_s=change_s,
+    )  # fmt: skip
+    np.testing.assert_allclose(fine[:: round(RECORD_S / step_s)], bare, rtol=0, atol=1e-9)
+    for at in (8500, 15_000):
+        rate = (fine[at + 1] - fine[at - 1]) / (2 * step_s)
+        acceleration = (fine[at + 1] - 2 * fine[at] + fine[at - 1]) / step_s**2
+        left = 1.2e9 * acceleration + ship.damping_nms_rad * rate + 6.7e8 * fine[at]
+        assert left == pytest.approx(float(moment.at(at * step_s)), rel=1e-3)
+
+
+def test_an_interface_that_is_not_there_ends_the_bench_with_its_name() -> None:
+    options = BenchOptions(real_time=True, channel="nowhere0", duration_s=60.0)
+    with pytest.raises(OSError, match="nowhere0"):
+        run_bench(STORM, options, lambda _name, _done: None)

@@ -11,6 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import firmware_sim.report
 from firmware_sim.cli import app as ship_app
 from utank_hil.cli import app
 from utank_hil.telemetry import read_recording
@@ -232,10 +233,15 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     assert process.returncode == 0, errors
     assert "Traceback" not in errors
     report = json.loads(output)
-    assert 0 < report["duration_s"] < 36000
+    assert report["interrupted"]
+    assert report["duration_s"] == 36000
+    assert 0 < report["end_s"] < 36000
+    run = [each["name"] for each in report["runs"]]
+    assert run[0] == "passive"
+    assert sorted(run + report["not_run"]) == ["dpc", "gpc", "passive"]
     recording = read_recording(tmp_path / "bench.rrd")
-    assert set(recording) <= {"passive", "gpc", "dpc"}
-    assert recording["passive"]["time_s"][-1] <= report["duration_s"]
+    assert list(recording) == run
+    assert min(each["time_s"][-1] for each in recording.values()) < report["end_s"] + 0.05
 
 
 @pytest.mark.slow
@@ -247,7 +253,47 @@ def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
     assert process.returncode == 2
     assert "Traceback" not in errors
     assert "ended before the first sample" in errors
-    assert not (tmp_path / "out").exists()
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("place", ["file", "/proc/nowhere", "taken"])
+def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "taken" / "bench.png").mkdir(parents=True)
+    out = tmp_path / place
+    result = invoke(app, "bench", "--duration", "3600", "--out", out)
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    assert str(out) in said(result).replace(" ", "")
+    assert "choose another folder with --out" in said(result)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_arguments: object, **_more: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    for name in ("_draw", "_record"):
+        monkeypatch.setattr(firmware_sim.report, name, full)
+    result = invoke(app, "bench", "--duration", "4", "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "roll RMS" in result.stdout
+    for name in ("picture", "recording"):
+        assert f"the {name} could not be written: [Errno 28] No space left" in said(result)
+    assert (tmp_path / "bench.json").is_file()
+
+
+@pytest.mark.parametrize("command", ["design", "identify"])
+def test_other_commands_try_their_folder_first_too(tmp_path: Path, command: str) -> None:
+    (tmp_path / "out").write_text("mine")
+    gpc = CONFIGS / "controllers" / "gpc.yaml"
+    words = ("design", "controller", gpc) if command == "design" else ("identify", "no.rrd", gpc)
+    result = invoke(app, *words, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "is not a folder" in said(result)
+    assert (tmp_path / "out").read_text() == "mine"
 
 
 def test_bench_refuses_a_controller_without_margins(tmp_path: Path) -> None:

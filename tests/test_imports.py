@@ -13,7 +13,8 @@ LOOP = """
 from pathlib import Path
 from utank_hil.canbus import SocketCanPort
 from utank_hil.commands.common import load
-from utank_hil.commands.run import RING_ROWS, run
+from utank_hil.commands.recording import RunRecording
+from utank_hil.commands.run import run
 from utank_hil.config import ControllerConfig
 from utank_hil.runtime import RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.runtime.assembly import build_controller_node

@@ -7,21 +7,37 @@ is the parameter of the same name.
 import hashlib
 import json
 from dataclasses import asdict
-from typing import Annotated
+from typing import Annotated, Any, Final
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from utank_hil.config_files import Section
-from utank_hil.config_laws import Law
+from utank_hil.config_laws import Law, build_law, sample_time
 from utank_hil.control import PredictiveDesign, PumpLimits
+from utank_hil.control.ship_design import MOST_ORDER
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import ParameterError, Problem, refuse
+from utank_hil.runtime.bus_model import SimulatedBus
 from utank_hil.runtime.retuning.settings import RetuningSettings
 from utank_hil.runtime.supervisor import SafetyLimits
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
+
+TICK_S: Final = 0.01
+"""Of the controller's loop; a law's sample time is a whole number of them."""
+
+MOST_PULSES_S: Final = 3600.0
+"""Longest identification: the pulses and the record are kept in memory."""
+
+# where the user set no limits, they are as the first ship's are to her pump and tank: the laws were
+# tuned within these
+_RATE_PER_PRESSURE: Final = 2.0
+_LEVEL_SHARE: Final = 3.85 / 4.88
 
 
 class Vessel(Section):
@@ -39,6 +55,41 @@ class Vessel(Section):
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
+    @property
+    def default_limits(self) -> dict[str, float]:
+        """Limits of the pump's command where the user sets none."""
+        pump = self.pump
+        return {
+            "pressure_pa": pump.max_pressure_pa,
+            "rate_pa_s": min(
+                _RATE_PER_PRESSURE * pump.max_pressure_pa, pump.max_pressure_rate_pa_s
+            ),
+            "level_m": self.tank.level_limit_m * _LEVEL_SHARE,
+        }
+
+    @model_validator(mode="after")
+    def _tank_suits_the_ship(self) -> "Vessel":
+        refuse("", tank_problems(self.ship, self.tank))
+        return self
+
+
+def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
+    """Why a ship can't carry a tank: the water must leave her inertia and stability."""
+    try:
+        mass, _, stiffness = coupled_matrices(ship, tank)
+    except OverflowError:
+        return [("tank", "has a length or area beyond all scale")]
+    water = mass[1, 1] * (tank.width_m / 2) ** 2  # about the ship's axis, as in mass_ratio
+    if not (0 < water < mass[0, 0] and np.linalg.det(mass) > 0):
+        return [("tank", "has more roll inertia in its water than the ship: make it smaller")]
+    if not (stiffness[0, 0] > 0 and np.linalg.det(stiffness) > 0):
+        reason = (
+            "takes all of the ship's stability by its free surface: lower reservoir_area_m2 or "
+            "width_m"
+        )
+        return [("tank", reason)]
+    return []
+
 
 class ControllerConfig(Section):
     """The controller's side, ``configs/controllers``: what ``utank-hil run`` takes."""
@@ -50,29 +101,110 @@ class ControllerConfig(Section):
     """From the sampling of a measurement to the drive's answer to the command made of it."""
     accept_low_margins: bool = False
     """Use the law even if it misses the required margins."""
-    limits: PumpLimits = PumpLimits()
+    limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
+    """Those not given are the vessel's (`Vessel.default_limits`)."""
     safety: SafetyLimits = SafetyLimits()
     command_timeout_ms: Annotated[float, Field(ge=20, le=100)] = 50.0
-    bit_rate: Annotated[int, Field(gt=0)] = 250_000
+    bit_rate: Annotated[int, Field(ge=10_000, le=1_000_000)] = 250_000
     retuning: RetuningSettings | None = None
     """How the controller may retune itself; without it, it never does."""
 
+    @field_validator("limits", mode="before")
+    @classmethod
+    def _as_the_vessel_allows(cls, limits: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        if vessel is None or not isinstance(limits, dict):
+            return limits
+        return {**vessel.default_limits, **limits}
+
+    @field_validator("bit_rate")
+    @classmethod
+    def _bits_of_whole_nanoseconds(cls, bit_rate: int) -> int:
+        try:
+            SimulatedBus(bit_rate)
+        except ValueError as error:
+            raise ValueError(str(error).partition(": ")[2]) from error
+        return bit_rate
+
     @model_validator(mode="after")
     def _consistent(self) -> "ControllerConfig":
-        pump, tank = self.vessel.pump, self.vessel.tank
-        if self.limits.pressure_pa > pump.max_pressure_pa:
-            raise ValueError(
-                f"limits.pressure_pa is {self.limits.pressure_pa:g}, but the vessel's pump gives "
-                f"{pump.max_pressure_pa:g} at most"
-            )
-        if self.limits.level_m > tank.level_limit_m:
-            raise ValueError(
-                f"limits.level_m is {self.limits.level_m:g}, but the vessel's tank is full or "
-                f"empty at {tank.level_limit_m:g}"
-            )
-        if self.retuning is not None and (
-            not isinstance(self.law, PredictiveDesign)
-            or "roll_rad" not in self.law.predictor.measured
-        ):
-            raise ValueError("retuning is for predictive laws that measure roll_rad")
+        problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
+        refuse("", problems)
         return self
+
+    def _limit_problems(self) -> list[Problem]:
+        pressure_pa = self.vessel.pump.max_pressure_pa
+        level_m = self.vessel.tank.level_limit_m
+        return [
+            (
+                f"limits.{name}",
+                f"is {value:g}, but the vessel's {why}: set it to {most:g} or less, or leave it "
+                "out",
+            )
+            for name, value, most, why in (
+                (
+                    "pressure_pa",
+                    self.limits.pressure_pa,
+                    pressure_pa,
+                    f"pump gives {pressure_pa:g} at most",
+                ),
+                (
+                    "level_m",
+                    self.limits.level_m,
+                    level_m,
+                    f"tank is full or empty at {level_m:g}",
+                ),
+            )
+            if value > most
+        ]
+
+    def _retuning_problems(self) -> list[Problem]:
+        settings, law = self.retuning, self.law
+        if settings is None:
+            return []
+        if not isinstance(law, PredictiveDesign) or "roll_rad" not in law.predictor.measured:
+            return [("retuning", "is for predictive laws (gpc, dpc) that measure roll_rad")]
+        problems = []
+        period_s = law.predictor.sample_time_s
+        if settings.order > MOST_ORDER:
+            problems.append(("order", f"must be {MOST_ORDER} at most, got {settings.order}"))
+        shortest_s, longest_s = settings.pulse_hold_s
+        if not period_s / 2 < shortest_s <= longest_s <= settings.identification_s:
+            problems.append(
+                (
+                    "pulse_hold_s",
+                    f"must rise from the law's sample time, {period_s:g} s, to identification_s at "
+                    f"most, got {shortest_s:g} and {longest_s:g}",
+                )
+            )
+        least_s = 2 * settings.order * period_s
+        if not least_s <= settings.identification_s <= MOST_PULSES_S:
+            problems.append(
+                (
+                    "identification_s",
+                    f"must be {least_s:g} (two samples per order) to {MOST_PULSES_S:g}, got "
+                    f"{settings.identification_s:g}",
+                )
+            )
+        return [(f"retuning.{name}", reason) for name, reason in problems]
+
+    def _law_problems(self) -> list[Problem]:
+        """What keeps the law from being designed for this vessel."""
+        name, period_s = sample_time(self.law)
+        ticks = period_s / TICK_S
+        if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
+            reason = f"must be a whole number of ticks of {TICK_S:g} s, got {period_s:g}"
+            return [(f"law.{name}", reason)]
+        try:
+            with np.errstate(all="ignore"):
+                linear = build_law(self.law, self.vessel, self.delay_s, self.limits).linear
+                sound = linear is None or all(
+                    np.isfinite(matrix).all() for matrix in linear.matrices()[:4]
+                )
+        except ParameterError as error:
+            return [(f"law.{name}", reason) for name, reason in error.problems]
+        except (ValueError, ArithmeticError) as error:
+            return [("law", f"can't be designed for this vessel: {error}")]
+        if not sound:
+            return [("law", "gives no finite law: its weights or noises are beyond all scale")]
+        return []

@@ -15,6 +15,7 @@ from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.pd import PD_MEASURED, design_pd
 from utank_hil.control.stimulate import Stimulation
 from utank_hil.dynamics.linear import STATES
+from utank_hil.parameters import NotNegative, Positive
 
 if TYPE_CHECKING:
     from utank_hil.config import Vessel
@@ -62,13 +63,13 @@ class FeedbackLinearizationLaw(Section):
     """Feedback linearization; keys as the parameters of `FeedbackLinearization`."""
 
     kind: Literal["feedback_linearization"]
-    frequency_rad_s: float
-    damping_ratio: float
-    soft_level_m: float
-    hard_level_m: float
-    shift_rad_m: float = 0.0
-    shift_length_m: float = 1.0
-    level_damping_ratio: float = 0.0
+    frequency_rad_s: Positive
+    damping_ratio: Positive
+    soft_level_m: Positive
+    hard_level_m: Positive
+    shift_rad_m: NotNegative = 0.0
+    shift_length_m: Positive = 1.0
+    level_damping_ratio: NotNegative = 0.0
 
 
 class SmallGainFuzzyLaw(Section):
@@ -96,11 +97,11 @@ class StimulationLaw(Section):
     """Rolls the ship on still water; keys as the parameters of `Stimulation`."""
 
     kind: Literal["stimulate"]
-    amplitude_rad: float
-    period_s: float
-    ramp_s: float
-    roll_limit_rad: float
-    correction_s: float = 120.0
+    amplitude_rad: Positive
+    period_s: Positive
+    ramp_s: Positive
+    roll_limit_rad: Positive
+    correction_s: Positive = 120.0
 
 
 Law = Annotated[
@@ -116,6 +117,15 @@ Law = Annotated[
     | StimulationLaw,
     Field(discriminator="kind"),
 ]
+
+
+def sample_time(law: Law) -> tuple[str, float]:
+    """Dotted key below ``law`` and value of a law's sample time; without such a key, a tick's."""
+    name, part = "", law
+    for section in ("design", "predictor"):
+        if hasattr(part, section):
+            name, part = f"{name}{section}.", getattr(part, section)
+    return f"{name}sample_time_s", getattr(part, "sample_time_s", 0.01)
 
 
 def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) -> BuiltLaw:

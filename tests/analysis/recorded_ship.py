@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from utank_hil.analysis.retune import RetuningTask
+from utank_hil.analysis.retune import LEAST_GAIN, RetuningTask
 from utank_hil.arrays import FloatArray
 from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
@@ -29,7 +29,16 @@ def ship_of(period_s: float) -> RollShip:
 def task_of(outputs: int, order: int) -> RetuningTask:
     design = DPC_ROLL_LEVEL if outputs == 2 else GPC_ROLL
     return RetuningTask(
-        design, CONFIGURED, TANK, DELAY_S, LAG_S, order, ModelLimits((6.0, 20.0)), 50e3
+        design,
+        CONFIGURED,
+        TANK,
+        DELAY_S,
+        LAG_S,
+        order,
+        ModelLimits((6.0, 20.0)),
+        50e3,
+        PumpLimits(),
+        LEAST_GAIN,
     )
 
 

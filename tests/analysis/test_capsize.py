@@ -4,15 +4,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from utank_hil.analysis.capsize import (
+from utank_hil.analysis import (
     capsize_probability,
     capsize_threshold,
     equilibria,
     erosion,
     safe_basin,
+    stacked_seas,
     without_tank,
 )
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate
+from utank_hil.dynamics import (
+    RollModel,
+    RollShip,
+    Tank,
+    WaveMoment,
+    simulate,
+    simulate_reference,
+)
+from utank_hil.sea import Sea, jonswap
 
 # Table 4.1
 PATTI = RollShip(1.468e6, 2.366e6 * 0.2138, 3.206e3, 9.882e4, restoring_odd_nm=(-2.366e6 * 0.6713,))
@@ -82,15 +91,43 @@ def test_threshold_separates_survival_from_capsize():
         assert math.isfinite(run.capsized_s) == capsizes
 
 
-def test_patti_b_thresholds_lie_near_the_printed_ones():
-    """Printed: 5.086e4 N m capsizes her without a tank, 8.646e4 with it; Lz, friction not given."""
+@pytest.mark.parametrize(
+    ("model", "printed", "phases_deg"),
+    [
+        (without_tank(MODEL), 5.086e4, (135, 150, 165)),
+        (RollModel(PATTI, replace(TANK, lz_m=0.0, damping_ratio=0.1)), 8.646e4, (0, 90)),
+    ],
+    ids=["no tank", "tank"],
+)
+def test_printed_thresholds_lie_within_the_range_over_the_phase_which_the_source_leaves_open(
+    model, printed, phases_deg
+):
+    found = [
+        capsize_threshold(model, 0.6, 2e5, phase_rad=math.radians(phase)) for phase in phases_deg
+    ]
+    assert min(each.capsizing_nm for each in found) < printed
+    assert max(each.safe_nm for each in found) > printed
+
+
+def test_threshold_at_another_phase_is_the_reference_integrator_s():
+    """The start at 150 degrees capsizes her latest; an adaptive integrator finds the same."""
+    bare, phase = without_tank(MODEL), math.radians(150)
+    found = capsize_threshold(bare, 0.6, 2e5, phase_rad=phase)
+    for amplitude, capsizes in ((found.safe_nm, False), (found.capsizing_nm, True)):
+        run = simulate_reference(
+            bare,
+            300.0,
+            (0.0, 0.0, 0.0, 0.0),
+            wave_moment_nm=lambda t, a=amplitude: a * math.cos(0.6 * t + phase),
+        )
+        assert math.isfinite(run.capsized_s) == capsizes
+
+
+def test_the_tank_raises_the_threshold_by_half():
+    """Lz -1 m, damping ratio 0.3: one of the tanks that the source may have meant."""
     bare = capsize_threshold(without_tank(MODEL), 0.6, 2e5).capsizing_nm
-    assert bare == pytest.approx(5.086e4, rel=0.15)
-    passive = capsize_threshold(
-        RollModel(PATTI, replace(TANK, lz_m=-1.0, damping_ratio=0.3)), 0.6, 2e5
-    ).capsizing_nm
-    assert passive == pytest.approx(8.646e4, rel=0.1)
-    assert passive > 1.5 * bare
+    tank = RollModel(PATTI, replace(TANK, lz_m=-1.0, damping_ratio=0.3))
+    assert capsize_threshold(tank, 0.6, 2e5).capsizing_nm > 1.5 * bare
 
 
 def test_nothing_capsizes_below_the_highest_amplitude_tried():
@@ -99,18 +136,54 @@ def test_nothing_capsizes_below_the_highest_amplitude_tried():
 
 
 def test_probability_has_the_exact_binomial_interval():
-    rng = np.random.default_rng(6)
-    frequency = np.linspace(0.4, 0.9, 20)
-    seas = WaveMoment(np.full((60, 20), 5e3), frequency, rng.uniform(0, math.tau, (60, 20)))
-    found = capsize_probability(without_tank(MODEL), seas, 200.0)
+    """Clopper-Pearson: 2.5 % of binomials at the upper end have as few, at the lower as many."""
+    from scipy.stats import binom
+
+    bare = without_tank(MODEL)
+    spectrum = jonswap(4.5, 10.5)
+    moments = [
+        Sea.irregular(spectrum, seed, components=48).roll_moment(PATTI.stiffness_nm_rad)
+        for seed in range(60)
+    ]
+    found = capsize_probability(bare, moments, 300.0)
     assert found.ships == 60
     assert 0 < found.capsized < 60
     assert found.low < found.estimate == found.capsized / 60 < found.high
-    # Clopper-Pearson: 2.5 % of binomials at the upper end have as few, at the lower end as many
-    from scipy.stats import binom
-
     assert binom.cdf(found.capsized, 60, found.high) == pytest.approx(0.025)
     assert binom.sf(found.capsized - 1, 60, found.low) == pytest.approx(0.025)
-    calm = capsize_probability(MODEL, WaveMoment(np.zeros((60, 20)), *seas[1:]), 20.0)
-    assert (calm.estimate, calm.low) == (0, 0)
-    assert calm.high == pytest.approx(1 - 0.025 ** (1 / 60))
+    # the same ships one at a time
+    alone = [simulate(bare, 300.0, wave=moment).capsized_s for moment in moments[:6]]
+    six = capsize_probability(bare, stacked_seas(moments[:6]), 300.0)
+    assert six.capsized == np.isfinite(alone).sum()
+
+
+def test_nobody_capsizes_in_a_calm_and_the_interval_says_how_sure_that_is():
+    calm = [Sea.regular(0.0, 0.6).roll_moment(PATTI.stiffness_nm_rad)] * 60
+    found = capsize_probability(MODEL, calm, 20.0)
+    assert (found.estimate, found.low) == (0, 0)
+    assert found.high == pytest.approx(1 - 0.025 ** (1 / 60))
+
+
+def test_more_ships_capsize_in_a_higher_sea_and_fewer_with_the_tank():
+    def share(model, hs_m):
+        return capsize_probability(
+            model,
+            [
+                Sea.irregular(jonswap(hs_m, 10.5), seed, components=48).roll_moment(
+                    PATTI.stiffness_nm_rad
+                )
+                for seed in range(40)
+            ],
+            300.0,
+        ).estimate
+
+    bare = without_tank(MODEL)
+    assert share(bare, 2.0) == 0
+    assert 0 < share(bare, 4.5) < share(bare, 8.0)
+    assert share(MODEL, 4.5) < share(bare, 4.5)
+
+
+def test_a_single_sea_is_no_list_of_seas():
+    moment = Sea.irregular(jonswap(4.0, 10.0), 1).roll_moment(PATTI.stiffness_nm_rad)
+    with pytest.raises(TypeError, match="got one Harmonics: put it in a list"):
+        capsize_probability(MODEL, moment, 20.0)

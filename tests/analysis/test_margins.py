@@ -8,6 +8,7 @@ import pytest
 
 from utank_hil.analysis.closed_loop import closed_loop_radius
 from utank_hil.analysis.margins import loop_response, margins, peak_sensitivity, stability_grid
+from utank_hil.analysis.printed_laws import PRINTED_ARX
 from utank_hil.control import ARX, PredictiveLaw, design_dpc, design_gpc, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.sampling import LinearModel, sample
@@ -15,11 +16,6 @@ from utank_hil.dynamics.sampling import LinearModel, sample
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 ROLL = pump_model(SHIP, TANK, ("roll_rad",))
-PRINTED = ARX(
-    np.array([3.94063822, -5.84238723, 3.86227874, -0.96062268]).reshape(-1, 1, 1),
-    np.array([0, 0.37109436, -0.35446052, -0.33986517, 0.36613699]).reshape(-1, 1, 1) * 1e-9,
-    0.2,
-)
 
 
 def roll_law() -> PredictiveLaw:
@@ -76,7 +72,7 @@ def test_margins_bound_each_other():
 
 @pytest.mark.parametrize(("design", "peak"), [(design_dpc, 4.8), (design_gpc, 6.0)])
 def test_printed_laws_are_fragile(design, peak):
-    law, plant = design(PRINTED), LinearModel(*_parts(PRINTED))
+    law, plant = design(PRINTED_ARX), PRINTED_ARX.matrices()
     found = peak_sensitivity(law, plant)[0]
     assert found == pytest.approx(peak, abs=0.06)
     fine = np.linspace(1e-3, np.pi / 0.2, 50_000)
@@ -84,16 +80,11 @@ def test_printed_laws_are_fragile(design, peak):
     assert closed_loop_radius(law, plant) < 1
     # one more sample of delay, and it is unstable
     late = ARX(
-        np.concatenate([PRINTED.alpha, np.zeros((1, 1, 1))]),
-        np.concatenate([np.zeros((1, 1, 1)), PRINTED.beta]),
+        np.concatenate([PRINTED_ARX.alpha, np.zeros((1, 1, 1))]),
+        np.concatenate([np.zeros((1, 1, 1)), PRINTED_ARX.beta]),
         0.2,
     )
-    assert closed_loop_radius(law, LinearModel(*_parts(late))) > 1
-
-
-def _parts(arx: ARX):
-    system = arx.to_state_space()
-    return system.A, system.B, system.C, system.D, system.dt
+    assert closed_loop_radius(law, late.matrices()) > 1
 
 
 def test_grid_over_ships_and_gains_finds_the_unstable_corner():

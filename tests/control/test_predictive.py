@@ -5,16 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from utank_hil.analysis.printed_laws import DPC_ROLL, GPC_ROLL, PRINTED, PRINTED_ARX
 from utank_hil.control import ARX, design_dpc, design_gpc
 from utank_hil.control.prediction import predict
-
-ALPHA = np.array([3.94063822, -5.84238723, 3.86227874, -0.96062268]).reshape(-1, 1, 1)
-BETA = np.array([0, 0.37109436, -0.35446052, -0.33986517, 0.36613699]).reshape(-1, 1, 1) * 1e-9
-# thesis 3.8, roll feedback, hc = 50
-DPC_INPUT = [-1.5996e-1, 1.6676, -5.3846e-2, -1.7555]
-DPC_ROLL = [-4.9422e9, 1.4438e10, -1.4101e10, 4.6059e9]
-GPC_INPUT = [-2.2029e-1, 2.2026, 8.2552e-2, -2.1745]
-GPC_ROLL = [-6.5885e9, 1.8736e10, -1.7859e10, 5.7052e9]
 
 shapes = {
     "seed": st.integers(0, 2**32 - 1),
@@ -47,20 +40,20 @@ def brute_force(arx: ARX, past_u, past_y, future_u):
 
 @pytest.mark.parametrize("prediction_horizon", [54, 60, 100])
 def test_printed_dpc_gains_at_any_horizon(prediction_horizon):
-    law = design_dpc(ARX(ALPHA, BETA, 0.2), 50, prediction_horizon)
-    np.testing.assert_allclose(law.input_gains[:, 0, 0], DPC_INPUT, rtol=1e-4)
-    np.testing.assert_allclose(law.output_gains[:, 0, 0], DPC_ROLL, rtol=1e-4)
+    law = design_dpc(PRINTED_ARX, 50, prediction_horizon)
+    np.testing.assert_allclose(law.input_gains[:, 0, 0], PRINTED[DPC_ROLL].input_gains, rtol=1e-4)
+    np.testing.assert_allclose(law.output_gains[:, 0, 0], PRINTED[DPC_ROLL].roll_gains, rtol=1e-4)
 
 
 def test_printed_gpc_gains():
-    law = design_gpc(ARX(ALPHA, BETA, 0.2))
-    np.testing.assert_allclose(law.input_gains[:, 0, 0], GPC_INPUT, rtol=1e-4)
-    np.testing.assert_allclose(law.output_gains[:, 0, 0], GPC_ROLL, rtol=1e-4)
+    law = design_gpc(PRINTED_ARX)
+    np.testing.assert_allclose(law.input_gains[:, 0, 0], PRINTED[GPC_ROLL].input_gains, rtol=1e-4)
+    np.testing.assert_allclose(law.output_gains[:, 0, 0], PRINTED[GPC_ROLL].roll_gains, rtol=1e-4)
 
 
 def test_default_dpc_is_the_printed_one():
-    law = design_dpc(ARX(ALPHA, BETA, 0.2))
-    np.testing.assert_allclose(law.output_gains[:, 0, 0], DPC_ROLL, rtol=1e-4)
+    law = design_dpc(PRINTED_ARX)
+    np.testing.assert_allclose(law.output_gains[:, 0, 0], PRINTED[DPC_ROLL].roll_gains, rtol=1e-4)
 
 
 @settings(deadline=None, max_examples=60)
@@ -166,7 +159,7 @@ def test_relaxed_deadbeat_becomes_the_exact_one_as_its_weight_grows():
 
 
 def test_longer_control_horizon_asks_for_less_pressure():
-    arx = ARX(ALPHA, BETA, 0.2)
+    arx = PRINTED_ARX
     effort = [np.abs(design_dpc(arx, hc, hc + 4).output_gains).max() for hc in (8, 25, 50)]
     assert effort == sorted(effort, reverse=True)
 
@@ -193,9 +186,9 @@ def test_dpc_does_not_depend_on_the_units_of_its_outputs():
 )
 def test_bad_gpc_settings_are_refused_by_name(arguments, message):
     with pytest.raises(ValueError, match=message):
-        design_gpc(ARX(ALPHA, BETA, 0.2), **arguments)
+        design_gpc(PRINTED_ARX, **arguments)
 
 
 def test_dpc_without_a_target_window_is_refused():
     with pytest.raises(ValueError, match="control_horizon < prediction_horizon"):
-        design_dpc(ARX(ALPHA, BETA, 0.2), 50, 50)
+        design_dpc(PRINTED_ARX, 50, 50)

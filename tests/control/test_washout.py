@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from utank_hil.control import PredictiveLaw, WashoutLaw
+from utank_hil.control import LQG_ROLL_RATE_LEVEL, PredictiveLaw, WashoutLaw
+from utank_hil.dynamics import RollShip, Tank
 
 LAW = PredictiveLaw(
     np.array([0.3, -0.2]).reshape(2, 1, 1),
@@ -12,6 +15,70 @@ LAW = PredictiveLaw(
     0.2,
 )
 WASHED = WashoutLaw(LAW, 0.03)
+SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
+LQG = LQG_ROLL_RATE_LEVEL.law(SHIP, Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10))
+
+
+def random_law(seed, taps, inputs, outputs):
+    rng = np.random.default_rng(seed)
+    return PredictiveLaw(
+        rng.normal(size=(taps, inputs, inputs)) * 0.5 / (taps * inputs),
+        rng.normal(size=(taps, inputs, outputs)),
+        rng.normal(size=(4, inputs, outputs)),
+        0.2,
+    )
+
+
+def assert_equal_to_the_plain_form(law, seed, steps, size_pa):
+    """The law on outputs that the low-pass of the module's text is taken off, step by step.
+
+    Some commands are replaced, some steps have a reference.
+    """
+    rng = np.random.default_rng(seed)
+    inputs, outputs = law.law.matrices().D.shape
+    washed, plain, mean = law.controller(), law.law.controller(), np.zeros(outputs)
+    for k in range(steps):
+        y = rng.normal(size=outputs) + 3.0  # a list
+        mean = mean + law.share * (y - mean)
+        reference = rng.normal(size=outputs) if k % 5 == 2 else None
+        u, expected = washed.step(y, reference), plain.step(y - mean, reference)
+        np.testing.assert_allclose(u, expected, rtol=1e-8, atol=1e-8 * size_pa)
+        if k % 3 == 0:
+            left = size_pa * rng.normal(size=inputs)
+            washed.applied(left)
+            plain.applied(left)
+
+
+@given(
+    seed=st.integers(0, 1000),
+    taps=st.integers(1, 6),
+    inputs=st.integers(1, 3),
+    outputs=st.integers(1, 3),
+    corner_rad_s=st.floats(1e-3, 5.0),
+)
+def test_predictive_law_with_the_washout_folded_in_is_the_plain_form(
+    seed, taps, inputs, outputs, corner_rad_s
+):
+    law = WashoutLaw(random_law(seed, taps, inputs, outputs), corner_rad_s)
+    assert_equal_to_the_plain_form(law, seed, 60, 1.0)
+
+
+def test_folded_predictive_law_stays_the_plain_form_over_many_turns_of_its_memory():
+    assert_equal_to_the_plain_form(WASHED, 1, 3000, 1e6)
+
+
+@pytest.mark.parametrize("corner_rad_s", [0.02, 1.0])
+def test_lqg_law_with_the_washout_folded_in_is_the_plain_form(corner_rad_s):
+    assert_equal_to_the_plain_form(WashoutLaw(LQG.law, corner_rad_s), 2, 500, 1e6)
+
+
+def test_innovation_of_a_washed_lqg_law_is_that_of_the_outputs_without_their_mean():
+    washed, plain, mean = LQG.controller(), LQG.law.controller(), np.zeros(3)
+    for y in np.random.default_rng(3).normal(size=(50, 3)):
+        mean = mean + LQG.share * (y - mean)
+        washed.step(y)
+        plain.step(y - mean)
+    np.testing.assert_allclose(washed.innovation, plain.innovation, rtol=1e-8)
 
 
 def test_steady_list_ends_in_zero_pressure():

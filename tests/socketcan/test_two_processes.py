@@ -38,6 +38,12 @@ def controller_program(folder: Path, out: Path) -> Program:
     return Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, "--out", out, "--json")
 
 
+def only_recording(folder: Path) -> Path:
+    """The recording of the one run that was recorded there."""
+    (file,) = folder.glob("run-*.rrd")
+    return file
+
+
 @dataclass
 class Story:
     """What happened on the bus, and what the programs left behind."""
@@ -80,7 +86,7 @@ def tell_story(folder: Path) -> Story:
             told.reports.append(ship.end()[0])
         told.log = candump.stop()
         for name in ("first", "second"):
-            told.recordings.append(read_recording(folder / name / "run.rrd")["live"])
+            told.recordings.append(read_recording(only_recording(folder / name))["live"])
     finally:
         watcher.close()
         candump.stop()
@@ -228,7 +234,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
     finally:
         set_link(up=True)
         watcher.close()
-    return report, folder / "out" / "run.rrd"
+    return report, only_recording(folder / "out")
 
 
 def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(

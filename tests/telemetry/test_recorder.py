@@ -1,6 +1,7 @@
 """The recorder process: nothing lost, nothing waited for, readable however it ends."""
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -47,6 +48,13 @@ def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:
 def recorded(file: Path) -> np.ndarray:
     run = read_recording(file)["live"]
     return np.stack([run[column] for column in SIGNALS], axis=1)
+
+
+def any_recorded(file: Path) -> bool:
+    try:
+        return len(recorded(file)) > 0
+    except ValueError:
+        return False
 
 
 def listening_addresses(pid: int) -> set[str]:
@@ -202,10 +210,43 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
     np.testing.assert_allclose(recorded(file)[:100], table(100), rtol=4e-16)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [300, 3000])
+def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
+    tmp_path: Path, rows: int
+) -> None:
+    """As on a full disk: with few rows only the footer does not fit, and Rerun says nothing."""
+    file = tmp_path / "run.rrd"
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, file)
+        feed(ring, table(100))
+        wait_for(lambda: any_recorded(file))
+        pid = recorder._process.pid
+        subprocess.run(["prlimit", f"--pid={pid}", "--fsize=240000"], check=True)
+        feed(ring, table(rows)[100:])
+    with pytest.raises(RecorderError, match="the recorder failed: ") as caught:
+        recorder.stop()
+    assert "exit code" not in str(caught.value)
+    assert len(recorded(file)) >= 100
+    if rows == 300:
+        assert "its 300 rows are written" in str(caught.value)
+        assert len(recorded(file)) == 300
+
+
 def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(RecorderError, match="did not start"):
+    with pytest.raises(RecorderError, match=r"did not start: .* is its writer running"):
         RecorderProcess("utank-no-such-ring", tmp_path / "run.rrd")
     assert "is its writer running" in capfd.readouterr().err
-    with RingWriter(SIGNALS) as ring, pytest.raises(RecorderError, match="did not start"):
+    with RingWriter(SIGNALS) as ring, pytest.raises(RecorderError, match="no-such-folder"):
         RecorderProcess(ring.name, tmp_path / "no-such-folder" / "run.rrd")
     assert "no-such-folder" in capfd.readouterr().err
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))  # the child has it too
+        with (
+            RingWriter(["time_s"], capacity=2) as ring,
+            pytest.raises(RecorderError, match=r"did not start: .*File too large"),
+        ):
+            RecorderProcess(ring.name, tmp_path / "run.rrd")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

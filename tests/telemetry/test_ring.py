@@ -296,3 +296,15 @@ assert reader.read().shape == (1, 1)
         for _ in range(2):
             subprocess.run([sys.executable, "-W", "error", "-c", code, writer.name], check=True)
         assert (SHM / writer.name).exists()
+
+
+def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(descriptor: int, offset: int, size: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(RingError, match=r"no room for .* No space left"):
+        RingWriter(["a"], name="utank-no-room")
+    assert not (SHM / "utank-no-room").exists()

@@ -1,5 +1,7 @@
 """Roll of the ship without its tank, in closed form: what every tank is measured against."""
 
+import math
+
 import numpy as np
 
 from utank_hil.arrays import FloatArray
@@ -8,12 +10,18 @@ from utank_hil.sea import Harmonics
 
 
 def roll_without_tank(
-    ship: RollShip, wave_moment: Harmonics, step_s: float, count: int
+    ship: RollShip,
+    wave_moment: Harmonics,
+    step_s: float,
+    count: int,
+    *,
+    later_ship: RollShip | None = None,
+    later_from_s: float = 0.0,
 ) -> FloatArray:
     """Linear roll from rest at time 0 under a sum of harmonics, on a uniform grid.
 
-    Each component's steady answer, plus the free decay that makes angle and rate zero at the start:
-    exact, whatever the step.
+    Each component's steady answer, plus the free decay that makes angle and rate what they are at
+    the start: exact, whatever the step.
 
     Parameters
     ----------
@@ -23,6 +31,10 @@ def roll_without_tank(
         In N m.
     step_s : float
     count : int
+    later_ship : RollShip, optional
+        What she becomes when she is loaded differently; angle and rate go on from where they are.
+    later_from_s : float
+        When that is; zero or more.
 
     Returns
     -------
@@ -34,20 +46,60 @@ def roll_without_tank(
     ValueError
         If the roll is not lightly damped.
     """
-    omega = wave_moment.frequency_rad_s
-    compliance = 1.0 / (
-        ship.stiffness_nm_rad - ship.inertia_kg_m2 * omega**2 + 1j * ship.damping_nms_rad * omega
+    motion = _Motion(ship, wave_moment, 0.0, 0.0, 0.0)
+    if later_ship is None:
+        return motion.series(step_s, 0, count)
+    first = min(count, math.ceil(later_from_s / step_s))
+    later = _Motion(later_ship, wave_moment, later_from_s, *motion.at(later_from_s))
+    return np.concatenate(
+        [motion.series(step_s, 0, first), later.series(step_s, first, count - first)]
     )
-    answer = wave_moment.amplitude * np.exp(1j * wave_moment.phase_rad) * compliance
-    steady = Harmonics(np.abs(answer), omega, np.angle(answer)).series(step_s, count)
-    decay = ship.damping_nms_rad / (2.0 * ship.inertia_kg_m2)
-    if decay >= ship.natural_frequency_rad_s:
-        raise ValueError("the ship's roll is overdamped; this closed form needs damping below one")
-    damped = np.sqrt(ship.natural_frequency_rad_s**2 - decay**2)
-    angle = -float(answer.real.sum())
-    rate = -float((1j * omega * answer).real.sum())
-    time = step_s * np.arange(count)
-    free = np.exp(-decay * time) * (
-        angle * np.cos(damped * time) + (rate + decay * angle) / damped * np.sin(damped * time)
-    )
-    return np.asarray(steady + free)
+
+
+class _Motion:
+    """Roll of one ship from an angle and a rate at `start_s` on."""
+
+    def __init__(
+        self, ship: RollShip, moment: Harmonics, start_s: float, angle: float, rate: float
+    ) -> None:
+        omega = moment.frequency_rad_s
+        compliance = 1.0 / (
+            ship.stiffness_nm_rad
+            - ship.inertia_kg_m2 * omega**2
+            + 1j * ship.damping_nms_rad * omega
+        )
+        answer = moment.amplitude * np.exp(1j * moment.phase_rad) * compliance
+        self._decay = ship.damping_nms_rad / (2.0 * ship.inertia_kg_m2)
+        if self._decay >= ship.natural_frequency_rad_s:
+            raise ValueError(
+                "the ship's roll is overdamped; this closed form needs damping below one"
+            )
+        self._damped = math.sqrt(ship.natural_frequency_rad_s**2 - self._decay**2)
+        self._steady = Harmonics(np.abs(answer), omega, np.angle(answer))
+        self._steady_rate = Harmonics(np.abs(answer) * omega, omega, np.angle(answer) + math.pi / 2)
+        self._start_s = start_s
+        self._angle = angle - float(self._steady.at(start_s))
+        self._rate = rate - float(self._steady_rate.at(start_s))
+
+    def series(self, step_s: float, first: int, count: int) -> FloatArray:
+        """Roll at ``step_s * (first + arange(count))``."""
+        since_s = step_s * np.arange(first, first + count, dtype=float) - self._start_s
+        free, _ = self._free(since_s)
+        return np.asarray(self._steady.series(step_s, count, first * step_s) + free)
+
+    def at(self, time_s: float) -> tuple[float, float]:
+        """Angle and rate at one time."""
+        free, free_rate = self._free(np.array(time_s - self._start_s))
+        return (
+            float(self._steady.at(time_s) + free),
+            float(self._steady_rate.at(time_s) + free_rate),
+        )
+
+    def _free(self, since_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angle and rate of the free decay, so long after the start."""
+        decay, damped, angle = self._decay, self._damped, self._angle
+        sine_part = (self._rate + decay * angle) / damped
+        shrunk = np.exp(-decay * since_s)
+        sine, cosine = np.sin(damped * since_s), np.cos(damped * since_s)
+        free = shrunk * (angle * cosine + sine_part * sine)
+        return free, shrunk * damped * (sine_part * cosine - angle * sine) - decay * free

@@ -5,13 +5,14 @@ angle passes a given angle beyond the saddle.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from utank_hil.analysis.sea_stack import stacked_seas
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
@@ -260,7 +261,7 @@ def erosion(
 
 def capsize_probability(
     model: RollModel,
-    seas: WaveMoment,
+    seas: WaveMoment | Iterable[WaveComponents],
     duration_s: float,
     *,
     confidence: float = 0.95,
@@ -272,8 +273,9 @@ def capsize_probability(
     Parameters
     ----------
     model : RollModel
-    seas : WaveMoment
-        Arrays of shape (n, m): n random seas of m components.
+    seas : WaveMoment or iterable of utank_hil.sea.Harmonics
+        Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
+        as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for a number of seeds.
     duration_s : float
     confidence : float
         Of the interval, between 0 and 1.
@@ -284,11 +286,17 @@ def capsize_probability(
     Returns
     -------
     Probability
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `stacked_seas`.
     """
     from scipy.stats import beta
 
+    stack = seas if isinstance(seas, WaveMoment) else stacked_seas(seas)
     result = simulate_batch(
-        model, duration_s, wave=seas, capsize_rad=capsize_rad, progress=progress
+        model, duration_s, wave=stack, capsize_rad=capsize_rad, progress=progress
     )
     ships = len(result.capsized_s)
     capsized = int(np.count_nonzero(np.isfinite(result.capsized_s)))

@@ -47,13 +47,14 @@ class LoopRun:
     ----------
     motion : ndarray, shape (n, 4)
         `STATES`.
-    pressure_pa, command_pa : ndarray, shape (n,)
-        Actual pressure, and the command before delay and lag.
+    pressure_pa, command_pa, wish_pa : ndarray, shape (n,)
+        Actual pressure, the command before delay and lag, and what the controller asked for.
     """
 
     motion: FloatArray
     pressure_pa: FloatArray
     command_pa: FloatArray
+    wish_pa: FloatArray
 
 
 def passive_motion(
@@ -104,6 +105,7 @@ def simulate_loop(
     *,
     delay_s: float = 0.05,
     lag_s: float = 0.1,
+    pump_gain: float = 1.0,
     noise: SensorNoise | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
@@ -124,6 +126,8 @@ def simulate_loop(
         From measurement to effect at the drive, a whole number of ticks.
     lag_s : float
         Of the drive.
+    pump_gain : float
+        Pressure that a command of 1 Pa ends in.
     noise : SensorNoise, optional
     seed : int
         Of the noise.
@@ -143,36 +147,45 @@ def simulate_loop(
     n = len(STATES)
     lagged = np.block([[a, pressure_effect], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
     transition, step = transition_and_step(
-        lagged, np.append(np.zeros(n), 1 / lag_s)[:, None], TICK_S
+        lagged, np.append(np.zeros(n), pump_gain / lag_s)[:, None], TICK_S
     )
-    effect = step[:, 0]
+    advance = np.hstack([transition, step])
     size = np.array([noise.roll_rad, noise.roll_rate_rad_s, noise.level_m, 0.0, noise.pressure_pa])
-    errors = np.random.default_rng(seed).standard_normal((len(wave_motion), n + 1)) * size
+    count = len(wave_motion)
+    # what the sensors show beyond the pump's own effect
+    shown = np.random.default_rng(seed).standard_normal((count, n + 1)) * size
+    shown[:, :n] += wave_motion
+    level_shown, pressure_shown = shown[:, _LEVEL].tolist(), shown[:, n].tolist()
     columns = [STATES.index(name) for name in measured]
     observer = LevelObserver(tank, 2 * TICK_S)
     limiter = CommandLimiter(limits, tank, TICK_S)
-    history = np.empty((len(wave_motion), n + 1))
-    commands = np.zeros(len(wave_motion) + delay_ticks)
-    state, seen, applied = np.zeros(n + 1), np.zeros(n + 1), np.zeros(1)
+    by_pump = np.empty((count, n + 1))  # motion and pressure that the pump makes
+    wishes = np.empty(count)
+    commands = [0.0] * delay_ticks
+    memory, applied = np.zeros(n + 2), np.zeros(1)  # the pump's motion and pressure; the command
     wish_pa = 0.0
-    for k, waves in enumerate(wave_motion):
-        history[k] = state
-        history[k, :n] += waves
-        np.add(history[k], errors[k], out=seen)
+    for k in range(count):
+        by_pump[k] = memory[: n + 1]
         if k % 2 == 0:
-            observer.update(float(seen[_LEVEL]), float(seen[n]))
+            observer.update(
+                level_shown[k] + float(memory[_LEVEL]), pressure_shown[k] + float(memory[n])
+            )
         if k % sample_ticks == 0:
             if k:
                 applied[0] = limiter.mean_since_last_call()
                 controller.applied(applied)
+            seen = shown[k] + by_pump[k]
             seen[_SPEED] = observer.rate_m_s
             wish_pa = float(controller.step(seen[columns])[0])
-        commands[k + delay_ticks] = limiter.limit(wish_pa, observer.level_m, observer.rate_m_s)
-        state = transition.dot(state)
-        state += effect * commands[k]
+        wishes[k] = wish_pa
+        commands.append(limiter.limit(wish_pa, observer.level_m, observer.rate_m_s))
+        memory[n + 1] = commands[k]
+        memory[: n + 1] = advance.dot(memory)
         if progress is not None and k % 10_000 == 0:
-            progress(k / len(wave_motion))
-    return LoopRun(history[:, :n], history[:, n], commands[delay_ticks:])
+            progress(k / count)
+    return LoopRun(
+        wave_motion + by_pump[:, :n], by_pump[:, n], np.array(commands[delay_ticks:]), wishes
+    )
 
 
 def _ticks(name: str, time_s: float) -> int:

@@ -15,18 +15,18 @@ class RollStatistics:
     ----------
     rms_rad : float
         Root mean square of the roll angle.
-    significant_rad : float
+    significant_rad : float or None
         Significant single amplitude, see `significant_amplitude`.
     maximum_rad : float
         Largest roll to either side.
     """
 
     rms_rad: float
-    significant_rad: float
+    significant_rad: float | None
     maximum_rad: float
 
 
-def significant_amplitude(signal: FloatArray) -> float:
+def significant_amplitude(signal: FloatArray) -> float | None:
     """Mean of the highest third of the single amplitudes between zero up-crossings.
 
     For a narrow-banded Gaussian signal this is close to twice the standard deviation.
@@ -38,13 +38,13 @@ def significant_amplitude(signal: FloatArray) -> float:
 
     Returns
     -------
-    float
-        In the signal's unit; zero when the record holds no whole cycle.
+    float or None
+        In the signal's unit; None when the record holds no whole cycle to tell it from.
     """
     centred = signal - signal.mean()
     starts = np.flatnonzero((centred[:-1] < 0) & (centred[1:] >= 0)) + 1
     if len(starts) < 2:
-        return 0.0
+        return None
     whole = centred[: starts[-1]]
     heights = np.maximum.reduceat(whole, starts[:-1]) - np.minimum.reduceat(whole, starts[:-1])
     highest = np.sort(heights)[-max(1, len(heights) // 3) :]

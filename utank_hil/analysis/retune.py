@@ -11,13 +11,19 @@ from functools import partial
 
 import numpy as np
 
-from utank_hil.analysis.rehearsal import Rehearsal, rehearse
+from utank_hil.analysis.rehearsal import RecordedWaves, Rehearsal
 from utank_hil.analysis.robustness import Robustness, robustness
 from utank_hil.arrays import FloatArray
 from utank_hil.config import ControllerConfig
-from utank_hil.control import ARX, LinearLaw, PredictiveDesign, PredictiveLaw, pump_model, wave_arx
+from utank_hil.control import (
+    ARX,
+    LinearLaw,
+    PredictiveDesign,
+    PredictiveLaw,
+    PumpLimits,
+    wave_arx,
+)
 from utank_hil.control.washout import WashoutLaw
-from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification import (
@@ -45,6 +51,9 @@ LAGS = 25
 """Samples over which prediction errors are to be uncorrelated."""
 LARGEST = 1e9
 """No command or output of a ship is as large in SI units."""
+LEAST_GAIN = 0.05
+"""Part by which a new law rolls less than the configured one in the recorded waves: what a
+rehearsal hardly tells apart is not worth a swap."""
 ROLL_PART = 1.02
 """Of the passive tank's roll, in the recorded waves: no law may be worse."""
 EFFORT_PART = 0.9
@@ -68,6 +77,10 @@ class RetuningTask:
     limits : ModelLimits
     pressure_pa : float
         Greatest pressure of the pump.
+    pump_limits : PumpLimits or None
+        All that limits the pump; None: the usual limits with that pressure.
+    least_gain : float or None
+        Part by which a law must roll less than the configured one; None: they are not compared.
     """
 
     design: PredictiveDesign
@@ -78,6 +91,8 @@ class RetuningTask:
     order: int
     limits: ModelLimits
     pressure_pa: float
+    pump_limits: PumpLimits | None = None
+    least_gain: float | None = None
 
 
 def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | None:
@@ -97,6 +112,8 @@ def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | Non
         settings.order,
         ModelLimits(settings.roll_period_range_s),
         config.limits.pressure_pa,
+        config.limits,
+        LEAST_GAIN,
     )
     rows = round(settings.identification_s / design.predictor.sample_time_s)
     return partial(retune, task=task), (rows, 1 + len(design.predictor.measured))
@@ -165,14 +182,28 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
             f"a record has the columns command, {', '.join(predictor.measured)}; this one has "
             f"shape {record.shape}"
         )
+    memory_s, shortest_s = task.order * predictor.sample_time_s, task.limits.roll_period_range_s[0]
+    if memory_s < shortest_s:  # such a model takes waves for the ship, and is sure of it
+        raise IdentificationError(
+            f"order {task.order} remembers {memory_s:g} s, less than the shortest roll period of "
+            f"{shortest_s:g} s: raise the order"
+        )
     split = round((1 - HELD_OUT) * len(record))
+    lost = max(task.order, LAGS)  # predictions, at the start and after every gap
+    needed_s = (LEAST_PREDICTIONS + lost) / HELD_OUT * predictor.sample_time_s
+    if len(record) - split - lost < LEAST_PREDICTIONS:
+        raise IdentificationError(
+            f"the record is too short: order {task.order} needs {needed_s:.0f} s, it has "
+            f"{len(record) * predictor.sample_time_s:.0f}"
+        )
     _refuse_empty(record[:split])
     _refuse_empty(record[split:])
     stretches = [stop - start for start, stop in unbroken(record[split:])]
-    predictions = sum(max(0, length - max(task.order, LAGS)) for length in stretches)
+    predictions = sum(max(0, length - lost) for length in stretches)
     if predictions < LEAST_PREDICTIONS:
         raise IdentificationError(
-            f"gaps leave {predictions} predictions on held-out data, {LEAST_PREDICTIONS} are needed"
+            f"gaps leave {predictions} predictions on held-out data, {LEAST_PREDICTIONS} are "
+            "needed: record longer, or with fewer gaps"
         )
     u, y = record[:split, :1], record[:split, 1:]
     waves = find_disturbance_frequencies(u, y, predictor.sample_time_s)
@@ -193,15 +224,19 @@ def _refuse_empty(part: FloatArray) -> None:
     """Refuse a part of a record in which nothing is to be seen."""
     here = np.asarray(np.isfinite(part).all(axis=1))
     if len(part) == 0 or np.mean(~here) > MOST_MISSING:
-        raise IdentificationError("too much of the record is missing")
+        raise IdentificationError("too much of the record is missing: are the sensors alive?")
     present = part[here]
     if np.abs(present).max() > LARGEST:
-        raise IdentificationError("the record holds numbers that no ship makes")
+        raise IdentificationError("the record holds numbers that no ship makes: is a unit wrong?")
     spread = np.ptp(present, axis=0)
     if spread[0] < LEAST_MOTION[0]:
-        raise IdentificationError("the pump was hardly used in a part of the record")
+        raise IdentificationError(
+            "the pump was hardly used in a part of the record: give pulses throughout"
+        )
     if spread[1:].min() < LEAST_MOTION[1]:
-        raise IdentificationError("an output hardly moves in a part of the record")
+        raise IdentificationError(
+            "an output hardly moves in a part of the record: is its sensor stuck?"
+        )
 
 
 def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
@@ -210,11 +245,13 @@ def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> 
     design, measured = task.design, task.design.predictor.measured
     law = design.law(ship, tank, task.delay_s, task.lag_s)
     report = robustness(law, ship, tank, measured, task.delay_s, task.lag_s)
-    plant = sample(pump_model(ship, tank, measured), law.sample_time_s, task.delay_s, task.lag_s)
-    roll = measured.index("roll_rad")
-    trial = rehearse(law, plant, record, roll, task.pressure_pa)
-    configured = design.law(task.ship, task.tank, task.delay_s, task.lag_s)
-    before = rehearse(configured, plant, record, roll, task.pressure_pa)
+    limits = task.pump_limits or PumpLimits(pressure_pa=task.pressure_pa)
+    waves = RecordedWaves(record, ship, tank, measured, law.sample_time_s, task.delay_s, task.lag_s)
+    trial = waves.rehearse(law, limits)
+    before = None
+    if task.least_gain is not None:
+        configured = design.law(task.ship, task.tank, task.delay_s, task.lag_s)
+        before = waves.rehearse(configured, limits)
     objections = (*report.failures(), *_rehearsal_objections(trial, before, task))
     if objections:
         return Refusal(objections)
@@ -226,13 +263,18 @@ def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> 
 
 
 def _rehearsal_objections(
-    trial: Rehearsal, before: Rehearsal, task: RetuningTask
+    trial: Rehearsal, before: Rehearsal | None, task: RetuningTask
 ) -> tuple[str, ...]:
     found = []
-    if not trial.roll_rad <= before.roll_rad:
+    if (
+        before is not None
+        and task.least_gain is not None
+        and not trial.roll_rad <= (1 - task.least_gain) * before.roll_rad
+    ):
         found.append(
             f"in the recorded waves the law rolls {math.degrees(trial.roll_rad):.2f} degrees RMS, "
-            f"the configured one {math.degrees(before.roll_rad):.2f}"
+            f"the configured one {math.degrees(before.roll_rad):.2f}: less than "
+            f"{task.least_gain:.0%} to gain"
         )
     if not trial.roll_rad <= ROLL_PART * trial.passive_rad:
         found.append(

@@ -7,10 +7,23 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from utank_hil.commands.check import refuse_low_margins
-from utank_hil.commands.common import CONFIGS, OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.common import (
+    CONFIGS,
+    OUT,
+    Duration,
+    Json,
+    View,
+    fail,
+    load,
+    notes,
+    prepare_out,
+    shown,
+)
+from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
@@ -49,7 +62,14 @@ def bench(
     """
     # the ship's side stands above this package: loaded only where a scenario is needed
     from firmware_sim.bench import BenchOptions, run_bench
-    from firmware_sim.report import as_json, endings, motion_table, pump_table, write_report
+    from firmware_sim.report import (
+        REPORT_FILES,
+        as_json,
+        endings,
+        motion_table,
+        pump_table,
+        write_report,
+    )
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
@@ -57,6 +77,7 @@ def bench(
     loaded = load(scenario, Scenario)
     for controller in loaded.controllers.values():
         refuse_low_margins(controller)
+    prepare_out(out, REPORT_FILES)
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
     options = BenchOptions(real_time, bus, seed, duration)
@@ -80,26 +101,29 @@ def bench(
             )
         except OSError as error:
             fail(error)
-    files = write_report(result, out)
+    files, failures = write_report(result, out)
     if json_:
         sys.stdout.write(json.dumps(as_json(result, files)) + "\n")
     else:
         console = Console()
-        console.print(motion_table(result))
-        console.print(pump_table(result))
+        print_table(console, motion_table(result))
+        print_table(console, pump_table(result))
         for ending in endings(result):
-            console.print(f"[red]{ending}[/red]")
+            console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:
-            console.print(timing_table(loops))
+            print_table(console, timing_table(loops))
         else:
-            speed = result.duration_s * len(result.runs) / result.wall_s
+            simulated_s = sum(run.end_s for run in result.runs)
             console.print(
-                f"Simulated {len(result.runs)} x {result.duration_s:.0f} s in "
-                f"{result.wall_s:.1f} s, {speed:.0f} times real time; no deadlines there."
+                f"Simulated {len(result.runs)} runs, {simulated_s:.0f} s in all, in "
+                f"{result.wall_s:.1f} s, {simulated_s / result.wall_s:.0f} times real time; "
+                "no deadlines there."
             )
         for name, path in files.items():
             console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+    if failures:
+        fail("; ".join(failures))
     if view:
         show(files["recording"])
 

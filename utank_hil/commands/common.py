@@ -1,6 +1,9 @@
 """What the commands share: loading, failing, telling."""
 
 import os
+import sys
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Final, NoReturn, TypeVar
 
@@ -13,7 +16,11 @@ from utank_hil.config_files import ConfigError, load_config
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-CONFIGS: Final = Path(__file__).resolve().parents[2] / "configs"
+_CHECKOUT: Final = Path(__file__).resolve().parents[2] / "configs"
+CONFIGS: Final = (
+    _CHECKOUT if _CHECKOUT.is_dir() else Path(sys.prefix) / "share" / "utank-hil" / "configs"
+)
+"""The shipped configurations: of the checkout, or installed with the package."""
 OUT: Final = Path("out")
 
 Json = Annotated[
@@ -54,6 +61,39 @@ def load(path: Path, model: type[ModelT]) -> ModelT:
         for problem in error.problems:
             notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
         raise typer.Exit(2) from None
+
+
+def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:
+    """Make a folder and try whether files can be written there; the reason if they can't.
+
+    Parameters
+    ----------
+    folder : Path
+        Made, with its parents, if it is not there.
+    files : iterable of str
+        Names of the files to come; those that exist are left as they are.
+    """
+    if folder.exists() and not folder.is_dir():
+        return f"{folder}: is not a folder"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        return f"{folder}: {error.strerror}"
+    for path in (folder / name for name in files):
+        if path.is_dir():
+            return f"{path}: is a folder"
+        if path.exists() and not os.access(path, os.W_OK):
+            return f"{path}: must not be written"
+    return None
+
+
+def prepare_out(folder: Path, files: Iterable[str]) -> None:
+    """Make the folder for results, or end with exit code 2 before anything is computed in vain."""
+    reason = why_not_writable(folder, files)
+    if reason is not None:
+        fail(f"{reason}; choose another folder with --out")
 
 
 def shown(path: Path) -> str:

@@ -14,7 +14,8 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from utank_hil.commands.bench import STORM
-from utank_hil.commands.common import OUT, Json, fail, load, new_app, notes, shown
+from utank_hil.commands.common import OUT, Json, fail, load, new_app, notes, prepare_out, shown
+from utank_hil.commands.tables import print_table
 from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.config_laws import LQGLaw
 from utank_hil.dynamics.ship import RollShip
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from utank_hil.analysis.tank_design import TankFigures
     from utank_hil.analysis.trade import Trade, TradePoint
 
+PICTURE, FIGURES = "design.png", "design.json"
 REALISATIONS = 16  # of the sea, pooled: a lightly damped ship needs a fine spectrum
 
 design = new_app("Design a law or a tank: what it could be, and what it would cost.")
@@ -55,6 +57,7 @@ def controller(
     if not isinstance(law, Design):
         fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
     sea = load(scenario, Scenario)
+    prepare_out(out, (PICTURE, FIGURES))
     vessel = loaded.vessel
     bar = Progress(
         TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal
@@ -71,8 +74,7 @@ def controller(
             limits=loaded.limits,
             progress=lambda done: bar.update(task, completed=done),
         )
-    out.mkdir(parents=True, exist_ok=True)
-    files = {"picture": out / "design.png", "figures": out / "design.json"}
+    files = {"picture": out / PICTURE, "figures": out / FIGURES}
     title = f"{loaded.name}: {vessel.name} in {sea.name}"
     limits = loaded.limits
     draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m)
@@ -88,7 +90,7 @@ def controller(
         sys.stdout.write(json.dumps(figures) + "\n")
         return
     console = Console(highlight=False)
-    console.print(_trade_table(result, title))
+    print_table(console, _trade_table(result, title))
     for point in result.points:
         if point.factor == 1:
             for failure in point.robustness.failures():

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from utank_hil.analysis.logged_samples import logged_samples
 from utank_hil.analysis.retune import Identification, RetuningTask, identify, retune
-from utank_hil.commands.common import OUT, Json, fail, load, notes, shown
+from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, shown
 from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.control import PredictiveDesign
 from utank_hil.identification import IdentificationError, mode_confidence
@@ -23,6 +23,11 @@ from utank_hil.runtime.retuning import Answer, Candidate
 
 ANY_PERIOD_S = (1.0, 60.0)
 STATES = 4
+PICTURE, VESSEL, CONTROLLER = (
+    "identification.png",
+    "identified_vessel.yaml",
+    "identified_controller.yaml",
+)
 
 
 def identify_log(
@@ -46,13 +51,14 @@ def identify_log(
     Exit code 0: model and law passed every check. 1: refused; the reasons are printed and no
     configuration is written. 2: a file is wrong.
 
-    [bold]Example:[/bold] utank-hil identify log/run.rrd configs/controllers/dpc.yaml --from 200
+    [bold]Example:[/bold] utank-hil identify out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
     from utank_hil.analysis.identification_picture import draw_identification
     from utank_hil.telemetry import read_recording
 
     loaded = load(config, ControllerConfig)
     task = _task(loaded, order)
+    prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
         runs = read_recording(log)
@@ -71,11 +77,8 @@ def identify_log(
             sys.stdout.write(json.dumps({"accepted": False, "reasons": [str(error)]}) + "\n")
         raise typer.Exit(1) from None
     answer = retune(record, task)
-    out.mkdir(parents=True, exist_ok=True)
     files = {
-        "picture": draw_identification(
-            record, found, task, out / "identification.png", f"{log.name}, {name}"
-        )
+        "picture": draw_identification(record, found, task, out / PICTURE, f"{log.name}, {name}")
     }
     if isinstance(answer, Candidate):
         files.update(_write_config(config, loaded, found, out))
@@ -111,7 +114,7 @@ def _write_config(
     config: Path, loaded: ControllerConfig, found: Identification, out: Path
 ) -> dict[str, Path]:
     """The identified vessel, and the configuration with it in place of the old one."""
-    files = {"vessel": out / "identified_vessel.yaml", "config": out / "identified_controller.yaml"}
+    files = {"vessel": out / VESSEL, "config": out / CONTROLLER}
     vessel = loaded.vessel.model_copy(update={"ship": found.fit.ship, "tank": found.fit.tank})
     files["vessel"].write_text(yaml.safe_dump(_vessel_content(vessel), sort_keys=False))
     content = yaml.safe_load(config.read_text(encoding="utf-8"))

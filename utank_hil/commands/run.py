@@ -3,16 +3,20 @@
 import json
 import sys
 from contextlib import ExitStack, suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from utank_hil.analysis.retune import retuner_work
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.recording import RecordingSummary, RunRecording
+from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.config import ControllerConfig
 from utank_hil.runtime import (
@@ -23,10 +27,7 @@ from utank_hil.runtime import (
 )
 from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.retuning import RetunerProcess
-from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderProcess, RingWriter, open_viewer
-
-RING_ROWS = 8192  # 82 s: a recorder that sleeps less loses nothing
+from utank_hil.telemetry import open_viewer
 
 
 def run(
@@ -41,7 +42,8 @@ def run(
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
-    It starts in STANDBY. Only an operator at the panel arms it.
+    It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
+    (UTC) of their start; a recording that fails is told, and the controller runs without.
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -55,25 +57,24 @@ def run(
             fail(error)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
-        sink = None
-        file = None
+        recording = None
         if out is not None or view:
-            folder = OUT if out is None else out
-            folder.mkdir(parents=True, exist_ok=True)
-            file = folder / "run.rrd"
-            ring = RingWriter(SIGNALS, capacity=RING_ROWS)
-            sink = ring.write
-            recorder = RecorderProcess(ring.name, file, live=view)
-            # first the ring is closed, then the recorder takes what is left of it
-            stack.callback(recorder.stop)
-            stack.callback(ring.close)
-            if view and recorder.url is not None:
-                viewer = stack.enter_context(open_viewer(recorder.url))
-                if viewer.url is not None:
-                    notes.print(f"Open {viewer.url} in a browser.", soft_wrap=True)
+            recording = RunRecording(OUT if out is None else out, live=view)
+            stack.callback(recording.stop)
+            if recording.summary.error is not None:
+                notes.print(
+                    f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True
+                )
+            elif recording.url is not None:
+                _show(recording.url, stack)
         work = retuner_work(loaded)
         retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
-        node = build_controller_node(loaded, retuner=retuner, statistics=statistics, sink=sink)
+        node = build_controller_node(
+            loaded,
+            retuner=retuner,
+            statistics=statistics,
+            sink=None if recording is None else recording.write,
+        )
         with suppress(PortError):  # the loop meets it too, and its node reacts
             port.receive()  # what came while the law was designed is old, and must not look fresh
         with real_time_scheduling() as scheduling:
@@ -96,17 +97,38 @@ def run(
                 for event in node.retuning_events
             ],
             "loop": statistics.summary(),
-            "recording": None if file is None else str(file),
+            "recording": None if recording is None else asdict(recording.summary),
         }
         sys.stdout.write(json.dumps(summary) + "\n")
         return
     console = Console(highlight=False)
-    console.print(timing_table({loaded.name: statistics}))
+    print_table(console, timing_table({loaded.name: statistics}))
     for event in node.retuning_events:
         console.print(
             f"{(event.time_ns - node.start_ns) * 1e-9:8.0f} s retuning {event.state.name}",
             *event.reasons,
         )
     console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
-    if file is not None:
-        console.print(f"recording: {shown(file)}", soft_wrap=True)
+    if recording is not None:
+        _tell(console, recording.summary)
+
+
+def _show(url: str, stack: ExitStack) -> None:
+    """Open a viewer until the run ends; the run goes on without one."""
+    try:
+        viewer = stack.enter_context(open_viewer(url))
+    except OSError as error:
+        notes.print(f"[red]no viewer:[/red] {escape(str(error))}", soft_wrap=True)
+        return
+    if viewer.url is not None:
+        notes.print(f"Open {viewer.url} in a browser.", soft_wrap=True)
+
+
+def _tell(console: Console, recording: RecordingSummary) -> None:
+    if recording.file is not None:
+        said = f"recording: {shown(Path(recording.file))}"
+        if recording.rows is not None:
+            said += f", {recording.rows} rows, {recording.lost} lost"
+        console.print(escape(said), soft_wrap=True)
+    if recording.error is not None:
+        console.print(f"[red]recording failed:[/red] {escape(recording.error)}", soft_wrap=True)

@@ -28,7 +28,7 @@ from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
 from utank_hil.control.ship_design import PredictiveDesign, Predictor, pump_model, wave_arx
 from utank_hil.control.stimulate import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
-from utank_hil.control.washout import WashoutController, WashoutLaw
+from utank_hil.control.washout import WashoutLaw
 
 __all__ = [
     "ARX",
@@ -62,7 +62,6 @@ __all__ = [
     "SmallGainFuzzy",
     "Stimulation",
     "ValveRange",
-    "WashoutController",
     "WashoutLaw",
     "design_constrained_gpc",
     "design_dpc",

@@ -4,10 +4,10 @@
 
     y(k) = sum_{i=1..p} alpha_i y(k-i) + sum_{i=0..p} beta_i u(k-i)
 
-Timing. When the model comes from `utank_hil.dynamics.sampled_model`, u(k) is the command that was
-computed at t_{k-1} and acts over [t_{k-1} + d, t_k + d), d the delay from sensor to pump. So y(k)
-already feels u(k) when d is shorter than the sample time (beta_0 is not zero), and a law that makes
-u(k) from y(k-1), y(k-2), ... uses the newest measurement there is.
+Timing. When the model comes from `utank_hil.dynamics.sampling.sampled_model`, u(k) is the command
+that was computed at t_{k-1} and acts over [t_{k-1} + d, t_k + d), d the delay from sensor to pump.
+So y(k) already feels u(k) when d is shorter than the sample time (beta_0 is not zero), and a law
+that makes u(k) from y(k-1), y(k-2), ... uses the newest measurement there is.
 """
 
 import math
@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.sampling import LinearModel
 
 if TYPE_CHECKING:
     from control import StateSpace
 
-    from utank_hil.dynamics.sampling import LinearModel
 
 _EXACT = 1e-7  # relative residual above which past outputs do not determine the state
 
@@ -85,7 +85,7 @@ class ARX:
         return int(self.beta.shape[2])
 
     @classmethod
-    def from_state_space(cls, system: "StateSpace", order: int) -> "ARX":
+    def from_state_space(cls, system: "StateSpace | LinearModel", order: int) -> "ARX":
         """Exact ARX form of a discrete state-space model.
 
         The past `order` outputs and inputs determine the state (a deadbeat observer), so the
@@ -94,7 +94,7 @@ class ARX:
 
         Parameters
         ----------
-        system : control.StateSpace
+        system : control.StateSpace or LinearModel
             Discrete, with n states and m outputs.
         order : int
             p, with p m >= n.
@@ -162,16 +162,23 @@ class ARX:
             history[k + self.order] = oldest_first @ history[k : k + self.order].ravel() + term
         return history[self.order :]
 
-    def to_state_space(self) -> "StateSpace":
-        """The same model with p m states (block observer form), as control.StateSpace."""
-        from control import ss  # here, because importing it brings plotting into the process
+    def matrices(self) -> LinearModel:
+        """The same model with p m states (block observer form).
 
+        State i is what the past makes of y(k + i), i = 0 ... p - 1, future inputs zero and the
+        outputs in between as predicted one by one.
+        """
         size = self.order * self.outputs
         a = np.eye(size, k=self.outputs)
         a[:, : self.outputs] += self.alpha.reshape(size, self.outputs)
         b = (self.beta[1:] + self.alpha @ self.beta[0]).reshape(size, self.inputs)
-        c = np.eye(self.outputs, size)
-        return ss(a, b, c, self.beta[0], self.sample_time_s)
+        return LinearModel(a, b, np.eye(self.outputs, size), self.beta[0], self.sample_time_s)
+
+    def to_state_space(self) -> "StateSpace":
+        """The same model as control.StateSpace."""
+        from control import ss  # here, because importing it brings plotting into the process
+
+        return ss(*self.matrices())
 
     def _record(self, u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         u, y = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
@@ -190,7 +197,7 @@ def discrete_matrices(
     if sample_time is None or isinstance(sample_time, bool) or not sample_time > 0:
         raise ValueError(
             f"the model must be discrete with a sample time in seconds, its dt is {sample_time}; "
-            "sample it first (utank_hil.dynamics.sampled_model)"
+            "sample it first (utank_hil.dynamics.sampling.sampled_model)"
         )
     parts = (system.A, system.B, system.C, system.D)
     a, b, c, d = (np.asarray(part, dtype=np.float64) for part in parts)

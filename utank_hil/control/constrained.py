@@ -80,16 +80,17 @@ class ConstrainedLaw:
 
     def matrices(self) -> LinearModel:
         """The law from y to u while no limit is touched."""
-        return self._linear().matrices()
+        return self.unlimited().matrices()
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """Its transfer matrix at the points `z`, shape (N,); shape (N, 1, m)."""
-        return self._linear().response(z)
+        return self.unlimited().response(z)
 
-    def _linear(self) -> LQGLaw:
+    def unlimited(self) -> LQGLaw:
+        """The law as it is while no limit is touched: one that knows of none."""
         rest = np.eye(len(self.steady_state)) - self.steady_state
         gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
-        return LQGLaw(self.model, gain, self.observer_gain, np.eye(len(self.model.C)))
+        return LQGLaw(self.model, gain, self.observer_gain)
 
 
 class ConstrainedController:

@@ -7,7 +7,8 @@ swinging is not cheap. What a steady heel explains of the motion is taken off fi
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from itertools import pairwise
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -17,15 +18,26 @@ from utank_hil.control.horizon import condense
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.sea_model import SeaModel
+from utank_hil.control.ship_design import MOST_SAMPLES, measured_problems, per_output
 from utank_hil.control.wave_predictor import sea_plant
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import (
+    NotNegative,
+    Positive,
+    Range,
+    SampleTime,
+    Share,
+    range_problems,
+    refuse,
+)
 
 _LEVEL = STATES.index("level_m")
 # a metre above the level limit costs as much as this roll over the whole horizon
 _PENALTY_ROLL_RAD = 0.05
+_MOST_SMOOTHING_RAD_S = 1.0  # wider than any sea's peak
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,46 +86,44 @@ class ConstrainedDesign:
     kind: Literal["constrained_gpc"]
     sea: SeaModel
     measured: tuple[str, ...] = ("roll_rad", "roll_rate_rad_s", "level_m")
-    measurement_std: tuple[float, ...] = (2e-4, 5e-4, 3.5e-3)
-    pressure_noise_pa_rt_s: float = 10e3
-    slope_noise_rad_rt_s: float = 2.5e-3
+    measurement_std: tuple[Positive, ...] = (2e-4, 5e-4, 3.5e-3)
+    pressure_noise_pa_rt_s: NotNegative = 10e3
+    slope_noise_rad_rt_s: NotNegative = 2.5e-3
     knots: tuple[int, ...] = (0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56)
-    horizon: int = 60
-    pressure_weight_rad2: float = 2.6e-4
-    level_weight_rad2_m2: float = 3e-5
-    level_margin_m: float = 0.2
-    heel_std_rad: float = 0.01
-    heel_time_s: float = 50e3
-    heel_share: float = 0.0
-    iteration_limit: int = 60
-    sample_time_s: float = 0.2
+    horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)] = 60
+    pressure_weight_rad2: Positive = 2.6e-4
+    level_weight_rad2_m2: NotNegative = 3e-5
+    level_margin_m: NotNegative = 0.2
+    heel_std_rad: NotNegative = 0.01
+    heel_time_s: Positive = 50e3
+    heel_share: Share = 0.0
+    iteration_limit: Annotated[int, Range(least=1)] = 60
+    sample_time_s: SampleTime = 0.2
 
     def __post_init__(self) -> None:
-        unknown = set(self.measured) - set(STATES)
-        if unknown or "level_m" not in self.measured or "roll_rad" not in self.measured:
-            raise ValueError(
-                f"measured must name outputs among {STATES}, roll_rad and level_m with them, got "
-                f"{self.measured}"
+        problems = [
+            *measured_problems(self.measured, "roll_rad", "level_m"),
+            *range_problems(self),
+        ]
+        if len(self.measurement_std) != len(self.measured):
+            problems.append(per_output("measurement_std", self.measurement_std, self.measured))
+        rising = all(early < late for early, late in pairwise(self.knots))
+        if not (self.knots and self.knots[0] == 0 and rising and self.knots[-1] < self.horizon):
+            problems.append(
+                (
+                    "knots",
+                    f"must increase from 0 and stay below the horizon of {self.horizon} samples, "
+                    f"got {self.knots}",
+                )
             )
-        if len(self.measurement_std) != len(self.measured) or not min(self.measurement_std) > 0:
-            raise ValueError(
-                f"measurement_std must have one positive value per measured output, "
-                f"{len(self.measured)}, got {self.measurement_std}"
+        if self.sea.smoothing_rad_s > _MOST_SMOOTHING_RAD_S:
+            problems.append(
+                (
+                    "sea.smoothing_rad_s",
+                    f"must be {_MOST_SMOOTHING_RAD_S:g} at most, got {self.sea.smoothing_rad_s}",
+                )
             )
-        for name in ("pressure_weight_rad2", "heel_time_s", "iteration_limit", "sample_time_s"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name} must be positive, got {getattr(self, name)}")
-        for name in (
-            "pressure_noise_pa_rt_s",
-            "slope_noise_rad_rt_s",
-            "level_weight_rad2_m2",
-            "level_margin_m",
-            "heel_std_rad",
-        ):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"{name} must be zero or more, got {getattr(self, name)}")
-        if not 0 <= self.heel_share <= 1:
-            raise ValueError(f"heel_share must be 0 to 1, got {self.heel_share}")
+        refuse("constrained design", problems)
 
     def law(
         self,

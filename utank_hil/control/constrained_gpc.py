@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.constrained import ConstrainedLaw
 from utank_hil.control.horizon import condense
 from utank_hil.control.limits import PumpLimits
-from utank_hil.dynamics.sampling import LinearModel
 
 
 def design_constrained_gpc(
@@ -52,7 +50,9 @@ def design_constrained_gpc(
         )
     if len(output_weight) != arx.outputs:
         raise ValueError(f"output_weight must have {arx.outputs} numbers, got {output_weight}")
-    model, observer_gain = _observer_form(arx)
+    model = arx.matrices()
+    # the deadbeat gain that makes this model's predictor the ARX predictor
+    observer_gain = arx.alpha.reshape(len(model.A), arx.outputs)
     horizon = condense(
         model,
         tuple(range(control_horizon)),
@@ -74,18 +74,3 @@ def design_constrained_gpc(
         steady_command=np.zeros(n),
         iteration_limit=iteration_limit,
     )
-
-
-def _observer_form(arx: ARX) -> tuple[LinearModel, FloatArray]:
-    """State-space model of an ARX model, and the deadbeat gain that makes it the ARX predictor.
-
-    State i is what the past makes of y(k + i), i = 0 ... p - 1, future inputs zero and the outputs
-    in between as predicted one by one.
-    """
-    p, m = arx.order, arx.outputs
-    alpha = arx.alpha.reshape(p * m, m)
-    beta = arx.beta[1:].reshape(p * m, arx.inputs)
-    a = np.eye(p * m, k=m)
-    a[:, :m] += alpha
-    c = np.eye(m, p * m)
-    return LinearModel(a, beta + alpha @ arx.beta[0], c, arx.beta[0], arx.sample_time_s), alpha

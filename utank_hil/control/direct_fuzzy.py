@@ -25,28 +25,17 @@ Derivation, and where the print differs: docs/controllers.md.
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from utank_hil.arrays import FloatArray
-from utank_hil.control.fuzzy_basis import FuzzyBasis
-from utank_hil.control.tracking_error import ErrorDynamics
-
-# part of the command that must have left for the parameters to learn from what followed
-OBEYED = 0.9
+from utank_hil.control.fuzzy_law import FuzzyController, FuzzyInputs, FuzzyLaw
 
 
 @dataclass(frozen=True, slots=True)
-class SmallGainFuzzy:
-    """Law (4.20)-(4.22).
+class SmallGainFuzzy(FuzzyLaw):
+    """Law (4.20)-(4.22); q above 2.
 
     Parameters
     ----------
-    error : ErrorDynamics
-        With q above 2.
-    ranges : tuple of float
-        Ranges of the fuzzy inputs; the first two are roll and roll rate, then level, level rate.
-    gain_rad_s2_pa : float
-        Nominal g: roll acceleration per pressure.
+    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
+        As in `FuzzyLaw`.
     gamma : float
         Below 1.
     rho : float
@@ -54,9 +43,6 @@ class SmallGainFuzzy:
         Gamma and sigma.
     initial : float
         lambda_0, zero or more.
-    brake_pa_s_m : float
-        Pump pressure per level rate against the flow (`level_brake`); 0 for the source's law.
-    sample_time_s : float
 
     Raises
     ------
@@ -64,23 +50,18 @@ class SmallGainFuzzy:
         If a parameter is out of its range.
     """
 
-    error: ErrorDynamics
-    ranges: tuple[float, ...]
-    gain_rad_s2_pa: float
     gamma: float
     rho: float
     adaptation: float
     leakage: float
     initial: float = 0.0
-    brake_pa_s_m: float = 0.0
-    sample_time_s: float = 0.01
 
     def __post_init__(self) -> None:
-        _check(self, ("gain_rad_s2_pa", "gamma", "rho", "adaptation", "leakage", "sample_time_s"))
+        FuzzyLaw.__post_init__(self)
+        self._require_positive("gamma", "rho", "adaptation", "leakage")
+        self._require_not_negative("initial")
         if not (self.error.q > 2 and self.gamma < 1):
             raise ValueError("the law needs q above 2 and gamma below 1")
-        if not (math.isfinite(self.initial) and self.initial >= 0):
-            raise ValueError(f"fuzzy law initial must be zero or more, got {self.initial}")
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -105,16 +86,13 @@ class SmallGainFuzzy:
 
 
 @dataclass(frozen=True, slots=True)
-class RobustFuzzy:
-    """Law (4.23)-(4.24).
+class RobustFuzzy(FuzzyLaw):
+    """Law (4.23)-(4.24); q above 1.
 
     Parameters
     ----------
-    error : ErrorDynamics
-        With q above 1.
-    ranges : tuple of float
-        As in `SmallGainFuzzy`.
-    gain_rad_s2_pa : float
+    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
+        As in `FuzzyLaw`.
     gamma : float
         Below 1.
     epsilon : float
@@ -123,9 +101,6 @@ class RobustFuzzy:
         Gamma_1, Gamma_2 and sigma_1, sigma_2.
     initial : tuple of float
         lambda_0, theta_0, zero or more.
-    brake_pa_s_m : float
-        Pump pressure per level rate against the flow (`level_brake`); 0 for the source's law.
-    sample_time_s : float
 
     Raises
     ------
@@ -133,26 +108,18 @@ class RobustFuzzy:
         If a parameter is out of its range.
     """
 
-    error: ErrorDynamics
-    ranges: tuple[float, ...]
-    gain_rad_s2_pa: float
     gamma: float
     epsilon: float
     adaptation: tuple[float, float]
     leakage: tuple[float, float]
     initial: tuple[float, float] = (0.0, 0.0)
-    brake_pa_s_m: float = 0.0
-    sample_time_s: float = 0.01
 
     def __post_init__(self) -> None:
-        _check(self, ("gain_rad_s2_pa", "gamma", "epsilon", "sample_time_s"))
+        FuzzyLaw.__post_init__(self)
+        self._require_positive("gamma", "epsilon", "adaptation", "leakage")
+        self._require_not_negative("initial")
         if not (self.error.q > 1 and self.gamma < 1):
             raise ValueError("the law needs q above 1 and gamma below 1")
-        for name in ("adaptation", "leakage"):
-            if not all(math.isfinite(value) and value > 0 for value in getattr(self, name)):
-                raise ValueError(f"fuzzy law {name} must be positive, got {getattr(self, name)}")
-        if not all(math.isfinite(value) and value >= 0 for value in self.initial):
-            raise ValueError(f"fuzzy law initial must be zero or more, got {self.initial}")
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -178,7 +145,7 @@ class RobustFuzzy:
         return DirectFuzzyController(self)
 
 
-class DirectFuzzyController:
+class DirectFuzzyController(FuzzyController):
     """Steps a direct adaptive fuzzy law.
 
     Parameters
@@ -192,47 +159,27 @@ class DirectFuzzyController:
     """
 
     def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:
-        self.sample_time_s = law.sample_time_s
         self._law = law
-        self._basis = FuzzyBasis(law.ranges)
-        p = law.error.lyapunov
-        self._p12, self._p22 = float(p[0, 1]), float(p[1, 1])
         self._leak = [
             (sigma, math.exp(-adaptation * sigma * law.sample_time_s))
             for adaptation, sigma in law.rates
         ]
-        self.reset()
+        super().__init__(law)
 
-    def reset(self) -> None:
-        """Forget what was learnt."""
+    def _forget(self) -> None:
         self.parameters = self._law.start
-        self._command_pa = 0.0
-        self._learning = True
 
-    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
-        """Pressure, shape (1,), for the fuzzy inputs `y`; the target of roll is one number."""
-        roll = y[0] if reference is None else y[0] - reference[0]
-        s = float(self._p12 * roll + self._p22 * y[1])
-        x = np.minimum(np.maximum(y, -self._basis.ranges * 2), self._basis.ranges * 2)
-        square = self._basis.square(x)
-        psi = 1.0 + float(x.dot(x)) + math.sqrt(square)
-        u, drives = self._law.answer(self.parameters, s, square, psi)
+    def _answer(self, now: FuzzyInputs) -> float:
+        square = self._basis.square(now.x)
+        psi = 1.0 + float(now.x.dot(now.x)) + math.sqrt(square)
+        u, drives = self._law.answer(self.parameters, now.s, square, psi)
         self.parameters = tuple(
-            self._adapted(value, start, drive if self._learning else 0.0, leak)
+            self._adapted(value, start, drive if now.learning else 0.0, leak)
             for value, start, drive, leak in zip(
                 self.parameters, self._law.start, drives, self._leak, strict=True
             )
         )
-        self._command_pa = u / self._law.gain_rad_s2_pa
-        if self._law.brake_pa_s_m:
-            self._command_pa -= self._law.brake_pa_s_m * float(y[3])
-        self._learning = True
-        return np.array([self._command_pa])
-
-    def applied(self, u: FloatArray) -> None:
-        """Rest from learning if the last command was cut short."""
-        left, asked = float(u[0]), self._command_pa
-        self._learning = abs(left - asked) <= (1 - OBEYED) * abs(asked)
+        return u
 
     @staticmethod
     def _adapted(value: float, start: float, drive: float, leak: tuple[float, float]) -> float:
@@ -240,13 +187,3 @@ class DirectFuzzyController:
         sigma, kept = leak
         rest = start + drive / sigma
         return rest + (value - rest) * kept
-
-
-def _check(law: SmallGainFuzzy | RobustFuzzy, names: tuple[str, ...]) -> None:
-    for name in names:
-        value = getattr(law, name)
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"fuzzy law {name} must be positive, got {value}")
-    if len(law.ranges) < 2:
-        raise ValueError("a fuzzy law needs at least roll and roll rate as inputs")
-    FuzzyBasis(law.ranges)

@@ -42,6 +42,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,31 +74,27 @@ class FeedbackLinearization:
 
     ship: RollShip
     tank: Tank
-    frequency_rad_s: float
-    damping_ratio: float
-    soft_level_m: float
-    hard_level_m: float
-    shift_rad_m: float = 0.0
-    shift_length_m: float = 1.0
-    level_damping_ratio: float = 0.0
-    sample_time_s: float = 0.01
+    frequency_rad_s: Positive
+    damping_ratio: Positive
+    soft_level_m: Positive
+    hard_level_m: Positive
+    shift_rad_m: NotNegative = 0.0
+    shift_length_m: Positive = 1.0
+    level_damping_ratio: NotNegative = 0.0
+    sample_time_s: SampleTime = 0.01
     model: RollModel = field(init=False, repr=False, compare=False)
     _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("frequency_rad_s", "damping_ratio", "shift_length_m", "sample_time_s"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"feedback linearization {name} must be positive, got {value}")
-        if not 0 < self.soft_level_m < self.hard_level_m:
-            raise ValueError(
-                "feedback linearization needs 0 < soft_level_m < hard_level_m, got "
-                f"{self.soft_level_m} and {self.hard_level_m}"
+        problems = range_problems(self)
+        if not self.soft_level_m < self.hard_level_m:
+            problems.append(
+                (
+                    "soft_level_m",
+                    f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}",
+                )
             )
-        for name in ("shift_rad_m", "level_damping_ratio"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"feedback linearization {name} must be zero or more, got {value}")
+        refuse("feedback linearization", problems)
         object.__setattr__(self, "model", RollModel(self.ship, self.tank))
         brake = level_brake(self.model, self.level_damping_ratio)
         object.__setattr__(self, "_brake_pa_s_m", brake)
@@ -105,10 +102,11 @@ class FeedbackLinearization:
         levels = np.linspace(0.0, reach, 201)
         grips = [self._grip(level) for level in levels.tolist()]
         if min(grips) < 0.1 * grips[0]:
-            raise ValueError(
-                f"the pump loses its grip on phi + kL l sin(h / l) within {reach} m of level: "
-                "lower shift_rad_m or raise shift_length_m"
+            reason = (
+                f"{self.shift_rad_m}: the pump loses its grip on phi + kL l sin(h / l) within "
+                f"{reach} m of level: lower it, or raise shift_length_m"
             )
+            refuse("feedback linearization", [("shift_rad_m", reason)])
 
     @property
     def zero_dynamics_rad_s(self) -> float:

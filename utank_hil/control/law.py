@@ -35,9 +35,9 @@ class PredictiveLaw:
     reference_gains: FloatArray
     sample_time_s: float
 
-    def controller(self) -> "PredictiveController":
-        """A new steppable controller, at rest."""
-        return PredictiveController(self)
+    def controller(self, washout_share: float = 0.0) -> "PredictiveController":
+        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
+        return PredictiveController(self, washout_share)
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """Transfer matrix from y to u at the points `z`, shape (N,); shape (N, r, m)."""
@@ -72,30 +72,52 @@ class PredictiveController:
     window that the gains look at; the window moves one row towards the front each step, and what
     it still needs is copied back to the end once in many steps. A step is then one product.
 
+    With a washout the law sees d(k) = keep (d(k-1) + y(k) - y(k-1)), keep = 1 - share, in place of
+    y(k). Its answer a(k) less keep a(k-1) then needs no d any more, only y itself and one sample
+    more of the past::
+
+        a(k) = keep a(k-1) + sum_i (Gu_i - keep Gu_{i-1}) u(k-i)
+                           + sum_i keep (Gy_i - Gy_{i-1}) y(k-i)
+
+    i = 1 ... p + 1, with zero gains beyond 1 ... p. So the last answer stands in front of the rows,
+    and a step is one product still. What is not in a is a reference, and what `applied` says.
+
     Parameters
     ----------
     law : PredictiveLaw
+    washout_share : float
+        Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
+        no washout.
     """
 
     _ROOM = 512  # steps between two copies
 
-    def __init__(self, law: PredictiveLaw) -> None:
-        taps, self._inputs, self._outputs = law.output_gains.shape
+    def __init__(self, law: PredictiveLaw, washout_share: float = 0.0) -> None:
+        inputs, outputs = law.output_gains.shape[1:]
         self.sample_time_s = law.sample_time_s
         gains = np.concatenate([law.input_gains, law.output_gains], axis=2)  # (p, r, r + m)
-        self._gains = np.ascontiguousarray(gains.transpose(1, 0, 2).reshape(self._inputs, -1))
+        answer_gain = np.zeros((inputs, 0))
+        if washout_share:
+            keep = 1 - washout_share
+            before = np.concatenate([np.zeros((1, *gains.shape[1:])), gains])
+            gains = np.concatenate([gains, np.zeros((1, *gains.shape[1:]))])
+            gains[:, :, :inputs] -= keep * before[:, :, :inputs]
+            gains[:, :, inputs:] -= before[:, :, inputs:]
+            gains[:, :, inputs:] *= keep
+            answer_gain = keep * np.eye(inputs)
+        taps = gains.transpose(1, 0, 2).reshape(inputs, -1)
+        self._gains = np.ascontiguousarray(np.hstack([answer_gain, taps]))
         self._reference_gains = law.reference_gains
         self._constant_reference_gain: FloatArray = law.reference_gains.sum(axis=0)
-        self._width = self._inputs + self._outputs
-        self._window = taps * self._width
-        self._flat = np.zeros(self._window + self._ROOM * self._width)
-        self._start = 0
+        self._answers, self._inputs, self._width = answer_gain.shape[1], inputs, inputs + outputs
+        self._window = taps.shape[1]
+        self._flat = np.zeros(self._answers + self._window + self._ROOM * self._width)
         self.reset()
 
     def reset(self) -> None:
         """Forget all past inputs and outputs."""
         self._flat[:] = 0.0
-        self._start = self._flat.size - self._window
+        self._newest = self._flat.size - self._window  # where the newest row begins
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take y(k-1), the newest measurement, and return u(k).
@@ -104,30 +126,32 @@ class PredictiveController:
         ----------
         y : ndarray, shape (m,)
         reference : ndarray, shape (m,) or (hp, m), optional
-            Target of the outputs: one for the whole horizon, or one for each sample of it.
+            Target of the outputs: one for the whole horizon, or one for each sample of it. With a
+            washout it is relative to the mean.
 
         Returns
         -------
         ndarray, shape (r,)
         """
-        flat, start, width = self._flat, self._start, self._width
-        flat[start + self._inputs : start + width] = y
-        u: FloatArray = self._gains.dot(flat[start : start + self._window])
+        flat, newest, answers, width = self._flat, self._newest, self._answers, self._width
+        flat[newest + self._inputs : newest + width] = y
+        u: FloatArray = self._gains.dot(flat[newest - answers : newest + self._window])
+        if newest < width + answers:
+            kept = self._window - width
+            flat[flat.size - kept :] = flat[newest : newest + kept]
+            newest = flat.size - kept
+        newest -= width
+        if answers:
+            flat[newest - answers : newest] = u
         if reference is not None:
             if reference.ndim == 1:
                 u += self._constant_reference_gain @ reference
             else:
                 u += np.einsum("qrm,qm->r", self._reference_gains, reference)
-        if start < width:
-            kept = self._window - width
-            flat[flat.size - kept :] = flat[start : start + kept]
-            start = flat.size - kept
-        start -= width
-        flat[start : start + self._inputs] = u
-        flat[start + self._inputs : start + width] = 0.0
-        self._start = start
+        flat[newest : newest + self._inputs] = u
+        self._newest = newest
         return u
 
     def applied(self, u: FloatArray) -> None:
         """Replace the newest input of the past by what was really commanded, shape (r,)."""
-        self._flat[self._start : self._start + self._inputs] = u
+        self._flat[self._newest : self._newest + self._inputs] = u

@@ -18,8 +18,12 @@ pump's pressure, beyond P_b, is for.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.parameters import NotNegative, Range, Share, range_problems, refuse
+
+_Limit = Annotated[float, Range(above=0, infinite=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,25 +53,16 @@ class PumpLimits:
         If a limit is out of its range.
     """
 
-    pressure_pa: float = 50e3
-    rate_pa_s: float = 100e3
-    level_m: float = 3.85
-    power_w: float = math.inf
-    brake_share: float = 0.7
-    sharpness: float = 2.2
-    lookahead_s: float = 0.25
+    pressure_pa: _Limit = 50e3
+    rate_pa_s: _Limit = 100e3
+    level_m: _Limit = 3.85
+    power_w: _Limit = math.inf
+    brake_share: Share = 0.7
+    sharpness: Annotated[float, Range(least=1, infinite=True)] = 2.2
+    lookahead_s: NotNegative = 0.25
 
     def __post_init__(self) -> None:
-        for name in ("pressure_pa", "rate_pa_s", "level_m", "power_w"):
-            value = getattr(self, name)
-            if not value > 0:
-                raise ValueError(f"pump limit {name} must be positive, got {value}")
-        if not 0 <= self.brake_share <= 1:
-            raise ValueError(f"pump limit brake_share must be 0 to 1, got {self.brake_share}")
-        if not self.sharpness >= 1:
-            raise ValueError(f"pump limit sharpness must be 1 or more, got {self.sharpness}")
-        if not (math.isfinite(self.lookahead_s) and self.lookahead_s >= 0):
-            raise ValueError(f"pump limit lookahead_s must be zero or more, got {self.lookahead_s}")
+        refuse("pump limit", range_problems(self))
 
 
 class CommandLimiter:

@@ -154,22 +154,23 @@ class LQGLaw:
         K.
     observer_gain : ndarray, shape (n, m)
         L.
-    innovation_covariance : ndarray, shape (m, m)
+    innovation_covariance : ndarray, shape (m, m), or None
+        None where the predictor was not made for a known noise.
     """
 
     model: LinearModel
     gain: FloatArray
     observer_gain: FloatArray
-    innovation_covariance: FloatArray
+    innovation_covariance: FloatArray | None = None
 
     @property
     def sample_time_s(self) -> float:
         """Time between two steps."""
         return self.model.dt
 
-    def controller(self) -> "LQGController":
-        """A new steppable controller, at rest."""
-        return LQGController(self)
+    def controller(self, washout_share: float = 0.0) -> "LQGController":
+        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
+        return LQGController(self, washout_share)
 
     def matrices(self) -> LinearModel:
         """The law from y to u; its states are the predicted ones."""
@@ -202,28 +203,36 @@ class LQGLaw:
 class LQGController:
     """Steps an `LQGLaw`.
 
-    Predicted state, last input and newest measurement are kept in one vector, so that a step is two
-    products.
+    Predicted state, mean of the outputs, last input and newest measurement are kept in one vector,
+    so that a step is one product: from it to the next state, mean and input.
 
     Parameters
     ----------
     law : LQGLaw
+    washout_share : float
+        Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
+        no washout.
     """
 
-    def __init__(self, law: LQGLaw) -> None:
+    def __init__(self, law: LQGLaw, washout_share: float = 0.0) -> None:
         self.sample_time_s = law.sample_time_s
         a, b, c, d, _ = law.model
-        observer = law.observer_gain
-        self._states, self._inputs = b.shape
-        self._advance = np.hstack([a - observer @ c, b - observer @ d, observer])
-        self._surprise = np.hstack([-c, -d, np.eye(len(c))])
-        self._gain = -law.gain
+        (states, inputs), outputs = b.shape, len(c)
+        self._own = states + outputs + inputs  # all of the memory but the measurement
+        self._command = slice(states + outputs, self._own)
+        state, mean, command, measured = np.split(
+            np.eye(self._own + outputs), [states, states + outputs, self._own]
+        )
+        self._surprise = (1 - washout_share) * (measured - mean) - c @ state - d @ command
+        next_state = a @ state + b @ command + law.observer_gain @ self._surprise
+        next_mean = mean + washout_share * (measured - mean)
+        self._advance = np.vstack([next_state, next_mean, -law.gain @ next_state])
         self._reference_gain: FloatArray | None = None
         self._law = law
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: state and input zero."""
+        """Forget the past: state, mean and input zero."""
         self._memory = np.zeros(self._advance.shape[1])
         self._stepped = self._memory.copy()
 
@@ -239,24 +248,25 @@ class LQGController:
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (r,).
 
-        `reference`, shape (m,), is a constant target of the outputs.
+        `reference`, shape (m,), is a constant target of the outputs, with a washout relative to
+        their mean.
         """
-        memory, states = self._memory, self._states
-        memory[states + self._inputs :] = y
-        self._stepped[:] = memory
-        state = self._advance.dot(memory)
-        command: FloatArray = self._gain.dot(state)
+        memory, own = self._memory, self._own
+        memory[own:] = y
+        following: FloatArray = self._advance.dot(memory)
+        command = following[self._command]
         if reference is not None:
             if self._reference_gain is None:
                 self._reference_gain = self._law.reference_gain()
             command += self._reference_gain @ reference
-        memory[:states] = state
-        memory[states : states + self._inputs] = command
+        # the vector just used is kept for the innovation
+        self._memory, self._stepped = self._stepped, memory
+        self._memory[:own] = following
         return command
 
     def applied(self, u: FloatArray) -> None:
         """Replace the newest input by what was really commanded: the predictor goes on from it."""
-        self._memory[self._states : self._states + self._inputs] = u
+        self._memory[self._command] = u
 
 
 def _weight(name: str, values: npt.ArrayLike, size: int) -> FloatArray:

@@ -18,6 +18,7 @@ from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import NotNegative, Positive, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +43,17 @@ class LQGDesign:
     """
 
     predictor: Predictor
-    state_weight: tuple[float, ...]
-    input_weight: float = 1.0
-    washout_rad_s: float = 0.0
+    state_weight: tuple[NotNegative, ...]
+    input_weight: Positive = 1.0
+    washout_rad_s: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        if len(self.state_weight) != len(STATES) or not min(self.state_weight) >= 0:
-            raise ValueError(
-                f"state_weight must have {len(STATES)} numbers, none negative, got "
-                f"{self.state_weight}"
+        problems = range_problems(self)
+        if len(self.state_weight) != len(STATES):
+            problems.append(
+                ("state_weight", f"must have {len(STATES)} numbers, got {self.state_weight}")
             )
-        if not self.input_weight > 0:
-            raise ValueError(f"input_weight must be positive, got {self.input_weight}")
+        refuse("LQG design", problems)
 
     def law(
         self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1

@@ -11,7 +11,7 @@ of it, the less the predictor trusts its model, and the greater the margins.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
@@ -26,6 +26,37 @@ from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import (
+    NotNegative,
+    Positive,
+    Problem,
+    Range,
+    SampleTime,
+    range_problems,
+    refuse,
+)
+
+MOST_ORDER: Final = 500
+"""Of a predictor: its law has as many states per output, and judging it takes their cube."""
+
+MOST_SAMPLES: Final = 1000
+"""Of a horizon: more than the sea can be foreseen by far."""
+
+
+def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
+    """What is wrong with names of outputs, of which the `needed` ones must be there."""
+    if measured and set(needed) <= set(measured) <= set(STATES):
+        return []
+    besides = f", {' and '.join(needed)} with them" if needed else ""
+    return [("measured", f"must name outputs among {', '.join(STATES)}{besides}, got {measured}")]
+
+
+def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) -> Problem:
+    """The problem of a parameter that does not have one value for each output."""
+    return (
+        name,
+        f"must have one value per measured output, {len(measured)} of them, got {values}",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,38 +89,19 @@ class Predictor:
     """
 
     measured: tuple[str, ...]
-    measurement_std: tuple[float, ...]
-    order: int
-    wave_peak_rad_s: float
-    wave_damping_ratio: float
-    wave_slope_rad: float
-    pressure_noise_pa_rt_s: float
-    sample_time_s: float = 0.2
+    measurement_std: tuple[Positive, ...]
+    order: Annotated[int, Range(least=1, most=MOST_ORDER)]
+    wave_peak_rad_s: Positive
+    wave_damping_ratio: Positive
+    wave_slope_rad: Positive
+    pressure_noise_pa_rt_s: NotNegative
+    sample_time_s: SampleTime = 0.2
 
     def __post_init__(self) -> None:
-        unknown = set(self.measured) - set(STATES)
-        if unknown or not self.measured:
-            raise ValueError(f"measured must name outputs among {STATES}, got {self.measured}")
+        problems = [*measured_problems(self.measured), *range_problems(self)]
         if len(self.measurement_std) != len(self.measured):
-            raise ValueError(
-                f"measurement_std must have one value per measured output, {len(self.measured)}"
-            )
-        positive = {
-            "measurement_std": min(self.measurement_std),
-            "order": self.order,
-            "wave_peak_rad_s": self.wave_peak_rad_s,
-            "wave_damping_ratio": self.wave_damping_ratio,
-            "wave_slope_rad": self.wave_slope_rad,
-            "sample_time_s": self.sample_time_s,
-        }
-        for name, value in positive.items():
-            if not value > 0:
-                raise ValueError(f"predictor {name} must be positive, got {value}")
-        if not self.pressure_noise_pa_rt_s >= 0:
-            raise ValueError(
-                "predictor pressure_noise_pa_rt_s must be zero or more, got "
-                f"{self.pressure_noise_pa_rt_s}"
-            )
+            problems.append(per_output("measurement_std", self.measurement_std, self.measured))
+        refuse("predictor", problems)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +129,56 @@ class PredictiveDesign:
 
     kind: Literal["gpc", "dpc"]
     predictor: Predictor
-    control_horizon: int
-    prediction_horizon: int
-    output_weight: tuple[float, ...] | None = None
-    first_output: int = 0
-    washout_rad_s: float = 0.0
+    control_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
+    prediction_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
+    output_weight: tuple[NotNegative, ...] | None = None
+    first_output: Annotated[int, Range(least=0)] = 0
+    washout_rad_s: NotNegative = 0.0
 
     def __post_init__(self) -> None:
+        problems = [*range_problems(self), *self._horizon_problems()]
+        measured = self.predictor.measured
         if self.kind not in ("gpc", "dpc"):
-            raise ValueError(f"kind must be gpc or dpc, got {self.kind}")
-        if self.kind == "dpc" and self.first_output:
-            raise ValueError("first_output belongs to GPC; DPC weighs from control_horizon on")
+            problems.append(("kind", f"must be gpc or dpc, got {self.kind}"))
+        if self.kind == "gpc" and self.output_weight is None:
+            problems.append(
+                ("output_weight", "GPC needs an output_weight for each measured output")
+            )
+        if self.output_weight is not None and len(self.output_weight) != len(measured):
+            problems.append(per_output("output_weight", self.output_weight, measured))
+        refuse("predictive design", problems)
+
+    def _horizon_problems(self) -> list[Problem]:
+        control, prediction = self.control_horizon, self.prediction_horizon
+        if self.kind == "dpc":
+            problems = []
+            if control >= prediction:
+                problems.append(
+                    (
+                        "control_horizon",
+                        f"must be below prediction_horizon, got {control} and {prediction}",
+                    )
+                )
+            if self.first_output:
+                problems.append(
+                    ("first_output", "belongs to GPC; DPC weighs from control_horizon on")
+                )
+            return problems
+        if control > prediction:
+            return [
+                (
+                    "control_horizon",
+                    f"must be prediction_horizon at most, got {control} and {prediction}",
+                )
+            ]
+        if self.first_output >= prediction:
+            return [
+                (
+                    "first_output",
+                    f"must be below prediction_horizon, got {self.first_output} and {prediction}",
+                )
+            ]
+        return []
 
     def law(
         self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1

@@ -22,6 +22,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import Positive, Problem, SampleTime, range_problems, refuse
 
 FACTOR = (0.25, 3.0)  # range of the correction m: beyond it the model is of another ship
 
@@ -55,44 +56,39 @@ class Stimulation:
 
     ship: RollShip
     tank: Tank
-    amplitude_rad: float
-    period_s: float
-    ramp_s: float
-    pressure_pa: float
-    roll_limit_rad: float
-    level_limit_m: float
-    correction_s: float = 120.0
-    sample_time_s: float = 0.02
+    amplitude_rad: Positive
+    period_s: Positive
+    ramp_s: Positive
+    pressure_pa: Positive
+    roll_limit_rad: Positive
+    level_limit_m: Positive
+    correction_s: Positive = 120.0
+    sample_time_s: SampleTime = 0.02
 
     def __post_init__(self) -> None:
-        for name in (
-            "amplitude_rad",
-            "period_s",
-            "ramp_s",
-            "pressure_pa",
-            "roll_limit_rad",
-            "level_limit_m",
-            "correction_s",
-            "sample_time_s",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"stimulation {name} must be positive, got {value}")
-        if self.amplitude_rad >= self.roll_limit_rad:
-            raise ValueError(
-                f"stimulation amplitude_rad {self.amplitude_rad} must be below roll_limit_rad "
-                f"{self.roll_limit_rad}"
-            )
+        problems = range_problems(self)
+        refuse("stimulation", problems or [*self._limit_problems(), *self._reach_problems()])
+
+    def _limit_problems(self) -> list[Problem]:
+        if self.amplitude_rad < self.roll_limit_rad:
+            return []
+        reason = f"{self.amplitude_rad} must be below roll_limit_rad {self.roll_limit_rad}"
+        return [("amplitude_rad", reason)]
+
+    def _reach_problems(self) -> list[Problem]:
         roll, level = self.gains
-        for name, needed, limit in (
-            ("pressure_pa", self.amplitude_rad / roll, self.pressure_pa),
-            ("level_limit_m", self.amplitude_rad * level / roll, self.level_limit_m),
-        ):
-            if needed > limit:
-                raise ValueError(
-                    f"{self.amplitude_rad:.3g} rad at {self.period_s:.3g} s take {needed:.4g}, "
-                    f"{name} is {limit:.4g}: roll less, or nearer to the natural period"
-                )
+        return [
+            (
+                "amplitude_rad",
+                f"{self.amplitude_rad:.3g} at {self.period_s:.3g} s takes {needed:.4g}, {name} is "
+                f"{limit:.4g}: roll less, or nearer to the natural period",
+            )
+            for name, needed, limit in (
+                ("pressure_pa", self.amplitude_rad / roll, self.pressure_pa),
+                ("level_limit_m", self.amplitude_rad * level / roll, self.level_limit_m),
+            )
+            if needed > limit
+        ]
 
     @property
     def gains(self) -> tuple[float, float]:

@@ -9,12 +9,20 @@ first-order low-pass sees it, is taken off before the law::
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.arrays import ComplexArray
 from utank_hil.control.interface import Controller, LinearLaw
 from utank_hil.dynamics.sampling import LinearModel
+
+
+class WashableLaw(LinearLaw, Protocol):
+    """A linear law whose controller can take the mean off its outputs by itself."""
+
+    def controller(self, washout_share: float = 0.0) -> Controller:
+        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +31,7 @@ class WashoutLaw:
 
     Parameters
     ----------
-    law : LinearLaw
+    law : PredictiveLaw or LQGLaw
     corner_rad_s : float
         w0, far below the ship's roll frequency.
 
@@ -33,7 +41,7 @@ class WashoutLaw:
         If the corner is not positive.
     """
 
-    law: LinearLaw
+    law: WashableLaw
     corner_rad_s: float
 
     def __post_init__(self) -> None:
@@ -50,9 +58,9 @@ class WashoutLaw:
         """Share of the newest sample in the mean."""
         return -math.expm1(-self.corner_rad_s * self.sample_time_s)
 
-    def controller(self) -> "WashoutController":
-        """A new steppable controller, at rest."""
-        return WashoutController(self.law.controller(), self.share)
+    def controller(self) -> Controller:
+        """A new steppable controller, at rest; a reference is relative to the mean."""
+        return self.law.controller(self.share)
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """Transfer matrix at the points `z`, shape (N,); shape (N, r, m)."""
@@ -70,36 +78,3 @@ class WashoutLaw:
         b = np.vstack([keep * law.B, share * np.eye(outputs)])
         c = np.hstack([law.C, np.zeros((len(law.C), outputs))])
         return LinearModel(a, b, c, law.D, law.dt)
-
-
-class WashoutController:
-    """Steps another controller on its outputs without their mean.
-
-    Parameters
-    ----------
-    controller : Controller
-    share : float
-        Share of the newest sample in the mean.
-    """
-
-    def __init__(self, controller: Controller, share: float) -> None:
-        self.sample_time_s = controller.sample_time_s
-        self._controller = controller
-        self._share = share
-        self._mean: FloatArray | float = 0.0
-
-    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
-        """Step with y less its mean; a `reference` is relative to the mean."""
-        deviation = y - self._mean
-        self._mean += self._share * deviation
-        deviation *= 1 - self._share
-        return self._controller.step(deviation, reference)
-
-    def applied(self, u: FloatArray) -> None:
-        """Pass on what was commanded."""
-        self._controller.applied(u)
-
-    def reset(self) -> None:
-        """Forget the mean and the past."""
-        self._mean = 0.0
-        self._controller.reset()

@@ -23,9 +23,11 @@ compiled (`compile_pump`); this module does not import a compiler.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import FunctionType
 from typing import Any, NamedTuple
+
+from utank_hil.parameters import Positive, Problem, range_problems, refuse
 
 
 class PumpCoefficients(NamedTuple):
@@ -96,38 +98,50 @@ class Pump:
         the loop is slower than the lag.
     """
 
-    duct_area_m2: float
-    radius_m: float
-    pitch_m: float
-    lift: float
-    friction: float
-    inertia_kg_m2: float
-    max_speed_rad_s: float
-    max_torque_nm: float
-    max_power_w: float
-    max_pressure_pa: float
-    max_pressure_rate_pa_s: float
-    lag_s: float = 0.1
-    speed_bandwidth_rad_s: float = 30.0
-    pressure_gain: float = 1.0
-    integral_time_s: float = 0.5
-    density_kg_m3: float = 1000.0
+    duct_area_m2: Positive
+    radius_m: Positive
+    pitch_m: Positive
+    lift: Positive
+    friction: Positive
+    inertia_kg_m2: Positive
+    max_speed_rad_s: Positive
+    max_torque_nm: Positive
+    max_power_w: Positive
+    max_pressure_pa: Positive
+    max_pressure_rate_pa_s: Positive
+    lag_s: Positive = 0.1
+    speed_bandwidth_rad_s: Positive = 30.0
+    pressure_gain: Positive = 1.0
+    integral_time_s: Positive = 0.5
+    density_kg_m3: Positive = 1000.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"pump {field.name} must be positive and finite, got {value}")
-        if not 1 / math.sqrt(8) < self.pitch_m / self.radius_m < math.sqrt(8):
-            raise ValueError(
-                f"pump pitch_m must be 0.354 to 2.83 times radius_m, got {self.pitch_m} and "
-                f"{self.radius_m}: outside, one pressure belongs to several speeds"
+        problems = range_problems(self)
+        if not problems:  # else these can't be computed
+            problems = [*self._blade_problems(), *self._lag_problems()]
+        refuse("pump", problems)
+
+    def _blade_problems(self) -> list[Problem]:
+        if 1 / math.sqrt(8) < self.pitch_m / self.radius_m < math.sqrt(8):
+            return []
+        return [
+            (
+                "pitch_m",
+                f"must be 0.354 to 2.83 times radius_m, got {self.pitch_m} and "
+                f"{self.radius_m}: outside, one pressure belongs to several speeds",
             )
-        if self.reference_lag_s <= 0:
-            raise ValueError(
-                f"pump lag_s = {self.lag_s} must exceed the loop's own lag of "
-                f"{self._loop_lag_s:g} s: raise it, speed_bandwidth_rad_s or pressure_gain"
+        ]
+
+    def _lag_problems(self) -> list[Problem]:
+        if self.reference_lag_s > 0:
+            return []
+        return [
+            (
+                "lag_s",
+                f"= {self.lag_s} must exceed the loop's own lag of {self._loop_lag_s:g} s: raise "
+                "it, speed_bandwidth_rad_s or pressure_gain",
             )
+        ]
 
     @classmethod
     def for_duct(cls, area_m2: float, max_pressure_pa: float = 50e3) -> "Pump":

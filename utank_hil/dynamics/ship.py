@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from utank_hil.parameters import Finite, NotNegative, Positive, Problem, range_problems, refuse
+
 
 @dataclass(frozen=True, slots=True)
 class RollShip:
@@ -42,43 +44,33 @@ class RollShip:
         the table of levers is incomplete or given beside a polynomial.
     """
 
-    inertia_kg_m2: float
-    stiffness_nm_rad: float
-    damping_nms_rad: float = 0.0
-    quadratic_damping_nms2_rad2: float = 0.0
-    restoring_odd_nm: tuple[float, ...] = ()
+    inertia_kg_m2: Positive
+    stiffness_nm_rad: Positive
+    damping_nms_rad: NotNegative = 0.0
+    quadratic_damping_nms2_rad2: NotNegative = 0.0
+    restoring_odd_nm: tuple[Finite, ...] = ()
     displacement_n: float = 0.0
     gz_step_rad: float = 0.0
-    gz_m: tuple[float, ...] = ()
-    offset_moment_nm: float = 0.0
-    wind_moment_nm: float = 0.0
+    gz_m: tuple[Finite, ...] = ()
+    offset_moment_nm: Finite = 0.0
+    wind_moment_nm: Finite = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("inertia_kg_m2", "stiffness_nm_rad"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"ship {name} must be positive and finite, got {value}")
-        for name in ("damping_nms_rad", "quadratic_damping_nms2_rad2"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"ship {name} must be zero or more and finite, got {value}")
-        for name in ("offset_moment_nm", "wind_moment_nm"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"ship {name} must be finite, got {getattr(self, name)}")
-        if not all(map(math.isfinite, (*self.restoring_odd_nm, *self.gz_m))):
-            raise ValueError("ship restoring_odd_nm and gz_m must hold finite numbers only")
-        if self.gz_m:
-            self._check_levers()
+        refuse("ship", [*range_problems(self), *self._lever_problems()])
 
-    def _check_levers(self) -> None:
+    def _lever_problems(self) -> list[Problem]:
+        if not self.gz_m:
+            return []
+        problems = []
         if self.restoring_odd_nm:
-            raise ValueError("ship gz_m and restoring_odd_nm exclude each other: remove one")
+            problems.append(("gz_m", "and restoring_odd_nm exclude each other: remove one"))
         if len(self.gz_m) < 4 or self.gz_m[0] != 0:
-            raise ValueError("ship gz_m needs at least 4 levers, the first of them 0 at zero heel")
+            problems.append(("gz_m", "needs at least 4 levers, the first of them 0 at zero heel"))
         for name in ("displacement_n", "gz_step_rad"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"ship {name} must be positive to go with gz_m, got {value}")
+                problems.append((name, f"must be positive to go with gz_m, got {value}"))
+        return problems
 
     @property
     def natural_frequency_rad_s(self) -> float:

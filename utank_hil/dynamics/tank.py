@@ -10,6 +10,17 @@ raises the starboard level.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
+
+from utank_hil.parameters import (
+    Finite,
+    NotNegative,
+    Positive,
+    Range,
+    Share,
+    range_problems,
+    refuse,
+)
 
 GRAVITY_M_S2 = 9.80665
 
@@ -48,40 +59,20 @@ class Tank:
         outside 0 to 1.
     """
 
-    width_m: float
-    height_m: float
-    reservoir_area_m2: float
-    duct_area_m2: float
-    lx_m: float = 0.0
-    lz_m: float = 0.0
-    density_kg_m3: float = 1000.0
-    damping_ratio: float = 0.0
-    quadratic_loss: float = 0.0
-    headroom_m: float = math.inf
-    restitution: float = 0.0
+    width_m: Positive
+    height_m: Positive
+    reservoir_area_m2: Positive
+    duct_area_m2: Positive
+    lx_m: Finite = 0.0
+    lz_m: Finite = 0.0
+    density_kg_m3: Positive = 1000.0
+    damping_ratio: NotNegative = 0.0
+    quadratic_loss: NotNegative = 0.0
+    headroom_m: Annotated[float, Range(above=0, infinite=True)] = math.inf
+    restitution: Share = 0.0
 
     def __post_init__(self) -> None:
-        for name in (
-            "width_m",
-            "height_m",
-            "reservoir_area_m2",
-            "duct_area_m2",
-            "density_kg_m3",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"tank {name} must be positive and finite, got {value}")
-        for name in ("damping_ratio", "quadratic_loss"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"tank {name} must be zero or more and finite, got {value}")
-        for name in ("lx_m", "lz_m"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"tank {name} must be finite, got {getattr(self, name)}")
-        if not self.headroom_m > 0:
-            raise ValueError(f"tank headroom_m must be positive, got {self.headroom_m}")
-        if not 0 <= self.restitution <= 1:
-            raise ValueError(f"tank restitution must lie in 0 to 1, got {self.restitution}")
+        refuse("tank", range_problems(self))
 
     @property
     def effective_length_m(self) -> float:

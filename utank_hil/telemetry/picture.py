@@ -23,13 +23,13 @@ class BenchCurve:
 
     Attributes
     ----------
-    name : str
-        Name in the legend.
+    label : str
+        What the legend says of it, figures included: they come from who judges the run.
     time_s, roll_rad, level_m, pressure_pa : array (n,)
         Level is the starboard surface above its still level.
     """
 
-    name: str
+    label: str
     time_s: FloatArray
     roll_rad: FloatArray
     level_m: FloatArray
@@ -79,7 +79,11 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
         figure.align_ylabels()
         handles = axes[0, -1].get_lines()[: len(curves)]
         figure.legend(
-            handles, _legend(curves), loc="outside lower left", ncols=len(curves), frameon=False
+            handles,
+            [curve.label for curve in curves],
+            loc="outside lower left",
+            ncols=len(curves),
+            frameon=False,
         )
     return path
 
@@ -112,13 +116,3 @@ def _draw_column(
             axis.plot(time, value[shown], color=color, linewidth=width)
     axes[-1].set_xlim(span_s[0] / unit_s, span_s[1] / unit_s)
     axes[-1].set_xlabel(f"Time ({unit})")
-
-
-def _legend(curves: Sequence[BenchCurve]) -> list[str]:
-    """Name each curve, with its RMS roll and what that is against the first."""
-    rms = [float(np.rad2deg(np.sqrt(np.mean(curve.roll_rad**2)))) for curve in curves]
-    names: list[str] = []
-    for curve, value in zip(curves, rms, strict=True):
-        change = f" ({value / rms[0] - 1:+.0%})".replace("-", "−") if names and rms[0] else ""
-        names.append(f"{curve.name}: roll {value:.2f}° RMS{change}")
-    return names

@@ -13,12 +13,13 @@ import select
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
-from utank_hil.telemetry.ring import RingError, RingReader
+from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.viewer import LOOPBACK, free_port, live_url, rerun_environment
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 _FLUSH_TIMEOUT_S: Final = 5.0
 _NICENESS: Final = 5
+_FIRST_BYTES: Final = 1 << 18  # what a recording needs to begin: most of it the blueprint
+_LAST_BYTES: Final = (b"FOOT", 64)  # what the last so many bytes of a finished file hold
 
 
 class RecorderError(RuntimeError):
@@ -69,8 +72,10 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
     ------
     RingError
         If there is no such ring.
+    OSError
+        If the file can't be made, or there is no room for the beginning of a recording.
     RuntimeError
-        If the file can't be written, be it from the start or because the disk is full.
+        If the file can't be written to its end.
     """
     import rerun as rr
 
@@ -79,6 +84,7 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
 
     stop = _stop_pipe()
     with RingReader(ring) as reader:
+        _make_room(file)
         sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(file)]
         if live_port is not None:
             sinks.append(rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY))
@@ -100,7 +106,11 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
             if last:
                 break
         _flush(recording)
-        recording.disconnect()
+        recording.disconnect()  # writes the footer, and says nothing if it can't
+        if not _is_finished(file):
+            raise RuntimeError(
+                f"its {recorded} rows are written, but not the end of the file: is the disk full?"
+            )
         return RecorderReport(recorded, reader.lost)
 
 
@@ -127,7 +137,7 @@ class RecorderProcess:
     Raises
     ------
     RecorderError
-        If the recorder does not come up; its own message is on standard error.
+        If the recorder does not come up, with its reason.
     """
 
     def __init__(self, ring: str, file: Path, live: bool = False) -> None:
@@ -150,9 +160,13 @@ class RecorderProcess:
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
         self._output = output
-        if not (ready and output.readline()):
+        said = json.loads(output.readline() or "{}") if ready else {}
+        if "ready" not in said:
             self._kill()
-            raise RecorderError(f"the recorder of {file} did not start")
+            reason = said.get(
+                "error", "it ended" if ready else f"silent for {_START_TIMEOUT_S:g} s"
+            )
+            raise RecorderError(f"the recorder of {file} did not start: {reason}")
 
     def stop(self) -> RecorderReport:
         """Have the last rows written and wait for the end of the process; idempotent.
@@ -160,7 +174,7 @@ class RecorderProcess:
         Raises
         ------
         RecorderError
-            If the process failed, or does not end; its own message is on standard error.
+            If the process failed, with its reason, or does not end.
         """
         if self._report is None:
             self._process.terminate()
@@ -170,9 +184,11 @@ class RecorderProcess:
                 self._kill()
                 raise RecorderError("the recorder did not end and was killed") from None
             with self._output:
+                said = json.loads(self._output.readline() or "{}")
                 if code != 0:
-                    raise RecorderError(f"the recorder failed, exit code {code}")
-                self._report = RecorderReport(**json.loads(self._output.readline()))
+                    reason = said.get("error", f"exit code {code}")
+                    raise RecorderError(f"the recorder failed: {reason}")
+                self._report = RecorderReport(**said)
         return self._report
 
     def _kill(self) -> None:
@@ -202,8 +218,9 @@ def _main() -> None:
     os.nice(_NICENESS)
     try:
         _say(asdict(record(arguments.ring, arguments.file, arguments.live_port)))
-    except (RingError, RuntimeError) as error:
+    except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
+        _say({"error": str(error)})
         os._exit(1)  # Rerun's exit hook would wait for ever for a writer that is gone
 
 
@@ -222,7 +239,22 @@ def _stop_pipe() -> int:
     return readable
 
 
-def _say(message: dict[str, int]) -> None:
+def _make_room(file: Path) -> None:
+    """Raise if the file can't be begun: Rerun would wait for ever for room for its first bytes."""
+    with file.open("wb") as begun:
+        os.posix_fallocate(begun.fileno(), 0, _FIRST_BYTES)
+
+
+def _is_finished(file: Path) -> bool:
+    """Tell whether a recording has its footer: without it, it is one that was cut off."""
+    mark, length = _LAST_BYTES
+    with file.open("rb") as content:
+        content.seek(0, os.SEEK_END)
+        content.seek(max(0, content.tell() - length))
+        return mark in content.read()
+
+
+def _say(message: Mapping[str, int | str]) -> None:
     """Tell the parent, one JSON object a line."""
     print(json.dumps(message), flush=True)
 

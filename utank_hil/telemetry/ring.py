@@ -89,7 +89,7 @@ class RingWriter:
     ValueError
         If there are no columns, a name comes twice, or the capacity is below two.
     RingError
-        If a ring of that name exists and its writer lives.
+        If a ring of that name exists and its writer lives, or there is no room for it.
     """
 
     def __init__(
@@ -110,6 +110,12 @@ class RingWriter:
             self._shm: SharedMemory | None = SharedMemory(self.name, create=True, size=size)
         except FileExistsError as error:
             raise RingError(f"{_SHM / self.name} exists: its writer runs, or remove it") from error
+        try:
+            _reserve(self.name, size)
+        except OSError as error:
+            self._shm.close()
+            self._shm.unlink()
+            raise RingError(f"no room for {size} bytes in {_SHM}: {error.strerror}") from error
         memory = self._shm.buf
         assert memory is not None  # it is, until closed
         memory[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + len(names)] = names
@@ -285,6 +291,15 @@ class RingReader:
 def _first_slot_word(names_bytes: int) -> int:
     """Word at which the slots begin, on a cache line."""
     return _HEADER_WORDS + 8 * -(-names_bytes // 64)
+
+
+def _reserve(name: str, size: int) -> None:
+    """Have memory put behind a segment now: a write that finds none later is a bus error."""
+    descriptor = os.open(_SHM / name, os.O_RDWR | os.O_CLOEXEC)
+    try:
+        os.posix_fallocate(descriptor, 0, size)
+    finally:
+        os.close(descriptor)
 
 
 def _start_of(pid: int) -> int | None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from utank_hil.analysis.capsize import without_tank
-from utank_hil.analysis.roll_decay import roll_decay
+from utank_hil.analysis.decay import roll_decay
 from utank_hil.dynamics import RollModel, RollShip, Tank, simulate
 
 TANK = Tank(17.1, 4.88, 17.11, 6.22)

@@ -1,0 +1,198 @@
+"""The sea of a scenario: an irregular one of any spectrum, or one regular wave.
+
+Irregular seas differ in their spectrum only; heading, speed, spreading and effective slope are the
+same keys for all of them.
+"""
+
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from utank_hil.arrays import FloatArray
+from utank_hil.config_files import Section
+from utank_hil.parameters import Problem, refuse
+from utank_hil.sea import (
+    EffectiveSlope,
+    MeasuredSpectra,
+    Sea,
+    Spectrum,
+    ittc,
+    jonswap,
+    load_ndbc,
+    pierson_moskowitz,
+)
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class _AnySea(Section):
+    """How the ship meets the waves, and how much of their slope acts on her."""
+
+    heading_deg: float = 90.0
+    """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
+    speed_m_s: Annotated[float, Field(ge=0)] = 0.0
+    """The ship's speed."""
+    effective_slope: EffectiveSlope = EffectiveSlope()
+
+
+class _IrregularSea(_AnySea):
+    """A sea drawn from a spectrum."""
+
+    spreading: Annotated[float, Field(ge=0)] | None = None
+    """Exponent s of the spreading cos^2s(theta / 2); long-crested without it."""
+
+    def spectrum(self) -> Spectrum:
+        """What the waves are drawn from."""
+        raise NotImplementedError
+
+    def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:  # noqa: ARG002, one for all
+        """Where the waves go relative to the ship, for all or for each band."""
+        return math.radians(self.heading_deg)
+
+    def sea(self, seed: int) -> Sea:
+        """A realisation of the spectrum."""
+        spectrum = self.spectrum()
+        return Sea.irregular(
+            spectrum,
+            seed,
+            heading_rad=self.heading_rad(spectrum),
+            spreading=self.spreading,
+            speed_m_s=self.speed_m_s,
+        )
+
+
+class JonswapSea(_IrregularSea):
+    """A growing sea."""
+
+    kind: Literal["jonswap"]
+    hs_m: Positive
+    tp_s: Positive
+    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
+
+    def spectrum(self) -> Spectrum:
+        """JONSWAP spectrum."""
+        return jonswap(self.hs_m, self.tp_s, self.gamma)
+
+
+class IttcSea(_IrregularSea):
+    """A sea of given height and period, Bretschneider's two-parameter spectrum."""
+
+    kind: Literal["ittc"]
+    hs_m: Positive
+    tp_s: Positive
+
+    def spectrum(self) -> Spectrum:
+        """ITTC spectrum."""
+        return ittc(self.hs_m, self.tp_s)
+
+
+class PiersonMoskowitzSea(_IrregularSea):
+    """A fully developed sea: the height settles the period."""
+
+    kind: Literal["pierson_moskowitz"]
+    hs_m: Positive
+
+    def spectrum(self) -> Spectrum:
+        """Pierson-Moskowitz spectrum."""
+        return pierson_moskowitz(self.hs_m)
+
+
+class MeasuredSea(_IrregularSea):
+    """One hour of a buoy's record, in one direction or in the directions measured."""
+
+    kind: Literal["measured"]
+    file: Path
+    """Spectral density, NDBC's yearly or 45-day layout."""
+    direction_file: Path | None = None
+    """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
+    time: datetime
+    """Start of the record's hour as written in the file, UTC unless it names another zone."""
+    course_deg: float | None = None
+    """The ship's course, degrees clockwise from true north."""
+
+    @field_validator("file")
+    @classmethod
+    def _readable(cls, file: Path) -> Path:
+        _load(file)
+        return file
+
+    @field_validator("direction_file")
+    @classmethod
+    def _belongs_to_file(cls, direction_file: Path | None, info: ValidationInfo) -> Path | None:
+        if direction_file is not None and "file" in info.data:
+            _load(info.data["file"], direction_file)
+        return direction_file
+
+    @field_validator("time")
+    @classmethod
+    def _hour_is_there(cls, time: datetime, info: ValidationInfo) -> datetime:
+        if time.tzinfo is not None:
+            time = time.astimezone(UTC).replace(tzinfo=None)
+        if "file" in info.data and _load(info.data["file"]).at(time.isoformat()).moment(0) == 0:
+            raise ValueError("the spectrum holds no energy: choose another hour")
+        return time
+
+    @model_validator(mode="after")
+    def _one_direction_for_each_band(self) -> Self:
+        problems: list[Problem] = []
+        if self.direction_file is None:
+            if self.course_deg is not None:
+                problems.append(("course_deg", "needs direction_file; without it give heading_deg"))
+        else:
+            if self.course_deg is None:
+                problems.append(("course_deg", "is required with direction_file: from true north"))
+            if "heading_deg" in self.model_fields_set:
+                problems.append(
+                    ("heading_deg", "and direction_file exclude each other: remove one")
+                )
+        refuse("sea", problems)
+        try:
+            self.heading_rad(self.spectrum())
+        except ValueError as error:  # energy without a direction
+            refuse("sea", [("direction_file", str(error))])
+        return self
+
+    def spectrum(self) -> Spectrum:
+        """The hour's spectrum."""
+        return _load(self.file, self.direction_file).at(self.time.isoformat())
+
+    def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:
+        """As measured, or `heading_deg` for all bands."""
+        if self.course_deg is None:
+            return super().heading_rad(spectrum)
+        return spectrum.heading_rad(self.course_deg)
+
+
+class RegularSea(_AnySea):
+    """One wave."""
+
+    kind: Literal["regular"]
+    amplitude_m: Annotated[float, Field(ge=0)]
+    period_s: Positive
+
+    def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw
+        """The wave."""
+        return Sea.regular(
+            self.amplitude_m,
+            2 * math.pi / self.period_s,
+            heading_rad=math.radians(self.heading_deg),
+            speed_m_s=self.speed_m_s,
+        )
+
+
+ScenarioSea = Annotated[
+    MeasuredSea | JonswapSea | IttcSea | PiersonMoskowitzSea | RegularSea,
+    Field(discriminator="kind"),
+]
+"""The section ``sea`` of a scenario."""
+
+
+def _load(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
+    """Spectra of a file; pydantic lists ValueErrors with their key, and no other errors."""
+    try:
+        return load_ndbc(file, direction_file)
+    except OSError as error:
+        raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error

@@ -1,0 +1,352 @@
+"""``utank-hil check``: whatever is wrong in a file is told with its place, and bench agrees."""
+
+import copy
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from firmware_sim.assembly import build_ship_side
+from firmware_sim.scenario import Scenario
+from utank_hil.analysis.retune import retuner_work
+from utank_hil.cli import app
+from utank_hil.config import ControllerConfig, Vessel
+from utank_hil.config_files import ConfigError, load_config
+from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.runtime.retuning import SimulatedRetuner
+
+CONFIGS = Path("configs").resolve()
+WIDE = {"TERM": "dumb", "COLUMNS": "300", "NO_COLOR": "1"}
+
+
+def invoke(*arguments: object, columns: int = 300):
+    environment = {**WIDE, "COLUMNS": str(columns)}
+    return CliRunner(env=environment).invoke(app, [str(argument) for argument in arguments])
+
+
+def told(result) -> set[tuple[str, str, str]]:
+    """File name, key and reason of every error; nothing else may have ended the command."""
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    lines = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    found = [re.fullmatch(r"error: (\S+?): (?:([\w.]+): )?(.*)", line) for line in lines]
+    return {(Path(each[1]).name, each[2] or "", each[3]) for each in found if each}
+
+
+def whole(path: Path) -> Any:
+    """Content of a file with all the files it names, so that any part of it can be changed."""
+
+    def resolved(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: resolved(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [resolved(item) for item in value]
+        if isinstance(value, str) and value.endswith(".yaml"):
+            return whole((path.parent / value).resolve())
+        if isinstance(value, str) and value.startswith("../"):
+            return str((path.parent / value).resolve())
+        return value
+
+    return resolved(yaml.safe_load(path.read_text()))
+
+
+def controller(folder: Path, shipped: str, **changes: object) -> Path:
+    """A copy of a shipped controller with dotted keys (``__`` for the dot) changed or added."""
+    content = yaml.safe_load((CONFIGS / "controllers" / f"{shipped}.yaml").read_text())
+    content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
+    for key, value in changes.items():
+        *parents, last = key.split("__")
+        place = content
+        for parent in parents:
+            place = place.setdefault(parent, {})
+        place[last] = value
+    path = folder / "controller.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+def scenario(folder: Path, path: Path) -> Path:
+    """A scenario with a controller."""
+    content = {
+        "name": "swell",
+        "vessel": str(CONFIGS / "ships" / "thesis_first.yaml"),
+        "sea": {"kind": "regular", "amplitude_m": 1.0, "period_s": 10.0},
+        "controllers": {"one": str(path)},
+        "operator": [{"time_s": 5.0, "action": "arm"}],
+        "duration_s": 20.0,
+        "settle_s": 5.0,
+    }
+    file = folder / "scenario.yaml"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return file
+
+
+WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
+    ("gpc", {"law__prediction_horizon": 5},
+     {"law.control_horizon": "must be prediction_horizon at most, got 58 and 5"}),
+    ("gpc", {"law__control_horizon": 400_000}, {"law.control_horizon": "must be 1 to 1000"}),
+    ("gpc", {"law__first_output": 71}, {"law.first_output": "must be below prediction_horizon"}),
+    ("gpc", {"law__output_weight": None}, {"law.output_weight": "GPC needs an output_weight"}),
+    ("gpc", {"law__output_weight": [1.0, 2.0]},
+     {"law.output_weight": "must have one value per measured output"}),
+    ("gpc", {"law__washout_rad_s": -0.02}, {"law.washout_rad_s": "must be zero or more"}),
+    ("gpc", {"law__predictor__order": 1_000_000}, {"law.predictor.order": "must be 1 to 500"}),
+    ("gpc", {"law__predictor__sample_time_s": 0.013},
+     {"law.predictor.sample_time_s": "must be a whole number of ticks of 0.01 s"}),
+    ("gpc", {"law__predictor__measured": ["yaw_rad"]},
+     {"law.predictor.measured": "must name outputs among roll_rad, "}),
+    ("gpc", {"law__predictor__pressure_noise_pa_rt_s": 1e250},
+     {"law": "can't be designed for this vessel: "}),
+    ("gpc", {"law__predictor__order": -1, "law__control_horizon": -3, "law__output_weight": [-1.0]},
+     {"law.predictor.order": "(got -1)", "law.control_horizon": "(got -3)",
+      "law.output_weight.0": "(got -1.0)"}),
+    ("dpc", {"law__prediction_horizon": 57},
+     {"law.control_horizon": "must be below prediction_horizon"}),
+    ("lqg", {"law__design__state_weight": [1.0]}, {"law.design.state_weight": "must have 4"}),
+    ("constrained_gpc", {"law__knots": [0, 3, 3]}, {"law.knots": "must increase from 0"}),
+    ("constrained_gpc", {"limits__level_m": 0.1}, {"law": "leaves nothing of the level limit"}),
+    ("feedback_linearization", {"law__frequency_rad_s": -1},
+     {"law.frequency_rad_s": "must be positive"}),
+    ("feedback_linearization", {"law__soft_level_m": 4.0},
+     {"law.soft_level_m": "must be below hard_level_m"}),
+    ("feedback_linearization", {"law__shift_rad_m": 5.0, "law__shift_length_m": 1.0},
+     {"law.shift_rad_m": "loses its grip"}),
+    ("stimulate", {"law__period_s": -1}, {"law.period_s": "must be positive"}),
+    ("stimulate", {"law__roll_limit_rad": 0.05}, {"law.amplitude_rad": "below roll_limit_rad"}),
+    ("stimulate", {"law__period_s": 4.0}, {"law.amplitude_rad": "nearer to the natural period"}),
+    ("gpc", {"bit_rate": 300_000}, {"bit_rate": "must divide 1e9"}),
+    ("gpc", {"limits__pressure_pa": 60e3, "limits__level_m": 6.0},
+     {"limits.pressure_pa": "set it to 50000 or less", "limits.level_m": "set it to 4.88 or less"}),
+    ("gpc", {"limits__pressure": 60e3}, {"limits.pressure": "did you mean pressure_pa?"}),
+    ("gpc", {"law__predictor__ordr": 3}, {"law.predictor.ordr": "did you mean order?"}),
+    ("adaptive_gpc", {"retuning__order": 2000, "retuning__pulse_hold_s": [3.0, 0.6]},
+     {"retuning.order": "must be 500 at most", "retuning.pulse_hold_s": "must rise",
+      "retuning.identification_s": "must be 800"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("shipped", "changes", "expected"), WRONG, ids=lambda v: str(v)[:50])
+def test_wrong_value_is_told_with_file_key_and_reason_by_check_bench_and_run(
+    tmp_path: Path, shipped: str, changes: dict[str, object], expected: dict[str, str]
+) -> None:
+    path = controller(tmp_path, shipped, **changes)
+    errors = told(invoke("check", path))
+    reasons = {key: reason for file, key, reason in errors if file == path.name}
+    assert set(reasons) == set(expected)
+    for key, reason in expected.items():
+        assert reason in reasons[key]
+    assert told(invoke("run", path, "--bus", "nowhere0")) == errors
+    assert told(invoke("bench", scenario(tmp_path, path), "--out", tmp_path)) == errors
+
+
+def test_missing_vessel_does_not_hide_what_else_is_wrong(tmp_path: Path) -> None:
+    path = controller(tmp_path, "gpc", vessel="nowhere.yaml", bit_rate=1, law__control_horizon=-1)
+    keys = {key for _, key, _ in told(invoke("check", path))}
+    assert keys == {"vessel", "bit_rate", "law.control_horizon"}
+
+
+def test_key_written_twice_is_refused_with_both_lines(tmp_path: Path) -> None:
+    path = controller(tmp_path, "gpc")
+    lines = len(path.read_text().splitlines())
+    path.write_text(path.read_text() + "name: again\nname: and again\n")
+    first = 1 + [line.startswith("name:") for line in path.read_text().splitlines()].index(True)
+    reasons = {reason for _, key, reason in told(invoke("check", path)) if key == "name"}
+    assert reasons == {
+        f"is written twice, in lines {first} and {lines + 1}: remove one",
+        f"is written twice, in lines {lines + 1} and {lines + 2}: remove one",
+    }
+
+
+def test_every_wrong_number_of_a_ship_has_its_own_key(tmp_path: Path) -> None:
+    content = whole(CONFIGS / "ships" / "thesis_first.yaml")
+    content["ship"] = {"inertia_kg_m2": -1, "stiffness_nm_rad": 0, "damping_nms_rad": -3}
+    content["pump"]["lag_s"] = "slow"
+    path = tmp_path / "ship.yaml"
+    path.write_text(yaml.safe_dump(content))
+    keys = {key for _, key, _ in told(invoke("check", path))}
+    assert keys == {
+        "ship.inertia_kg_m2", "ship.stiffness_nm_rad", "ship.damping_nms_rad", "pump.lag_s",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "reason"),
+    [
+        ("ship", "stiffness_nm_rad", 1e7, "takes all of the ship's stability"),
+        ("tank", "density_kg_m3", 1e5, "more roll inertia in its water than"),
+        ("tank", "width_m", 1e200, "beyond all scale"),
+    ],
+)
+def test_ship_that_can_not_carry_her_tank_is_refused(
+    tmp_path: Path, section: str, key: str, value: float, reason: str
+) -> None:
+    content = whole(CONFIGS / "ships" / "thesis_first.yaml")
+    content[section][key] = value
+    path = tmp_path / "ship.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert any(at == "tank" and reason in why for _, at, why in told(invoke("check", path)))
+
+
+def test_ship_is_recognised_and_shown_in_numbers() -> None:
+    path = CONFIGS / "ships" / "thesis_first.yaml"
+    report = json.loads(invoke("check", path, "--json").stdout)
+    assert report["kind"] == "ship"
+    vessel = load_config(path, Vessel)
+    assert report["roll_frequency_rad_s"] == pytest.approx(0.5)
+    assert report["tank_frequency_rad_s"] == vessel.tank.natural_frequency_rad_s
+    assert report["mass_ratio"] == pytest.approx(0.0366, rel=1e-2)  # docs/control.md
+    # rho g At L^2 / 2, two reservoirs at half the width
+    free_surface = 1000 * 9.80665 * 17.11 * 17.1**2 / 2
+    assert report["stability_taken"] == pytest.approx(free_surface / 4.81875e8)
+    slow, fast = (mode["frequency_rad_s"] for mode in report["modes"])
+    assert slow < 0.5 < 0.588 < fast
+    text = invoke("check", path).stdout
+    for word in ("mass ratio", "12.57", "10.69", "4.88 m", "50.0 kPa"):
+        assert word in text
+
+
+def test_scenario_is_recognised_and_shown_with_the_margins_of_all_its_controllers(
+    tmp_path: Path,
+) -> None:
+    path = CONFIGS / "scenarios" / "storm.yaml"
+    result = invoke("check", path, "--json")
+    assert result.exit_code == 0
+    report = json.loads(result.stdout)
+    assert report["kind"] == "scenario"
+    assert set(report["controllers"]) == {"dpc", "gpc"}
+    for each in report["controllers"].values():
+        assert each["accepted"]
+        assert 1 < each["robustness"]["nominal"]["peak_sensitivity"] < 2
+    fragile = controller(
+        tmp_path, "gpc", law__output_weight=[1e16], law__predictor__pressure_noise_pa_rt_s=1e-3
+    )
+    refused = invoke("check", scenario(tmp_path, fragile), columns=100)
+    assert refused.exit_code == 1
+    assert "refused" in refused.stdout
+    assert "missed by one: " in refused.stdout
+
+
+def test_scenario_refuses_a_controller_of_another_ship(tmp_path: Path) -> None:
+    path = controller(tmp_path, "pd", vessel=str(CONFIGS / "ships" / "naval_vessel.yaml"))
+    (_, _, reason), *rest = told(invoke("check", scenario(tmp_path, path)))
+    assert "is for another ship, Naval vessel" in reason
+    assert not rest
+
+
+@pytest.mark.parametrize(
+    ("actual", "key", "reason"),
+    [
+        ({"mass_kg": 1.0}, "actual_ship.mass_kg", "a ship has inertia_kg_m2, stiffness_nm_rad"),
+        ({"inertia_kg_m2": -1.0}, "actual_ship.inertia_kg_m2", "must be positive"),
+        ({"stiffness_nm_rad": 1e7}, "actual_ship", "takes all of the ship's stability"),
+        ({"gz_m": 1.0}, "actual_ship", "object"),
+    ],
+)
+def test_ship_that_a_scenario_changes_is_checked_too(
+    tmp_path: Path, actual: dict[str, float], key: str, reason: str
+) -> None:
+    path = scenario(tmp_path, controller(tmp_path, "pd"))
+    path.write_text(path.read_text() + yaml.safe_dump({"actual_ship": actual}))
+    ((file, at, why),) = told(invoke("check", path))
+    assert (file, at) == (path.name, key)
+    assert reason in why
+
+
+@pytest.mark.parametrize("text", ["name: a\n", "name: a\nvessel: b\n", "law: 1\ntank: 2\n"])
+def test_file_of_no_kind_is_told_what_each_kind_has(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "what.yaml"
+    path.write_text(text)
+    ((_, _, reason),) = told(invoke("check", path))
+    for word in ("controller", "law", "scenario", "sea", "ship", "tank"):
+        assert word in reason
+
+
+def test_limitless_margins_say_how_far_they_were_searched() -> None:
+    path = CONFIGS / "controllers" / "gpc.yaml"
+    text = invoke("check", path).stdout
+    assert "over 5000 ms" in text
+    assert "inf" not in text
+    assert "pump gain factor" in text
+    report = json.loads(invoke("check", path, "--json").stdout)
+    assert report["robustness"]["nominal"]["delay_margin_s"] is None
+    assert report["delay_margin_searched_s"] == 5.0
+
+
+def test_limits_not_written_are_the_vessels(tmp_path: Path) -> None:
+    path = controller(tmp_path, "gpc", vessel=str(CONFIGS / "ships" / "patti_b.yaml"))
+    limits = load_config(path, ControllerConfig).limits
+    vessel = load_config(CONFIGS / "ships" / "patti_b.yaml", Vessel)
+    assert limits.pressure_pa == vessel.pump.max_pressure_pa == 20e3
+    assert limits.rate_pa_s == 40e3
+    assert 0 < limits.level_m < vessel.tank.level_limit_m
+    changed = controller(tmp_path, "gpc", limits={"level_m": 3.0})
+    limits = load_config(changed, ControllerConfig).limits
+    assert (limits.pressure_pa, limits.rate_pa_s, limits.level_m) == (50e3, 100e3, 3.0)
+
+
+def places(content: Any, key: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Keys of all values in a content."""
+    if key:
+        yield key
+    items: Any = ()
+    if isinstance(content, dict):
+        items = content.items()
+    elif isinstance(content, list):
+        items = enumerate(content)
+    for name, item in items:
+        yield from places(item, (*key, name))
+
+
+CONTENTS = {
+    str(path.relative_to(CONFIGS)): whole(path)
+    for path in sorted(CONFIGS.glob("*/*.yaml"))
+    if path.parent.name != "ships"
+}
+VALUES = st.one_of(
+    st.floats(),
+    st.integers(-(10**400), 10**400),
+    st.integers(-5, 300),
+    st.none(),
+    st.booleans(),
+    st.sampled_from(["", "roll_rad", "gpc", "1e12", [], {}, [1.0], [-1.0, 2.0], {"kind": "pd"}]),
+)
+
+
+@pytest.mark.slow
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data: Any) -> None:
+    name = data.draw(st.sampled_from(sorted(CONTENTS)))
+    content = copy.deepcopy(CONTENTS[name])
+    for _ in range(data.draw(st.integers(1, 2))):
+        *parents, last = data.draw(st.sampled_from(list(places(content))))
+        place = content
+        for parent in parents:
+            place = place[parent]
+        old = place[last]
+        if isinstance(old, float) and data.draw(st.booleans()):
+            place[last] = old * data.draw(st.sampled_from([-1, 0.1, 10, 1e6, 1e-6, 1e200]))
+        else:
+            place[last] = data.draw(VALUES)
+    path = tmp_path / "changed.yaml"
+    path.write_text(yaml.safe_dump(content))
+    try:
+        loaded = load_config(path, Scenario if "scenarios" in name else ControllerConfig)
+    except ConfigError:
+        return
+    controllers = [loaded]
+    if isinstance(loaded, Scenario):
+        build_ship_side(loaded, loaded.seed, loaded.operator)
+        controllers = [*loaded.controllers.values()]
+    for each in controllers:
+        work = retuner_work(each)
+        retuner = None if work is None else SimulatedRetuner(work[0], 5.0)
+        build_controller_node(each, retuner=retuner)

@@ -1,0 +1,115 @@
+"""A run's recording: named by its time, and never a reason not to control."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.commands import recording as module
+from utank_hil.commands.recording import RecordingSummary, RunRecording
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RecorderError, RecorderReport, read_recording
+
+SHM = Path("/dev/shm")
+
+
+def rings() -> set[str]:
+    return {path.name for path in SHM.glob("utank-*")}
+
+
+def rows(count: int) -> np.ndarray:
+    values = np.zeros((count, len(SIGNALS)))
+    values[:, SIGNALS.index("time_s")] = np.arange(count) / 100
+    return values
+
+
+def record(folder: Path, count: int) -> RecordingSummary:
+    before = rings()
+    recording = RunRecording(folder)
+    for row in rows(count):
+        recording.write(row)
+    recording.stop()
+    recording.stop()  # twice is as good as once
+    assert rings() <= before
+    return recording.summary
+
+
+class Instant:
+    """A recorder that leaves a file and takes no time."""
+
+    url = None
+
+    def __init__(self, ring: str, file: Path, live: bool = False) -> None:
+        file.write_text(ring)
+
+    def stop(self) -> RecorderReport:
+        return RecorderReport(rows=5, lost=2)
+
+
+def test_every_row_is_in_a_file_named_by_the_time(tmp_path: Path) -> None:
+    summary = record(tmp_path / "new" / "folder", 30)
+    assert summary.file is not None
+    assert re.fullmatch(r"run-\d{8}T\d{6}Z\.rrd", Path(summary.file).name)
+    assert (summary.rows, summary.lost, summary.error) == (30, 0, None)
+    assert len(read_recording(Path(summary.file))["live"]["time_s"]) == 30
+
+
+def test_no_recording_is_overwritten_however_soon_the_next_run_comes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "RecorderProcess", Instant)
+    files = {record(tmp_path, 1).file for _ in range(20)}
+    assert len(files) == 20
+    assert {str(path) for path in tmp_path.iterdir()} == files
+    assert len({path.read_text() for path in tmp_path.iterdir()}) == 20
+
+
+def test_lost_rows_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "RecorderProcess", Instant)
+    summary = record(tmp_path, 1)
+    assert (summary.rows, summary.lost, summary.error) == (5, 2, None)
+
+
+@pytest.mark.parametrize("place", ["file", "/proc/nowhere"])
+def test_folder_that_can_not_be_is_told_and_the_run_goes_on(tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    folder = tmp_path / place
+    summary = record(folder, 10)
+    assert summary.file is None
+    assert summary.rows is None
+    assert summary.error is not None
+    assert str(folder) in summary.error
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # a folder that is gone when the recorder comes to it, as a disk may be
+    folder = tmp_path / "gone"
+
+    def unplugged(ring: str, file: Path, live: bool = False) -> Instant:
+        shutil.rmtree(folder)
+        raise RecorderError(f"the recorder of {file} did not start: no such folder")
+
+    monkeypatch.setattr(module, "RecorderProcess", unplugged)
+    summary = record(folder, 10)
+    assert summary.file is None
+    assert summary.error is not None
+    assert "did not start" in summary.error
+
+
+def test_recorder_that_fails_on_the_way_is_told_with_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Failing(Instant):
+        def stop(self) -> RecorderReport:
+            raise RecorderError("the recorder failed: disk full")
+
+    monkeypatch.setattr(module, "RecorderProcess", Failing)
+    summary = record(tmp_path, 10)
+    assert summary.file is not None
+    assert summary.error == "the recorder failed: disk full"
+    assert summary.rows is None

@@ -1,0 +1,48 @@
+"""Tables on narrow terminals: nothing is cut."""
+
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+from rich.table import Table
+
+from utank_hil.commands.tables import print_table
+
+CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
+
+
+def printed(width: int) -> str:
+    table = Table(title="A storm", caption="60 s to 120 s")
+    table.add_column("", no_wrap=True)
+    for heading in ("roll RMS\n°", "significant\n°"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for name, cells in CELLS.items():
+        table.add_row(name, *cells)
+    output = io.StringIO()
+    print_table(Console(file=output, width=width), table)
+    return output.getvalue()
+
+
+@given(st.integers(24, 200))
+def test_every_figure_and_heading_is_there_at_any_width(width: int) -> None:
+    text = printed(width)
+    assert "…" not in text
+    for word in ("A storm", "60 s to 120 s", "roll RMS", "significant", *CELLS):
+        assert word in text
+    for cells in CELLS.values():
+        for cell in cells:
+            assert cell in text
+    assert max(len(line) for line in text.splitlines()) <= width
+
+
+@pytest.mark.parametrize(("width", "boxed"), [(80, True), (36, True), (35, False)])
+def test_it_is_a_table_where_there_is_room(width: int, boxed: bool) -> None:
+    assert ("┏" in printed(width)) is boxed
+
+
+def test_an_empty_cell_has_no_line_of_its_own_in_a_list() -> None:
+    text = printed(30)
+    assert text.count("significant") == 1
+    assert text.count("roll RMS") == 2

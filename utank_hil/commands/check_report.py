@@ -1,0 +1,248 @@
+"""What ``utank-hil check`` says of a controller, a scenario or a ship."""
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from utank_hil.analysis.margins import Margins
+from utank_hil.analysis.robustness import Robustness
+from utank_hil.analysis.tank_design import tank_figures
+from utank_hil.commands.tables import print_table
+from utank_hil.config import ControllerConfig, Vessel
+from utank_hil.config_laws import build_law
+from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
+
+DELAY_SAMPLES = 25
+"""Samples up to which the delay margin is searched for (`Margins.delay_margin_s`)."""
+
+NO_LOOP = "The law is nonlinear or passive: it has no margins of a linear loop."
+
+Judged = dict[str, tuple[ControllerConfig, Robustness | None]]
+
+
+def controller_json(config: ControllerConfig, report: Robustness | None) -> dict[str, Any]:
+    """A controller as one JSON object."""
+    return {
+        "name": config.name,
+        "vessel": config.vessel.name,
+        "configuration_version": config.vessel.version,
+        "law": config.law.kind,
+        "limits": _finite(asdict(config.limits)),
+        "robustness": None if report is None else _finite(asdict(report)),
+        "delay_margin_searched_s": None if report is None else _searched_s(config),
+        "failures": [] if report is None else list(report.failures()),
+        "accepted": _accepted(config, report),
+    }
+
+
+def scenario_json(name: str, vessel: Vessel, judged: Judged) -> dict[str, Any]:
+    """A scenario with its controllers as one JSON object."""
+    controllers = {name: controller_json(*each) for name, each in judged.items()}
+    return {
+        "name": name,
+        "vessel": vessel.name,
+        "configuration_version": vessel.version,
+        "controllers": controllers,
+        "accepted": all(each["accepted"] for each in controllers.values()),
+    }
+
+
+def ship_json(vessel: Vessel) -> dict[str, Any]:
+    """A ship as one JSON object."""
+    return {
+        "name": vessel.name,
+        "configuration_version": vessel.version,
+        **ship_figures(vessel),
+        "limits": vessel.default_limits,
+    }
+
+
+def ship_figures(vessel: Vessel) -> dict[str, Any]:
+    """What ship, tank and pump are to each other, by the linear model.
+
+    Returns
+    -------
+    dict
+        Frequencies in rad/s of the ship without water and of the water in a ship held still; the
+        two motions that they make together (`modes`, from slow to fast); ratios as in
+        `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
+        reservoir is full or empty; heel that the pump's greatest pressure holds.
+    """
+    ship, tank = vessel.ship, vessel.tank
+    figures = tank_figures(ship, tank)
+    _, _, stiffness = coupled_matrices(ship, tank)
+    free = np.linalg.eigvals(state_matrices(ship, tank)[0])
+    frequency = ship.natural_frequency_rad_s
+    push = [0.0, tank.reservoir_area_m2 * vessel.pump.max_pressure_pa]
+    heel_rad = np.linalg.solve(stiffness, push)[STATES.index("roll_rad")]
+    free_surface_nm_rad = stiffness[0, 1] ** 2 / stiffness[1, 1]
+    return {
+        "roll_frequency_rad_s": frequency,
+        "roll_damping_ratio": ship.damping_nms_rad / (2 * ship.inertia_kg_m2 * frequency),
+        "tank_frequency_rad_s": tank.natural_frequency_rad_s,
+        "tank_damping_ratio": tank.damping_ratio,
+        "modes": [
+            {"frequency_rad_s": abs(mode), "damping_ratio": -mode.real / abs(mode)}
+            for mode in sorted(free.astype(complex), key=abs)
+            if mode.imag >= 0
+        ],
+        "frequency_ratio": figures.frequency_ratio,
+        "mass_ratio": figures.mass_ratio,
+        "coupling_ratio": figures.coupling_ratio,
+        "stability_taken": float(free_surface_nm_rad / ship.stiffness_nm_rad),
+        "level_limit_m": tank.level_limit_m,
+        "pump_heel_rad": float(abs(heel_rad)),
+    }
+
+
+def print_controller(config: ControllerConfig, report: Robustness | None) -> None:
+    """Print a controller's margins."""
+    console = Console(highlight=False)
+    console.print(f"{config.name} for {config.vessel.name}: the configuration is valid.")
+    if report is None:
+        console.print(NO_LOOP)
+        return
+    margin = report.nominal
+    table = Table(title="Margins, delay and pump lag included")
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("required", justify="right")
+    table.add_row("peak sensitivity", f"{margin.peak_sensitivity:.2f}", "2 or less")
+    table.add_row("  at", f"{margin.peak_frequency_rad_s:.2f} rad/s", "")
+    table.add_row("pump gain factor", _gain(margin), "")
+    table.add_row("phase margin", _phase(margin), "")
+    table.add_row("delay margin", _delay(config, margin), "over 20 ms")
+    table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
+    table.add_row(
+        "largest eigenvalue, roll period 0.7 to 1.3, gain 0.8 to 1.2",
+        f"{report.worst_radius:.4f}",
+        "less than 1",
+    )
+    print_table(console, table)
+    for failure in report.failures():
+        console.print(f"[red]missed:[/red] {escape(failure)}")
+    if report.failures():
+        verdict = "accepted by the configuration" if config.accept_low_margins else "refused"
+        console.print(f"This law is {verdict}.")
+    else:
+        console.print("[green]All requirements are met.[/green]")
+
+
+def print_scenario(name: str, vessel: Vessel, judged: Judged) -> None:
+    """Print the margins of all controllers of a scenario."""
+    console = Console(highlight=False)
+    console.print(f"{name}, {vessel.name}: the scenario is valid.")
+    table = Table(title="Margins, delay and pump lag included")
+    table.add_column("", no_wrap=True)
+    for heading in (
+        "peak\nsensitivity",
+        "pump gain\nfactor",
+        "phase\nmargin",
+        "delay\nmargin",
+        "largest\neigenvalue",
+    ):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    for each, (config, report) in judged.items():
+        if report is None:
+            table.add_row(escape(each), *5 * ("",), "no loop")
+            continue
+        margin = report.nominal
+        verdict = "[green]ok[/green]" if not report.failures() else "[red]refused[/red]"
+        table.add_row(
+            escape(each),
+            f"{margin.peak_sensitivity:.2f}",
+            _gain(margin),
+            _phase(margin),
+            _delay(config, margin),
+            f"{report.worst_radius:.4f}",
+            "[yellow]accepted[/yellow]" if report.failures() and config.accept_low_margins
+            else verdict,
+        )  # fmt: skip
+    print_table(console, table)
+    for each, (_, report) in judged.items():
+        for failure in () if report is None else report.failures():
+            console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}")
+
+
+def print_ship(vessel: Vessel) -> None:
+    """Print what ship, tank and pump are to each other."""
+    figures = ship_figures(vessel)
+    table = Table(title=f"{escape(vessel.name)}, linear model")
+    table.add_column("")
+    table.add_column("frequency\nrad/s", justify="right", no_wrap=True)
+    table.add_column("period\ns", justify="right", no_wrap=True)
+    table.add_column("damping\nratio", justify="right", no_wrap=True)
+    motions = [
+        ("roll of the ship without water", figures["roll_frequency_rad_s"], "roll_damping_ratio"),
+        ("water in the ship held still", figures["tank_frequency_rad_s"], "tank_damping_ratio"),
+    ]
+    for text, frequency, damping in motions:
+        table.add_row(text, *_motion(frequency, figures[damping]))
+    for mode in figures["modes"]:
+        motion = _motion(mode["frequency_rad_s"], mode["damping_ratio"])
+        table.add_row("ship and water moving together", *motion)
+    console = Console(highlight=False)
+    console.print(f"{vessel.name}: the ship is valid.")
+    print_table(console, table)
+    rest = Table(show_header=False)
+    rest.add_column()
+    rest.add_column(justify="right", no_wrap=True)
+    for text, value in (
+        ("water's frequency per roll frequency", f"{figures['frequency_ratio']:.3f}"),
+        ("mass ratio", f"{figures['mass_ratio']:.4f}"),
+        ("coupling ratio", f"{figures['coupling_ratio']:.3f}"),
+        ("stability taken by the free surface", f"{figures['stability_taken']:.1%}"),
+        ("level at which a reservoir is full or empty", f"{figures['level_limit_m']:.2f} m"),
+        ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
+        ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
+    ):
+        rest.add_row(text, value)
+    print_table(console, rest)
+
+
+def _motion(frequency_rad_s: float, damping_ratio: float) -> tuple[str, str, str]:
+    period_s = 2 * math.pi / frequency_rad_s
+    return f"{frequency_rad_s:.3f}", f"{period_s:.2f}", f"{damping_ratio:.3f}"
+
+
+def _gain(margin: Margins) -> str:
+    high = f"{margin.gain_high:.2f}" if math.isfinite(margin.gain_high) else "any"
+    return f"{margin.gain_low:.2f} to {high}"
+
+
+def _phase(margin: Margins) -> str:
+    if not math.isfinite(margin.phase_margin_rad):
+        return "any"
+    return f"{math.degrees(margin.phase_margin_rad):.0f}°"
+
+
+def _delay(config: ControllerConfig, margin: Margins) -> str:
+    if not math.isfinite(margin.delay_margin_s):
+        return f"over {1e3 * _searched_s(config):.0f} ms"
+    return f"{1e3 * margin.delay_margin_s:.0f} ms"
+
+
+def _searched_s(config: ControllerConfig) -> float:
+    """Extra delay up to which the loop was found stable, when no margin was found."""
+    linear = build_law(config.law, config.vessel, config.delay_s, config.limits).linear
+    return 0.0 if linear is None else DELAY_SAMPLES * linear.sample_time_s
+
+
+def _accepted(config: ControllerConfig, report: Robustness | None) -> bool:
+    return config.accept_low_margins or report is None or not report.failures()
+
+
+def _finite(values: dict[str, Any]) -> dict[str, Any]:
+    """JSON has no infinity: an unlimited value is null."""
+    return {
+        name: _finite(value)
+        if isinstance(value, dict)
+        else (value if math.isfinite(value) else None)
+        for name, value in values.items()
+    }

@@ -1,0 +1,105 @@
+"""The recording of a run: if it fails, the controller runs all the same, and the user is told."""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+from utank_hil.arrays import FloatArray
+from utank_hil.commands.common import why_not_writable
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter
+
+RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
+
+
+@dataclass(slots=True)
+class RecordingSummary:
+    """What became of a recording.
+
+    Attributes
+    ----------
+    file : str or None
+        None if there is none.
+    rows, lost : int or None
+        Rows recorded, and rows that the recorder was too slow for; None if it failed.
+    error : str or None
+        Why it did not start, or ended before the run.
+    """
+
+    file: str | None = None
+    rows: int | None = None
+    lost: int | None = None
+    error: str | None = None
+
+
+class RunRecording:
+    """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there. The file is named by the time, so that none is overwritten: the
+        recording of a run that crashed is what tells why.
+    live : bool
+        Serve viewers too.
+
+    Attributes
+    ----------
+    summary : RecordingSummary
+        Complete after `stop`.
+    """
+
+    def __init__(self, folder: Path, live: bool = False) -> None:
+        self.summary = RecordingSummary()
+        self._ring: RingWriter | None = None
+        self._recorder: RecorderProcess | None = None
+        reason = why_not_writable(folder)
+        if reason is not None:
+            self.summary.error = reason
+            return
+        file = _new_file(folder)
+        try:
+            self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
+            self._recorder = RecorderProcess(self._ring.name, file, live=live)
+        except (OSError, RecorderError) as error:
+            self.summary.error = str(error)
+            self.stop()
+        if file.exists():
+            self.summary.file = str(file)
+
+    @property
+    def url(self) -> str | None:
+        """Where viewers find the live stream, if there is one."""
+        return None if self._recorder is None else self._recorder.url
+
+    def write(self, row: FloatArray) -> None:
+        """Take one row of telemetry; never waits, and does nothing without a recorder."""
+        if self._ring is not None:
+            self._ring.write(row)
+
+    def stop(self) -> None:
+        """Have the last rows written and the summary completed; idempotent."""
+        ring, self._ring = self._ring, None
+        if ring is not None:
+            ring.close()  # first: what ends the recorder is the end of the ring
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            try:
+                report = recorder.stop()
+            except RecorderError as error:
+                self.summary.error = str(error)
+            else:
+                self.summary.rows, self.summary.lost = report.rows, report.lost
+
+
+def _new_file(folder: Path) -> Path:
+    """Path of a file named by the time, and numbered where that is taken."""
+    stem = f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    path = folder / f"{stem}.rrd"
+    for number in count(2):
+        if not path.exists():
+            break
+        path = folder / f"{stem}-{number}.rrd"
+    return path

@@ -1,0 +1,33 @@
+"""Tables on terminals of any width."""
+
+from typing import Final
+
+from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
+
+UNLIMITED: Final = 10_000
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Print a table, or the same as a list where the terminal is too narrow for it.
+
+    Nothing is cut: each row becomes its name with one line a figure.
+    """
+    unlimited = console.options.update(max_width=UNLIMITED)  # else the answer is what there is
+    if Measurement.get(console, unlimited, table).maximum <= console.width:
+        console.print(table)
+        return
+    if table.title:
+        console.print(table.title, style="italic")
+    headings = [" ".join(str(column.header).split()) for column in table.columns]
+    wide = max(len(heading) for heading in headings)
+    for cells in zip(*(column.cells for column in table.columns), strict=True):
+        name, *figures = cells
+        console.print(name, style="bold")
+        for heading, figure in zip(headings[1:], figures, strict=True):
+            if figure != "":
+                console.print(f"  {heading:{wide}}  {figure}")
+    if table.caption:
+        console.print(table.caption, style="dim")
+    console.print()

@@ -1,0 +1,59 @@
+"""Which keys a place in a configuration file may have, for the misspelt ones."""
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel
+
+
+def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
+    """Advice for a key that is not known; empty if none resembles it.
+
+    Parameters
+    ----------
+    model : type of pydantic.BaseModel
+        What the configuration as a whole must hold.
+    location : tuple
+        The key as a validation error gives it, with the kinds of sections chosen by kind.
+    """
+    *parents, written = location
+    places: list[Any] = [model]
+    for part in parents:
+        places = [inner for place in places for inner in _inside(place, part)]
+    known = {name for place in places for name in _members(place)}
+    near = get_close_matches(str(written), known, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _members(place: Any) -> dict[str, Any]:
+    """Annotations of a section's keys, without the marks on them."""
+    if isinstance(place, type) and issubclass(place, BaseModel):
+        return {name: field.annotation for name, field in place.model_fields.items()}
+    if isinstance(place, type) and is_dataclass(place):
+        hints = get_type_hints(place)
+        return {field.name: hints[field.name] for field in fields(place) if field.init}
+    return {}
+
+
+def _inside(place: Any, part: str | int) -> Iterator[Any]:
+    """What stands at a key or index, or is the kind of that name."""
+    origin, arguments = get_origin(place), get_args(place)
+    if origin is Annotated:
+        yield from _inside(arguments[0], part)
+    elif origin in (Union, UnionType):
+        chosen = [kind for kind in arguments if part in get_args(_members(kind).get("kind"))]
+        if chosen:
+            yield from chosen
+        else:
+            for kind in arguments:
+                if kind is not NoneType:
+                    yield from _inside(kind, part)
+    elif origin is dict:
+        yield arguments[1]
+    elif origin in (tuple, list):
+        yield arguments[0]
+    elif origin is not Literal and part in _members(place):
+        yield _members(place)[str(part)]

@@ -1,0 +1,86 @@
+"""YAML as configuration files are written in it: what plain YAML passes over is a problem here."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import yaml
+
+Key = tuple[str | int, ...]
+Finding = tuple[Key, str]
+"""Key within the text, and what is wrong there."""
+
+_STRING = "tag:yaml.org,2002:str"
+_MERGE = "tag:yaml.org,2002:merge"
+
+
+class YamlError(ValueError):
+    """Text that holds nothing to go on with."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Tells the place of a value that looks like a date or number but is none."""
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except ValueError as error:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"{error}; put text in quotes", node.start_mark
+            ) from error
+
+
+def parse_yaml(text: str) -> tuple[Any, list[Finding]]:
+    """Content of a text, and the keys in it that are written twice or are no names.
+
+    Raises
+    ------
+    YamlError
+        If the text is not valid YAML, or nested so that it has no end.
+    """
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None, []
+        findings = list(_findings(node, (), ()))
+        return loader.construct_document(node), findings
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = "" if mark is None else f" in line {mark.line + 1}, column {mark.column + 1}"
+        raise YamlError(f"is not valid YAML{place}: {error.problem}") from error
+    except yaml.YAMLError as error:
+        raise YamlError(f"is not valid YAML: {error}") from error
+    except RecursionError:
+        raise YamlError("is not valid YAML: it is nested too deeply") from None
+
+
+def _findings(node: yaml.Node, key: Key, above: tuple[yaml.Node, ...]) -> Iterator[Finding]:
+    if node in above:
+        raise yaml.composer.ComposerError(
+            None, None, "an alias (*) names what it stands in", node.start_mark
+        )
+    above = (*above, node)
+    if isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            yield from _findings(item, (*key, index), above)
+    if not isinstance(node, yaml.MappingNode):
+        return
+    lines: dict[str, int] = {}
+    for name, value in node.value:
+        line = name.start_mark.line + 1
+        if not isinstance(name, yaml.ScalarNode):
+            continue  # can be no key, and is refused when it is made
+        if name.tag not in (_STRING, _MERGE):
+            kind = name.tag.rpartition(":")[2]
+            yield (
+                (*key, name.value),
+                f"is read as a {kind} and not as a name (line {line}): put it in quotes",
+            )
+            continue
+        if name.value in lines:
+            yield (
+                (*key, name.value),
+                f"is written twice, in lines {lines[name.value]} and {line}: remove one",
+            )
+        lines[name.value] = line
+        yield from _findings(value, (*key, name.value), above)

@@ -1,0 +1,150 @@
+"""Ranges of parameters: said once at the field, held in code and in configuration files alike.
+
+A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands what else must hold to
+`refuse`. A configuration file checks each field by its annotation as it reads it, so that every
+wrong number is found at once and at its own key; everything made in code is checked by
+`range_problems`.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Problem = tuple[str, str]
+"""Dotted name of a parameter, empty for all of them together, and what is wrong with it."""
+
+
+class ParameterError(ValueError):
+    """Parameters that can't be used.
+
+    Parameters
+    ----------
+    owner : str
+        Whose they are, in a word.
+    problems : list of tuple of (str, str)
+        Name of each parameter and what is wrong with it.
+    """
+
+    def __init__(self, owner: str, problems: list[Problem]) -> None:
+        super().__init__("; ".join(" ".join(filter(None, (owner, *each))) for each in problems))
+        self.owner = owner
+        self.problems = problems
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.owner, self.problems)
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Annotation of a number: where it must lie.
+
+    Parameters
+    ----------
+    least, most : float
+        Bounds, themselves allowed.
+    above : float, optional
+        Bound that is not itself allowed, instead of `least`.
+    infinite : bool
+        Whether infinity is a value, for limits that need not be there.
+    """
+
+    least: float = -math.inf
+    most: float = math.inf
+    above: float | None = None
+    infinite: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies in the range; what is not a number never does."""
+        try:
+            value = float(value)
+        except OverflowError:  # a whole number of hundreds of digits
+            return False
+        if not (self.infinite or math.isfinite(value)):
+            return False
+        low = value >= self.least if self.above is None else value > self.above
+        return low and value <= self.most
+
+    @property
+    def demand(self) -> str:
+        """What a value must be, in words."""
+        if self.most < math.inf:
+            if self.above is not None:
+                return f"must be above {self.above:g} and at most {self.most:g}"
+            return f"must be {self.least:g} to {self.most:g}"
+        if self.above == 0:
+            low = "positive"
+        elif self.above is not None:
+            low = f"above {self.above:g}"
+        elif self.least == 0:
+            low = "zero or more"
+        elif self.least > -math.inf:
+            low = f"{self.least:g} or more"
+        else:
+            return "must be finite"
+        return f"must be {low}" if self.infinite else f"must be {low} and finite"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Let configuration files check the field as they read it."""
+        from pydantic_core import core_schema  # here: nothing but files needs it
+
+        def held(value: float) -> float:
+            if not self.holds(value):
+                raise ValueError(self.demand)
+            return value
+
+        return core_schema.no_info_after_validator_function(held, handler(source))
+
+
+Finite = Annotated[float, Range()]
+Positive = Annotated[float, Range(above=0)]
+NotNegative = Annotated[float, Range(least=0)]
+Share = Annotated[float, Range(least=0, most=1)]
+SampleTime = Annotated[float, Range(least=1e-3, most=10)]
+"""From a fast drive's to a large ship's; beyond, no ship rolls so fast or so slowly."""
+
+
+def range_problems(instance: "DataclassInstance") -> list[Problem]:
+    """Every parameter of a dataclass that lies outside the `Range` of its annotation."""
+    problems = []
+    for name, hint in _annotations(type(instance)).items():
+        value = getattr(instance, name)
+        demand = _missed(hint, value)
+        if demand is not None:
+            problems.append((name, f"{demand}, got {value}"))
+    return problems
+
+
+def refuse(owner: str, problems: list[Problem]) -> None:
+    """Raise a `ParameterError` if there is any problem."""
+    if problems:
+        raise ParameterError(owner, problems)
+
+
+@lru_cache(maxsize=256)
+def _annotations(owner: type) -> dict[str, Any]:
+    """Of a dataclass's parameters; what it computes itself is left out."""
+    hints = get_type_hints(owner, include_extras=True)
+    return {field.name: hints[field.name] for field in fields(owner) if field.init}
+
+
+def _missed(hint: Any, value: Any) -> str | None:
+    """Demand of the first `Range` in an annotation that a value does not meet."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    parts: list[tuple[Any, Any]] = []
+    if origin is Annotated:
+        for mark in arguments[1:]:
+            if isinstance(mark, Range) and not mark.holds(value):
+                return mark.demand
+        parts = [(arguments[0], value)]
+    elif origin is tuple and arguments[1:] == (...,):
+        parts = [(arguments[0], item) for item in value]
+    elif origin is tuple:
+        parts = list(zip(arguments, value, strict=False))
+    elif origin is UnionType and value is not None:
+        parts = [(inner, value) for inner in arguments if inner is not NoneType]
+    return next((demand for demand in (_missed(*part) for part in parts) if demand), None)
