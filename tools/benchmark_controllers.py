@@ -1,180 +1,252 @@
-"""What one step of each controller costs, beside the interpreter's floor and a hand-built OSQP.
+"""What one step of each controller costs, beside the interpreter's floor.
 
-Every controller of ``configs/controllers`` is stepped with the motion of the passive ship in the
-storm. The floor is the passive controller, which does nothing. The programmes of the constrained
-controller are solved again by OSQP, set up by hand with the same matrices and warm-started, if that
-is installed (it is no dependency of this project: ``pip install osqp`` in an environment of yours).
+    python tools/benchmark_controllers.py --steps 5000      # --json
 
-Example: .venv/bin/python tools/benchmark_controllers.py --steps 2000
+Every controller runs in a closed loop on the linear ship in a storm (JONSWAP, 4.7 m, 10 s), with
+sensor noise, limiter and drive, as in the campaigns; only its own step is timed. The floor is the
+passive controller, which does nothing. Memory: the most bytes that a step holds at once beyond
+what was there before, and the bytes that it leaves behind (both mean of 200 steps). How the solver
+of the constrained law compares with others says tools/peers.
 """
 
 import argparse
 import gc
-import importlib.util
 import json
+import math
 import sys
 import time
 import tracemalloc
-from pathlib import Path
-from typing import Any
-from unittest.mock import patch
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from trial_setup import shipped
 
-from utank_hil.analysis.loop_simulation import passive_motion
+from utank_hil.analysis.loop_simulation import TICK_S, passive_motion, simulate_loop
 from utank_hil.arrays import FloatArray
 from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
 from utank_hil.config_laws import build_law
-from utank_hil.control import Controller, PassiveController, plan_programme
-from utank_hil.control.qp import ActiveSetSolver
+from utank_hil.control import (
+    ClippedValve,
+    Controller,
+    ErrorDynamics,
+    IndirectFuzzy,
+    OnOffValve,
+    PassiveController,
+    PumpLimits,
+    SmallGainFuzzy,
+    ValveRange,
+    design_lqr,
+    level_brake,
+    pump_model,
+)
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
-CONTROLLERS = Path(__file__).resolve().parents[1] / "configs" / "controllers"
 WARM_UP = 200
+TRACED = 200
+FLOOR = "passive (floor)"
+# of configs/controllers, the linear laws first
+SHIPPED = (
+    "pd",
+    "lqg",
+    "dpc",
+    "gpc",
+    "constrained_gpc",
+    "stimulate",
+    "feedback_linearization",
+    "fuzzy_robust",
+)
 
-# gradient, lower and upper bounds of every programme that was solved
-Programmes = list[tuple[FloatArray, FloatArray, FloatArray]]
+
+@dataclass(frozen=True)
+class Candidate:
+    """A controller to be timed.
+
+    Attributes
+    ----------
+    controller : Controller
+    measured : tuple of str
+    limits : PumpLimits
+    pumps : bool
+        Whether its answer is a pressure; a valve's is not.
+    """
+
+    controller: Controller
+    measured: tuple[str, ...]
+    limits: PumpLimits
+    pumps: bool = True
 
 
-class Recording(ActiveSetSolver):
-    """Solves as its parent does, and keeps what it was asked and how long it took."""
+class Timed:
+    """A controller whose steps are timed, and what it saw.
 
-    hessian: FloatArray
-    rows: FloatArray
-    programmes: Programmes
-    took_us: list[float]
+    Parameters
+    ----------
+    candidate : Candidate
+    """
 
-    def __init__(self, hessian: FloatArray, rows: FloatArray, iteration_limit: int) -> None:
-        super().__init__(hessian, rows, iteration_limit)
-        Recording.hessian, Recording.rows = hessian.copy(), rows.copy()
-        Recording.programmes, Recording.took_us = [], []
+    def __init__(self, candidate: Candidate) -> None:
+        self.sample_time_s = candidate.controller.sample_time_s
+        self.took_ns: list[int] = []
+        self.seen: list[FloatArray] = []
+        self._controller, self._pumps = candidate.controller, candidate.pumps
 
-    def solve(
-        self, gradient: FloatArray, lower: FloatArray, upper: FloatArray
-    ) -> FloatArray | None:
-        """Solve and note."""
-        Recording.programmes.append((gradient.copy(), lower.copy(), upper.copy()))
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Step, and note how long it took."""
+        step = self._controller.step
         begin = time.perf_counter_ns()
-        solution = super().solve(gradient, lower, upper)
-        Recording.took_us.append((time.perf_counter_ns() - begin) / 1e3)
-        return solution
+        u = step(y, reference)
+        self.took_ns.append(time.perf_counter_ns() - begin)
+        self.seen.append(y)
+        return u if self._pumps else np.zeros(1)
+
+    def applied(self, u: FloatArray) -> None:
+        """Pass on."""
+        self._controller.applied(u)
+
+    def reset(self) -> None:
+        """Pass on."""
+        self._controller.reset()
 
 
-def percentiles(costs_us: list[float]) -> dict[str, float]:
-    """Median, 99th percentile and maximum."""
-    ordered = np.sort(costs_us)
+def candidates() -> dict[str, Callable[[], Candidate]]:
+    """Everything that is timed, by name, the floor first."""
+    config = shipped("gpc")
+    ship, tank, limits = config.vessel.ship, config.vessel.tank, config.limits
+    model = RollModel(ship, tank)
+    coefficients = model.coefficients
+    lqr = design_lqr(sample(pump_model(ship, tank, STATES), 0.2, 0.0, 0.0), 1e11)
+    error, ranges = ErrorDynamics(1.5, 0.7, 2.5), (0.524, 0.524, 4.0, 4.0)
+    gain = (
+        -coefficients.coupling
+        * coefficients.area
+        / (coefficients.inertia * coefficients.level_inertia - coefficients.coupling**2)
+    )
+    small_gain = SmallGainFuzzy(error, ranges, gain, 0.9, 1.0, adaptation=0.1, leakage=20.0)
+    indirect = IndirectFuzzy(
+        error,
+        ranges,
+        gain,
+        adaptation_f=0.02,
+        adaptation_g=0.02,
+        leakage=0.02,
+        brake_pa_s_m=level_brake(model, 0.5),
+    )
+    valve = ValveRange(0.0, 3e5)
+
+    def pump(build: Callable[[], Controller]) -> Callable[[], Candidate]:
+        return lambda: Candidate(build(), STATES, limits)
+
+    def throttle(build: Callable[[], Controller]) -> Callable[[], Candidate]:
+        return lambda: Candidate(build(), STATES, limits, pumps=False)
+
     return {
-        "p50_us": float(np.percentile(ordered, 50)),
-        "p99_us": float(np.percentile(ordered, 99)),
-        "max_us": float(ordered[-1]),
+        FLOOR: pump(PassiveController),
+        "lqr": pump(lqr.controller),
+        **{name: _of_file(shipped(name)) for name in SHIPPED},
+        "fuzzy_small_gain": pump(small_gain.controller),
+        "fuzzy_indirect": pump(indirect.controller),
+        "on-off valve": throttle(lambda: OnOffValve(valve)),
+        "clipped valve": throttle(lambda: ClippedValve(valve, lqr.controller())),
     }
 
 
-def step_costs(controller: Controller, measured: FloatArray) -> dict[str, float]:
-    """Cost of each step, and the bytes that a step leaves behind."""
-    for y in measured[:WARM_UP]:
-        controller.step(y)
+def _of_file(config: ControllerConfig) -> Callable[[], Candidate]:
+    def build() -> Candidate:
+        built = build_law(config.law, config.vessel, config.delay_s, config.limits)
+        return Candidate(built.controller, built.measured, config.limits)
+
+    return build
+
+
+def costs(candidate: Candidate, waves: FloatArray) -> dict[str, float]:
+    """Cost of each step in a closed loop, and its memory."""
+    vessel = shipped("gpc").vessel
+    timed = Timed(candidate)
     gc.collect()
     gc.disable()
-    costs = []
-    for y in measured[WARM_UP:]:
-        begin = time.perf_counter_ns()
-        controller.step(y)
-        costs.append((time.perf_counter_ns() - begin) / 1e3)
-    tracemalloc.start()
-    before = tracemalloc.get_traced_memory()[0]
-    for y in measured[WARM_UP : 2 * WARM_UP]:
-        controller.step(y)
-    kept = (tracemalloc.get_traced_memory()[0] - before) / WARM_UP
-    tracemalloc.stop()
+    simulate_loop(vessel.ship, vessel.tank, waves, timed, candidate.measured, candidate.limits)
     gc.enable()
-    return {**percentiles(costs), "kept_bytes_per_step": kept}
+    took_us = np.array(timed.took_ns[WARM_UP:]) / 1e3
+    return {
+        "p50_us": float(np.percentile(took_us, 50)),
+        "p99_us": float(np.percentile(took_us, 99)),
+        "max_us": float(took_us.max()),
+        **memory(candidate.controller, timed.seen[-TRACED:]),
+    }
 
 
-def osqp_costs() -> dict[str, float] | None:
-    """Costs of the recorded programmes in OSQP; None if it is not installed."""
-    if importlib.util.find_spec("osqp") is None:
-        return None
-    osqp: Any = importlib.import_module("osqp")
-    sparse: Any = importlib.import_module("scipy.sparse")
-    n = len(Recording.hessian)
-    gradient, lower, upper = Recording.programmes[0]
-    solver = osqp.OSQP()
-    solver.setup(
-        sparse.csc_matrix(np.triu(Recording.hessian)),
-        gradient,
-        sparse.csc_matrix(np.vstack([np.eye(n), Recording.rows])),
-        lower,
-        upper,
-        verbose=False,
-        eps_abs=1e-4,
-        eps_rel=1e-4,
-    )
-    costs = []
-    for gradient, lower, upper in Recording.programmes[1:]:
-        begin = time.perf_counter_ns()
-        solver.update(q=gradient, l=lower, u=upper)
-        solver.solve()
-        costs.append((time.perf_counter_ns() - begin) / 1e3)
-    return percentiles(costs)
+def memory(controller: Controller, seen: list[FloatArray]) -> dict[str, float]:
+    """Bytes that a step holds at most, and those that it leaves behind."""
+    peaks = []
+    tracemalloc.start()
+    begin = tracemalloc.get_traced_memory()[0]
+    for y in seen:
+        before = tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        controller.step(y)
+        peaks.append(tracemalloc.get_traced_memory()[1] - before)
+    left = tracemalloc.get_traced_memory()[0] - begin - sys.getsizeof(peaks)
+    tracemalloc.stop()
+    return {
+        "held_bytes": float(np.mean(peaks)),
+        "kept_bytes": max(left, 0) / len(seen),
+    }
 
 
 def measure(steps: int) -> dict[str, dict[str, float]]:
     """Costs by controller, the floor first."""
-    results: dict[str, dict[str, float]] = {}
-    moments: dict[str, FloatArray] = {}
-    for path in sorted(CONTROLLERS.glob("*.yaml")):
-        config = load_config(path, ControllerConfig)
-        with patch.object(plan_programme, "ActiveSetSolver", Recording):
-            built = build_law(config.law, config.vessel, config.delay_s, config.limits)
-        ship, tank = config.vessel.ship, config.vessel.tank
-        step_s = built.controller.sample_time_s
-        key = f"{config.vessel.name} {step_s}"
-        if key not in moments:
-            sea = Sea.irregular(jonswap(4.7, 10.0), seed=1, components=128)
-            moment = sea.roll_moment(ship.stiffness_nm_rad, EffectiveSlope(0.5))
-            moments[key] = passive_motion(ship, tank, moment, step_s, steps + WARM_UP)
-        motion = moments[key]
-        if not results:
-            results["floor"] = step_costs(PassiveController(), motion[:, :1])
-        rows = [STATES.index(name) for name in built.measured]
-        results[path.stem] = step_costs(built.controller, np.ascontiguousarray(motion[:, rows]))
-    results["constrained: DAQP"] = percentiles(Recording.took_us[1:])
-    by_osqp = osqp_costs()
-    if by_osqp is not None:
-        results["constrained: OSQP"] = by_osqp
+    vessel = shipped("gpc").vessel
+    sea = Sea.irregular(jonswap(4.7, 10.0), seed=1)
+    moment = sea.roll_moment(vessel.ship.stiffness_nm_rad, EffectiveSlope(0.5))
+    results = {}
+    for name, build in candidates().items():
+        candidate = build()
+        ticks = (steps + WARM_UP) * math.ceil(candidate.controller.sample_time_s / TICK_S - 1e-9)
+        waves = passive_motion(vessel.ship, vessel.tank, moment, TICK_S, ticks)
+        results[name] = costs(candidate, waves)
     return results
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--steps", type=int, default=2000)
-    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--steps", type=int, default=5000, help="of each controller (%(default)s)")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     arguments = parser.parse_args()
+    if arguments.steps < 100:
+        parser.error("--steps must be 100 or more: fewer have no 99th percentile")
     results = measure(arguments.steps)
     if arguments.json:
         sys.stdout.write(json.dumps(results) + "\n")
         return
-    table = Table(title="One step of each controller, µs")
-    for heading in ("", "p50", "p99", "max", "p50\nover floor", "bytes kept\na step"):
+    table = Table(title=f"One step of each controller, {arguments.steps} steps")
+    for heading in (
+        "",
+        "p50\nµs",
+        "p99\nµs",
+        "max\nµs",
+        "p50 over\nfloor µs",
+        "bytes\nheld",
+        "bytes\nkept",
+    ):
         table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
-    floor = results["floor"]["p50_us"]
+    floor = results[FLOOR]["p50_us"]
     for name, cost in results.items():
-        kept = cost.get("kept_bytes_per_step")
         table.add_row(
             name,
             *(f"{cost[key]:.1f}" for key in ("p50_us", "p99_us", "max_us")),
             f"{cost['p50_us'] - floor:.1f}",
-            "" if kept is None else f"{kept:.0f}",
+            *(f"{cost[key]:.0f}" for key in ("held_bytes", "kept_bytes")),
         )
-    Console().print(table)
+    Console(width=100).print(table)
 
 
 if __name__ == "__main__":

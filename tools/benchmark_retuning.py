@@ -1,4 +1,4 @@
-"""What retuning costs the real-time loop: overruns with and without it, in turns.
+"""What retuning costs the real-time loop: overruns with and without it, in turns, and each step.
 
     python tools/benchmark_retuning.py [--turns 8] [--json]
 
@@ -7,21 +7,32 @@ up to the end of the pulses and goes on with the very same nodes in real time: t
 real process, which identifies and designs while the loop runs; the answer comes back, the new law's
 memory is filled, and it takes over. Every second turn orders nothing and is the measure for
 what the machine itself does to the loop.
+
+The costs of the controller's single steps are measured after that, in a plain loop on a linear
+ship, with the retuner's process at work beside it.
 """
 
 import argparse
 import json
+import math
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import binomtest, chi2
 
 from firmware_sim.assembly import build_ship_side
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.retune import retuner_work
-from utank_hil.canbus import RetuningState
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Mode, OperatorCommand, RetuningState
+from utank_hil.config import ControllerConfig
 from utank_hil.config_files import load_config
+from utank_hil.control import PredictiveDesign, wave_arx
+from utank_hil.dynamics import coupled_model
+from utank_hil.dynamics.sampling import sample
 from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
@@ -32,13 +43,16 @@ from utank_hil.runtime import (
 )
 from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.retuning import RetunerProcess
+from utank_hil.runtime.retuning import AdaptiveController, RetunerProcess, make_pulses
 from utank_hil.runtime.signals import SIGNALS
 
 SCENARIO = Path(__file__).resolve().parents[1] / "configs" / "scenarios" / "adaptive.yaml"
 CONTROLLER = "gpc-roll"
 ORDERED_S, REAL_TIME_S = 15.0, 20.0
 SECOND_NS = 1_000_000_000
+PERIOD_S = 7.5  # of the ship that the costs are measured with
+WAVE_NM, WAVE_RAD_S = 2e7, 0.6
+BEGUN, REPEATS = 200, 5
 
 
 class ShiftedClock:
@@ -95,6 +109,101 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
     return swapped, float(steepest.max())
 
 
+def costs(config: ControllerConfig, repeats: int) -> dict[str, float]:
+    """Median times in us of the adaptive controller's steps, and of the retuner's whole work."""
+    times: dict[str, list[float]] = {}
+    for _ in range(repeats):
+        retune_once(config, times)
+    return {name: 1e6 * float(np.median(values)) for name, values in times.items()}
+
+
+def retune_once(config: ControllerConfig, times: dict[str, list[float]]) -> None:
+    """Retune on order, and add the time of each step under its name."""
+    design, settings, vessel = config.law, config.retuning, config.vessel
+    work = retuner_work(config)
+    assert isinstance(design, PredictiveDesign)
+    assert settings is not None
+    assert work is not None
+    path = (config.delay_s, vessel.pump.lag_s)
+    period_s = design.predictor.sample_time_s
+    with RetunerProcess(*work) as retuner:
+        controller = AdaptiveController(
+            design.law(vessel.ship, vessel.tank, *path),
+            wave_arx(design.predictor, vessel.ship, vessel.tank, *path),
+            design.predictor.measured.index("roll_rad"),
+            settings,
+            make_pulses(settings, config.limits, vessel.ship, vessel.tank, period_s, *path),
+            retuner,
+        )
+        ship = _Rolling(config)
+        order = OperatorCommand(Mode.ACTIVE, True, False, False, False)
+        handed_over = 0.0
+        for k in range(round((settings.identification_s + 2 * settings.trial_s) / period_s)):
+            before, candidate = controller.state, controller.candidate
+            if before is RetuningState.DESIGN and candidate is None:
+                time.sleep(period_s)  # the other process works in true time
+            pressed = order._replace(retune=k == BEGUN)
+            start = time.perf_counter()
+            controller.update(round(k * period_s * SECOND_NS), pressed, engaged=True, fresh=True)
+            middle = time.perf_counter()
+            answer = controller.step(ship.outputs)
+            end = time.perf_counter()
+            now = controller.state
+            if before is RetuningState.IDENTIFY and now is RetuningState.DESIGN:
+                handed_over = end
+                times.setdefault("handing the record over", []).append(middle - start)
+            elif controller.candidate is not candidate:
+                times.setdefault("identification and design", []).append(end - handed_over)
+                times.setdefault("taking the law in", []).append(middle - start)
+            elif now is RetuningState.DESIGN and candidate is None:
+                times.setdefault("looking for the law", []).append(middle - start)
+            elif now is RetuningState.DESIGN:
+                times.setdefault("step, filling the law's memory", []).append(end - middle)
+            else:
+                times.setdefault(f"step, {now.name}", []).append(end - middle)
+                times.setdefault(f"update, {now.name}", []).append(middle - start)
+            controller.applied(ship.push(answer))
+    assert controller.state is RetuningState.RETUNED, controller.events
+
+
+class _Rolling:
+    """A linear ship of another loading in a regular wave."""
+
+    def __init__(self, config: ControllerConfig) -> None:
+        design, vessel = config.law, config.vessel
+        assert isinstance(design, PredictiveDesign)
+        stiffness = vessel.ship.inertia_kg_m2 * (2 * math.pi / PERIOD_S) ** 2
+        ship = replace(vessel.ship, stiffness_nm_rad=stiffness)
+        self._period_s = design.predictor.sample_time_s
+        names = list(design.predictor.measured)
+        model = coupled_model(ship, vessel.tank)
+        both = model[names, ["pressure_pa", "wave_moment_nm"]]
+        self._plant = sample(both, self._period_s, config.delay_s, vessel.pump.lag_s)
+        self._noise = np.random.default_rng(1)
+        self._deviation = np.array(design.predictor.measurement_std) / 10
+        self._limit_pa = config.limits.pressure_pa
+        self._state = np.zeros(len(self._plant.A))
+        self._steps = 0
+        self.outputs = np.zeros(len(names))
+
+    def push(self, pressure_pa: FloatArray) -> FloatArray:
+        """Let a sample time pass; what of the pressure was within the pump's limit."""
+        applied = np.clip(pressure_pa, -self._limit_pa, self._limit_pa)
+        wave_nm = WAVE_NM * math.cos(WAVE_RAD_S * self._period_s * self._steps)
+        self._steps += 1
+        inputs = np.array([float(applied[0]), wave_nm])
+        noise = self._deviation * self._noise.standard_normal(len(self.outputs))
+        self.outputs = self._plant.C @ self._state + self._plant.D @ inputs + noise
+        self._state = self._plant.A @ self._state + self._plant.B @ inputs
+        return applied
+
+
+def interval(count: int) -> tuple[float, float]:
+    """95 % confidence interval of the mean of a Poisson count."""
+    low = chi2.ppf(0.025, 2 * count) / 2 if count else 0.0
+    return float(low), float(chi2.ppf(0.975, 2 * count + 2) / 2)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -113,6 +222,8 @@ def main() -> None:
         name: {
             "ticks": here.ticks,
             "overruns": here.overruns,
+            "overruns_at_least": interval(here.overruns)[0],
+            "overruns_at_most": interval(here.overruns)[1],
             "lateness_p50_us": here.lateness.percentile_ns(0.5) / 1e3,
             "lateness_p99_us": here.lateness.percentile_ns(0.99) / 1e3,
             "duration_p50_us": here.duration.percentile_ns(0.5) / 1e3,
@@ -122,11 +233,20 @@ def main() -> None:
         for name, here in sums.items()
     }
     result["swaps"] = {"done": swaps, "steepest_command_pa_s": steepest}
+    more, fewer = sums["with"], sums["without"]
+    share = more.ticks / max(1, more.ticks + fewer.ticks)
+    both = more.overruns + fewer.overruns
+    chance = binomtest(more.overruns, both, share, "greater").pvalue if both else 1.0
+    # small: so many more overruns with retuning would be unlikely if it did nothing
+    result["comparison"] = {"chance_of_so_many_with_retuning": float(chance)}
+    result["costs_us"] = costs(scenario.controllers[CONTROLLER], REPEATS)
     if arguments.json:
         print(json.dumps(result))
         return
     for name, values in result.items():
-        print(name, ", ".join(f"{key} {value:g}" for key, value in values.items()), sep=": ")
+        print(name)
+        for key, value in values.items():
+            print(f"  {key:36}{value:12.4g}")
 
 
 if __name__ == "__main__":

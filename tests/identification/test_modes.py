@@ -1,5 +1,8 @@
 """Modes, their confidence, and what the best estimator could do."""
 
+from dataclasses import replace
+
+import control
 import numpy as np
 import pytest
 from cramer_rao import cramer_rao
@@ -9,6 +12,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.control.limits import PumpLimits
 from utank_hil.identification import (
+    IdentificationError,
     era,
     markov_parameters,
     modal_assurance,
@@ -43,6 +47,23 @@ def test_modes_ask_for_a_discrete_model() -> None:
     system.dt = 0
     with pytest.raises(ValueError, match="discrete"):
         modes(system)
+
+
+def test_integrators_dead_poles_and_modes_that_no_output_shows_have_figures_all_the_same() -> None:
+    a = np.diag([1.0, 0.5, 0.0])
+    found = modes(control.ss(a, np.ones((3, 1)), [[1.0, 0.0, 1.0]], [[0.0]], 0.2))
+    assert found.frequency_rad_s.tolist() == [0.0, pytest.approx(5 * np.log(2)), np.inf]
+    assert found.damping_ratio.tolist() == [1.0, 1.0, 1.0]
+    assert found.shapes[:, 0].tolist() == [1.0, 0.0, 1.0]
+
+
+def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
+    u = pulses(1)
+    result = okid(u, noisy(plant().respond(u, 0 * u), 0.01, 1)[:, :1], 10)
+    markov = np.zeros_like(result.markov)
+    markov[2] = 1.0  # a delay: two poles at zero
+    with pytest.raises(IdentificationError, match="order 2 has poles that coincide"):
+        mode_confidence(replace(result, markov=markov), 2)
 
 
 def test_orthogonal_shapes_have_no_assurance() -> None:

@@ -180,6 +180,11 @@ def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
     _refused("persistently exciting of order 2 only", np.sin(0.5 * time_s), y)
     _refused("usable rows cannot determine", u[:70], y[:70])
     _refused("no row without a gap", u * np.nan, y)
+    _refused("input 0 holds values up to .* a unit is wrong", u * 1e80, y)
+    _refused("output 0 stays at its largest value", u, np.minimum(y, 0.7 * y.max(axis=0)))
+    _refused(
+        "output 1 stays at its smallest .* as gaps", u, np.maximum(y, [-1, -0.7 * y[:, 1].max()])
+    )
     holed = y.copy()
     holed[::15] = np.nan
     _refused("no stretch of the record", u, holed)
@@ -200,6 +205,31 @@ def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
 def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         okid(pulses(1), plant().respond(pulses(1), pulses(2)), **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1, 0.5])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_coarse_steps_of_a_sensor_are_not_taken_for_clipping(step: float, noise: float) -> None:
+    # a regular wave holds its peak for longest, and of the same height again and again
+    time_s = np.arange(2500) * SAMPLE_TIME_S
+    for period_s in (10.0, 10.47, 12.0):
+        u = pulses(1)
+        y = np.sin(2 * np.pi / period_s * time_s) + 1e-6 * u
+        y += noise * np.random.default_rng(1).standard_normal(len(u))
+        assert okid(u, step * np.round(y / step), 4).rows == 2496
+
+
+def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters() -> None:
+    u, truth = pulses(1), plant()
+    y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
+    for part in np.linspace(0.5, 1.0, 26):
+        limit = part * np.abs(y[:, 0]).max()
+        clipped = np.column_stack([np.clip(y[:, 0], -limit, limit), y[:, 1]])
+        try:
+            result = okid(u, clipped, 120)
+        except IdentificationError:
+            continue
+        assert response_error(era(result.markov, 4), truth).max() < 0.03
 
 
 def test_records_of_the_wrong_shape_are_refused() -> None:

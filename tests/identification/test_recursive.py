@@ -69,6 +69,17 @@ def test_gap_teaches_nothing_and_its_neighbours_are_left_out() -> None:
     assert model.updates == 500 - 6 + 1
 
 
+def test_number_that_is_no_measurement_is_a_gap_and_spoils_nothing() -> None:
+    u, y = _record(1)
+    spoiled, gapped = RecursiveArx(6, *SCALE), RecursiveArx(6, *SCALE)
+    for model, value in ((spoiled, 1e300), (gapped, np.nan)):
+        v = u.copy()
+        v[700] = value
+        _run(model, v, y)
+    np.testing.assert_array_equal(spoiled.arx.alpha, gapped.arx.alpha)
+    assert np.isfinite(spoiled.arx.alpha).all()
+
+
 @pytest.mark.slow
 def test_stays_stable_over_half_a_day_with_hours_of_still_water() -> None:
     # 200000 samples of 0.2 s are 11 hours; the middle half has no signal but the last bit of noise

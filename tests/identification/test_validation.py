@@ -99,6 +99,37 @@ def test_record_that_does_not_fit_is_refused() -> None:
         validate(model, 0 * u, y)
     with pytest.raises(IdentificationError, match="longer than the order"):
         validate(model, u[:20], y[:20])
+    with pytest.raises(IdentificationError, match=r"5 predictions are too few .* 25 lags"):
+        validate(model, u[:30], y[:30])
+    with pytest.raises(ValueError, match="lags must be a positive integer, got 0"):
+        validate(model, u, y, lags=0)
+    late = np.where(np.arange(len(u)) < len(u) - 5, 0.0, u)
+    with pytest.raises(IdentificationError, match="input 0 does not move in the samples that"):
+        validate(model, late, y)
+    with pytest.raises(IdentificationError, match="predictions of this record overflow"):
+        validate(ARX(1e300 * model.alpha, model.beta, 0.2), u, y)
+
+
+def test_free_run_of_an_unstable_model_is_no_fit_at_all() -> None:
+    model, u, y = _arx_record(1)
+    result = validate(ARX(1.9 * model.alpha, model.beta, 0.2), u, y)
+    assert (result.simulation_fit == -np.inf).all()
+    assert np.isfinite(result.one_step_fit).all()
+
+
+def test_units_of_the_record_do_not_matter() -> None:
+    model, u, y = _arx_record(1)
+    scale = np.array([1e-30, 1e30])
+    other = ARX(
+        model.alpha * scale[:, None] / scale,
+        model.beta * scale[:, None] / 1e-20,
+        model.sample_time_s,
+    )
+    one, two = validate(model, u, y), validate(other, 1e-20 * u, scale * y)
+    np.testing.assert_allclose(two.one_step_fit, one.one_step_fit)
+    np.testing.assert_allclose(
+        two.independence_probability, one.independence_probability, rtol=1e-6
+    )
 
 
 def test_true_modes_stay_and_spurious_ones_wander_in_the_stabilization_diagram() -> None:

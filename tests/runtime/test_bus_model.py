@@ -26,8 +26,7 @@ def carry(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:
     arrived = []
 
     def advance(until_ns: int) -> None:
-        while (delivery := bus.next_delivery(until_ns)) is not None:
-            end_ns, _, sent = delivery
+        for end_ns, _, sent in bus.carry_until(until_ns):
             row = int.from_bytes(sent.data, "little")
             begun_ns = end_ns + 3 * BIT_NS - length_ns(sent)
             arrived.append((rows[row][0] * BIT_NS, begun_ns, sent.can_id, row))
@@ -81,8 +80,7 @@ def test_load_over_every_second_adds_up_to_the_load_of_the_run():
         bus.queue(0, sent, second * SECOND_NS)
         for _ in range(number - 1):
             bus.queue(0, sent, second * SECOND_NS)
-        while bus.next_delivery((second + 1) * SECOND_NS):
-            pass
+        bus.carry_until((second + 1) * SECOND_NS)
     statistics = bus.statistics(4 * SECOND_NS)
     share = length_ns(sent) / SECOND_NS
     assert statistics.window_loads == pytest.approx([100 * share, share, 1000 * share, share])
@@ -94,7 +92,7 @@ def test_frame_across_a_border_counts_in_both_seconds():
     bus = SimulatedBus()
     sent = frame(1)
     bus.queue(0, sent, SECOND_NS - 10 * BIT_NS)
-    assert bus.next_delivery(2 * SECOND_NS) is not None
+    assert len(bus.carry_until(2 * SECOND_NS)) == 1
     loads = bus.statistics(2 * SECOND_NS).window_loads
     assert loads == pytest.approx(
         [10 * BIT_NS / SECOND_NS, (length_ns(sent) - 10 * BIT_NS) / SECOND_NS]
@@ -104,7 +102,7 @@ def test_frame_across_a_border_counts_in_both_seconds():
 def test_load_counts_a_frame_under_way_up_to_now():
     bus = SimulatedBus()
     bus.queue(0, frame(1), 0)
-    assert bus.next_delivery(10 * BIT_NS) is None
+    assert bus.carry_until(10 * BIT_NS) == []
     assert bus.statistics(10 * BIT_NS).load == 1.0
     assert SimulatedBus().statistics(0).load == 0.0
 
@@ -115,8 +113,7 @@ def test_queueing_delays_are_exact():
     for _ in range(100):
         bus.queue(0, sent, 0)
     assert bus.statistics(0).waiting == 100
-    while bus.next_delivery(SECOND_NS):
-        pass
+    bus.carry_until(SECOND_NS)
     statistics = bus.statistics(SECOND_NS)
     assert statistics.delay_p50_ns == 49 * length_ns(sent)
     assert statistics.delay_p99_ns == 98 * length_ns(sent)

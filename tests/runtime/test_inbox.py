@@ -77,7 +77,7 @@ class Line:
             inbox.level_m, inbox.pressure_pa, inbox.high_level, inbox.drive_state,
             inbox.drive_fault, inbox.power_w, inbox.operator, inbox.motion_ns, inbox.tank_ns,
             inbox.pump_ns, inbox.drive_ns, inbox.echo_ns, inbox.panel_ns, inbox.address_conflict,
-            inbox.versions_match, inbox.requested_mode(),
+            inbox.versions_match, inbox.requested_mode,
         )  # fmt: skip
 
 
@@ -92,7 +92,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert inbox.pressure_pa == 8e3
     assert inbox.power_w == pytest.approx(20e3)
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
-    assert inbox.requested_mode() is Mode.ACTIVE
+    assert inbox.requested_mode is Mode.ACTIVE
     assert [getattr(inbox, name) for name in TIMES.values()] == [1010, 1020, 1030, 1040, 1060]
     assert inbox.echo_ns == 1040
     assert inbox.frames == 6
@@ -224,6 +224,6 @@ def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
     line = Line()
-    assert line.inbox.requested_mode() is Mode.STANDBY
+    assert line.inbox.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
-    assert line.inbox.requested_mode() is Mode.STANDBY
+    assert line.inbox.requested_mode is Mode.STANDBY

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from toy_nodes import BIT_NS, MS, ToyNode, frame
+from toy_nodes import BIT_NS, MS, SelectiveNode, ToyNode, frame
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.runtime import Lockstep, NodeError, SimulatedBus, frame_bits
@@ -107,6 +107,31 @@ def test_frame_reaches_every_node_but_its_sender_at_its_last_bit():
     end_of_frame_ns = (frame_bits(sent) - 3) * 8_000
     assert nodes[0].heard == nodes[2].heard == [(end_of_frame_ns, sent)]
     assert nodes[1].heard == []
+
+
+ids = st.frozensets(st.integers(0, 5))
+
+
+@given(st.lists(ids, min_size=1, max_size=4), st.lists(ids, min_size=1, max_size=3))
+def test_selective_node_hears_what_it_names_and_any_other_node_everything(choices, said):
+    talkers = [
+        ToyNode(f"talker {i}", says=lambda now, said=said: map(frame, sorted(said)))
+        for i, said in enumerate(said)
+    ]
+    listeners = [
+        SelectiveNode(f"listener {i}", says=lambda now: [frame(0)], hears=chosen)
+        for i, chosen in enumerate(choices)
+    ]
+    rows: list[tuple[int, str, Frame]] = []
+    run = Lockstep([*talkers, *listeners], trace=lambda *row: rows.append(row))
+    run.run_until(30 * MS)
+    for node in [*talkers, *listeners]:
+        chosen = node.hears if isinstance(node, SelectiveNode) else frozenset(range(6))
+        assert node.heard == [
+            (now_ns, sent)
+            for now_ns, name, sent in rows
+            if name != node.name and sent.can_id in chosen
+        ]
 
 
 def test_silent_node_does_not_hold_up_the_others():

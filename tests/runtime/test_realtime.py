@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from toy_nodes import MS, START_NS, FakeClock, ToyNode, ToyPort, frame
+from toy_nodes import MS, START_NS, FakeClock, SelectiveNode, ToyNode, ToyPort, frame
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.runtime import (
@@ -305,3 +305,13 @@ def test_loop_process_has_one_python_thread_and_no_compiler_or_plotting():
         [sys.executable, "-c", LOOP_PROCESS], capture_output=True, text=True, check=True
     )
     assert run.stdout == "1 []\n"
+
+
+def test_selective_node_hears_what_it_names_from_the_port_and_from_its_group():
+    port = ToyPort()
+    port.arriving = [frame(1), frame(2), frame(3)]
+    selective = SelectiveNode("selective", hears=frozenset({2, 4}))
+    other = ToyNode("other", says=lambda now: [frame(4), frame(5)])
+    RealTimeLoop([selective, other], port, clock=FakeClock()).run(duration_ns=MS)
+    assert [sent.can_id for _, sent in selective.heard] == [2, 4]
+    assert [sent.can_id for _, sent in other.heard] == [1, 2, 3]

@@ -38,6 +38,13 @@ class ToyNode:
         return self.says(now_ns)
 
 
+@dataclass
+class SelectiveNode(ToyNode):
+    """A toy node that says what it hears."""
+
+    hears: frozenset[int] = frozenset()
+
+
 class FakeClock:
     """Time that passes only in sleeps, and where a test lets it."""
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _HIGHEST_ORDER = 20  # looked at when the singular values are to tell the order
 _CORRELATION_BLOCKS = 2  # of ERA/DC, beside the first, down and across
+_SMALLEST, _LARGEST = 1e-140, 1e140  # what is computed from such numbers stays finite
 _SIGNAL = 1e-3  # part of the largest singular value that can still be called signal
 
 
@@ -71,7 +72,7 @@ def era(markov: FloatArray, order: int | None = None, sample_time_s: float = 0.2
     ValueError
         If the Markov parameters have the wrong shape or the order does not fit them.
     IdentificationError
-        If they are zero.
+        If they are zero, or of an absurd size.
     """
     markov = _checked(markov)
     found = realize(markov, order)
@@ -231,16 +232,21 @@ def _hankel(markov: FloatArray, first: int, rows: int, columns: int) -> FloatArr
 
 
 def _scaled(markov: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Markov parameters with outputs and inputs of equal energy, and the two scales."""
-    rows = _energy(markov, (0, 2))
-    columns = _energy(markov / rows[:, None], (0, 1))
-    return markov / rows[:, None] / columns, rows, columns
+    """Markov parameters without D, outputs and inputs of equal energy; and the two scales."""
+    scaled = markov.copy()
+    scaled[0] = 0.0
+    rows = _energy(scaled, (0, 2))
+    scaled /= rows[:, None]
+    columns = _energy(scaled, (0, 1))
+    return scaled / columns, rows, columns
 
 
 def _energy(markov: FloatArray, axes: tuple[int, int]) -> FloatArray:
-    """Root sum of squares over `axes` of all but D; 1 where a channel is dead."""
-    largest = np.abs(markov[1:]).max()  # first, so that no square underflows
-    energy = largest * np.sqrt(np.sum((markov[1:] / largest) ** 2, axis=axes))
+    """Root sum of squares over `axes`; 1 where a channel is dead."""
+    largest = np.abs(markov).max(axis=axes)  # first, so that no square underflows
+    largest = np.where(largest > 0, largest, 1.0)
+    relative = markov / np.expand_dims(largest, axes)
+    energy: FloatArray = largest * np.sqrt(np.sum(relative**2, axis=axes))
     return np.where(energy > 0, energy, 1.0)
 
 
@@ -254,10 +260,18 @@ def _checked(markov: FloatArray) -> FloatArray:
         raise ValueError("Markov parameters must be finite")
     if not markov[1:].any():
         raise IdentificationError("the Markov parameters are zero: the input moves no output")
+    size = np.abs(markov)
+    if size.max() > _LARGEST or size[1:].max() < _SMALLEST:
+        raise IdentificationError(
+            f"the Markov parameters reach {size.max():.1e}, responses {size[1:].max():.1e}; scale "
+            "the units of inputs and outputs"
+        )
     return markov
 
 
 def _checked_order(order: int | None, values: FloatArray) -> int:
+    if values[0] < _SMALLEST:  # channels are scaled: it is about one
+        raise IdentificationError("the Markov parameters hold no response that can be realized")
     if order is None:
         return order_from_singular_values(values)
     rank = int(np.count_nonzero(values > len(values) * np.finfo(np.float64).eps * values[0]))

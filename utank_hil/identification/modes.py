@@ -12,13 +12,14 @@ The covariance is right when the prediction errors are white, which a high order
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.identification.era import Realization, realize
+from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.markov import gradient
 from utank_hil.identification.okid import OkidResult
 
@@ -37,11 +38,11 @@ class Modes:
     poles : ndarray, shape (k,)
         Of the discrete model, imaginary part zero or more.
     frequency_rad_s : ndarray, shape (k,)
-        Undamped natural frequency.
+        Undamped natural frequency; infinite for a pole at 0.
     damping_ratio : ndarray, shape (k,)
         1 for a real pole, negative when unstable.
     shapes : ndarray, shape (k, m)
-        Complex amplitudes of the outputs, the largest being 1.
+        Complex amplitudes of the outputs, the largest being 1; zero for a mode that none shows.
     """
 
     poles: ComplexArray
@@ -89,7 +90,7 @@ def modes(system: "StateSpace") -> Modes:
     """
     if not system.dt or system.dt is True:
         raise ValueError(f"modes need a discrete model with a sample time, its dt is {system.dt}")
-    return _modes(np.asarray(system.A), np.asarray(system.C), float(system.dt))[0]
+    return _modes(np.asarray(system.A), np.asarray(system.C), float(system.dt)).modes
 
 
 def mode_confidence(result: OkidResult, order: int) -> ModeConfidence:
@@ -105,10 +106,26 @@ def mode_confidence(result: OkidResult, order: int) -> ModeConfidence:
     -------
     ModeConfidence
         The modes are those of ``modes(era(result.markov, order, sample_time_s))``.
+
+    Raises
+    ------
+    ValueError, IdentificationError
+        As `era`; and if poles coincide or lie at 0 or 1, where to first order they do not move.
     """
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s
-    model, right_vectors, left_vectors = _modes(found.a, found.c, sample_time_s)
+    model, vectors, kept = _modes(found.a, found.c, sample_time_s)
+    left_vectors: ComplexArray | None
+    try:
+        left_vectors = np.linalg.inv(vectors).T[:, kept].astype(np.complex128)
+    except np.linalg.LinAlgError:
+        left_vectors = None
+    if left_vectors is None or (model.poles == 0).any() or (model.poles == 1).any():
+        raise IdentificationError(
+            f"the model of order {order} has poles that coincide or lie at 0 or 1; their "
+            "confidence is not defined, choose another order"
+        )
+    right_vectors = vectors[:, kept]
     rows = len(result.column_scale)
     m = result.arx.outputs
     directions = np.zeros((rows, m, 2 * len(model.poles)))
@@ -150,24 +167,33 @@ def modal_assurance(first: ComplexArray, second: ComplexArray) -> FloatArray:
     return assurance
 
 
-def _modes(
-    a: FloatArray, c: FloatArray, sample_time_s: float
-) -> tuple[Modes, ComplexArray, ComplexArray]:
-    """Modes with right eigenvectors and the left ones, scaled so that their product is 1."""
+class _Eigen(NamedTuple):
+    """Modes, all right eigenvectors, and the numbers of those that the modes belong to."""
+
+    modes: Modes
+    vectors: ComplexArray
+    kept: np.ndarray
+
+
+def _modes(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
     values, vectors = np.linalg.eig(a)
-    duals = np.linalg.inv(vectors).T
-    s = np.log(values.astype(np.complex128)) / sample_time_s
+    with np.errstate(divide="ignore", invalid="ignore"):  # the logarithm of 0
+        s = np.log(values.astype(np.complex128)) / sample_time_s
     kept = np.flatnonzero(values.imag >= 0)
     kept = kept[np.argsort(np.abs(s[kept]))]
-    shapes = (c @ vectors[:, kept]).T
+    s = s[kept]
+    oscillating = (np.abs(s) > 0) & np.isfinite(s)
+    damping = np.ones(len(s))
+    damping[oscillating] = -s[oscillating].real / np.abs(s[oscillating])
+    shapes = (c @ vectors[:, kept]).T.astype(np.complex128)
     peak = np.take_along_axis(shapes, np.argmax(np.abs(shapes), axis=1)[:, None], axis=1)
     model = Modes(
         values[kept].astype(np.complex128),
-        np.abs(s[kept]),
-        -s[kept].real / np.abs(s[kept]),
-        (shapes / peak).astype(np.complex128),
+        np.abs(s),
+        damping,
+        shapes / np.where(peak == 0, 1.0, peak),
     )
-    return model, vectors[:, kept], duals[:, kept]
+    return _Eigen(model, vectors, kept)
 
 
 def _pole_weights(

@@ -19,6 +19,7 @@ from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import Fit, fit
 from utank_hil.identification.markov import markov_parameters
+from utank_hil.identification.record import channel_scale, stacked_record
 
 _MARKOV_COUNT = 401  # at 0.2 s a Hankel matrix of 40 s: more than the longest roll period
 _LEAST_EXCITATION = 4  # what one oscillation takes (twice its order)
@@ -109,7 +110,7 @@ def okid(
         If an argument has the wrong shape or value.
     IdentificationError
         If the record does not determine a model: too short, too many gaps, an input that hardly
-        excites, an output that does not move.
+        excites, an output that does not move or is clipped.
     """
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
@@ -170,41 +171,6 @@ def _in_units(
         solution.excitation_order,
         regression.rows,
     )
-
-
-def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
-    """Outputs and inputs side by side, shape (N, m + r), and m; gaps marked by NaN throughout."""
-    columns = []
-    for name, part in (("y", y), ("u", u)):
-        array = np.asarray(part, dtype=np.float64)
-        array = array[:, None] if array.ndim == 1 else array
-        if array.ndim != 2 or array.shape[1] == 0:
-            raise ValueError(f"{name} must have shape (N, channels), got {np.shape(part)}")
-        columns.append(array)
-    if len(columns[0]) != len(columns[1]):
-        raise ValueError(f"y has {len(columns[0])} samples and u has {len(columns[1])}")
-    z = np.hstack(columns)
-    z[~np.isfinite(z).all(axis=1)] = np.nan
-    return z, columns[0].shape[1]
-
-
-def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
-    """Root mean square of each channel, shape (q,), so that pascals and radians weigh the same.
-
-    Raises
-    ------
-    IdentificationError
-        If a channel is constant or the record holds no finite row.
-    """
-    good = z[np.isfinite(z[:, 0])]
-    if len(good) == 0:
-        raise IdentificationError("the record has no row without a gap")
-    for c in np.flatnonzero(np.ptp(good, axis=0) == 0):
-        name = f"output {c}" if c < outputs else f"input {c - outputs}"
-        raise IdentificationError(f"{name} does not move in the whole record")
-    magnitude = np.abs(good).max(axis=0)  # first, so that the squares neither over- nor underflow
-    scale: FloatArray = magnitude * np.sqrt(np.mean((good / magnitude) ** 2, axis=0))
-    return scale
 
 
 def checked_order(order: int) -> int:

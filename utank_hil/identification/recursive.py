@@ -18,6 +18,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
 
 _START = 1e3  # root of the first covariance, in scaled coefficients: knows nothing
+_LARGEST = 1e6  # times the usual magnitude: no measurement
 _RECOUNT = 1000  # updates after which the running trace of P is computed anew
 
 
@@ -79,8 +80,8 @@ class RecursiveArx:
         ----------
         u : array_like, shape (r,)
         y : array_like, shape (m,)
-            A sample that is not finite is a gap: nothing is learned until `order` samples have
-            come after it.
+            A sample that is not finite, or a million times as large as usual, is a gap: nothing is
+            learned until `order` samples have come after it.
 
         Returns
         -------
@@ -89,10 +90,12 @@ class RecursiveArx:
             incomplete.
         """
         m = self._outputs
-        sample = np.concatenate([np.atleast_1d(y), np.atleast_1d(u)]) / self._scale
+        measured = np.concatenate([np.atleast_1d(y), np.atleast_1d(u)])
+        usable = bool((np.abs(measured) <= _LARGEST * self._scale).all())
+        sample = measured / self._scale if usable else np.full(len(measured), np.nan)
         self._window[1:] = self._window[:-1]
         self._window[0] = sample
-        if not np.isfinite(sample).all():
+        if not usable:
             self._filled = 0
             return np.full(m, np.nan)
         self._filled += 1

@@ -21,7 +21,8 @@ import numpy as np
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.modes import ModeConfidence, Modes, frequency_and_damping_std
-from utank_hil.identification.okid import OkidResult, channel_scale, stacked_record
+from utank_hil.identification.okid import OkidResult
+from utank_hil.identification.record import channel_scale, stacked_record
 
 if TYPE_CHECKING:
     from control import StateSpace

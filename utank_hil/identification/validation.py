@@ -14,8 +14,11 @@ from scipy.special import chdtrc
 from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.identification.disturbance import DisturbanceBasis
+from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
-from utank_hil.identification.okid import channel_scale, stacked_record
+from utank_hil.identification.record import channel_scale, stacked_record
+
+_STILL = 1e-12  # of a channel's root mean square: rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +32,7 @@ class Validation:
     simulation_fit : ndarray, shape (m,)
         The same for the free response to input and disturbance basis, begun with the first p
         samples of each stretch. What no model of the pump can know, an irregular sea, is in it.
+        Minus infinity where the response grows out of all bounds.
     residual_correlation : ndarray, shape (lags, m)
         Autocorrelation of the prediction errors at lags 1, 2, ...
     whiteness_probability : ndarray, shape (m,)
@@ -68,6 +72,7 @@ def validate(
     disturbance_frequencies_rad_s : sequence of float
         Known regular waves; amplitude and phase are fitted to this record.
     lags : int
+        Over which errors and inputs are correlated, 1 or more.
 
     Returns
     -------
@@ -76,39 +81,38 @@ def validate(
     Raises
     ------
     ValueError
-        If the record does not fit the model.
+        If the record does not fit the model, or `lags` is below 1.
     IdentificationError
-        If no unbroken stretch is longer than the model's order and lags, or a channel does not
-        move.
+        If the record cannot tell how good the model is: no unbroken stretch is longer than order
+        and lags, fewer predictions than lags are left, a channel does not move in what is left, an
+        output is clipped, or the predictions overflow.
     """
+    if int(lags) != lags or lags < 1:
+        raise ValueError(f"lags must be a positive integer, got {lags}")
     z, m = stacked_record(u, y)
     if (m, z.shape[1] - m) != (arx.outputs, arx.inputs):
         raise ValueError(
             f"the model has {arx.outputs} outputs and {arx.inputs} inputs, the record {m} and "
             f"{z.shape[1] - m}"
         )
-    channel_scale(z, m)  # refuses channels that do not move
+    scale = channel_scale(z, m)
     basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s))
-    regression = LagRegression(
-        z, m, max(arx.order, lags), basis.evaluate(len(z), arx.sample_time_s)
-    )
-    coefficients = _coefficients(arx, regression)
-    errors = regression.residuals(coefficients)
+    functions = basis.evaluate(len(z), arx.sample_time_s)
+    regression = LagRegression(z / scale, m, max(arx.order, int(lags)), functions)
+    _refuse_stillness(regression, lags)
+    coefficients = _coefficients(arx, scale, regression)
+    errors = _errors(regression, coefficients)
     if basis.size:
         waves = np.hstack([s.basis for s in regression.segments])
         coefficients[-basis.size :] = np.linalg.lstsq(waves.T, np.hstack(errors).T, rcond=None)[0]
-        errors = regression.residuals(coefficients)
-    simulated = [
-        s.channels[:m, regression.order :] - free
-        for s, free in zip(regression.segments, _simulated(regression, coefficients), strict=True)
-    ]
+        errors = _errors(regression, coefficients)
     targets = np.hstack([s.channels[:m, regression.order :] for s in regression.segments])
     spread = np.std(targets, axis=1)
     whiteness, correlation = _whiteness(errors, lags)
     independence, crossed = _independence(errors, regression, lags)
     return Validation(
         1 - _rms(errors) / spread,
-        1 - _rms(simulated) / spread,
+        _simulation_fit(regression, coefficients, spread),
         correlation,
         whiteness,
         crossed,
@@ -117,12 +121,68 @@ def validate(
     )
 
 
-def _coefficients(arx: ARX, regression: LagRegression) -> FloatArray:
-    """The model as a regression's coefficients, zero beyond its order and for the basis."""
+def _refuse_stillness(regression: LagRegression, lags: int) -> None:
+    """Refuse a record whose usable stretches leave nothing to judge by.
+
+    Raises
+    ------
+    IdentificationError
+    """
+    p, m = regression.order, regression.outputs
+    if regression.rows <= lags:
+        raise IdentificationError(
+            f"{regression.rows} predictions are too few to correlate over {lags} lags; validate "
+            "on a longer record, mend its gaps or ask for fewer lags"
+        )
+    for c in range(regression.channels):
+        # an output is compared at the predictions; an input at each of the lags before them too
+        for lag in range(1 if c < m else lags + 1):
+            parts = [
+                s.channels[c, p - lag : s.channels.shape[1] - lag] for s in regression.segments
+            ]
+            if max(part.max() for part in parts) - min(part.min() for part in parts) < _STILL:
+                name = f"output {c}" if c < m else f"input {c - m}"
+                raise IdentificationError(
+                    f"{name} does not move in the samples that predictions are judged by; "
+                    "validate on a stretch in which it moves throughout"
+                )
+
+
+def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
+    """Prediction errors by segment, refused if they overflow."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        errors = regression.residuals(coefficients)
+        if not all(np.isfinite(e @ e.T).all() for e in errors):
+            raise IdentificationError(
+                "the model's predictions of this record overflow; the model is not of these "
+                "signals, or of other units"
+            )
+    return errors
+
+
+def _simulation_fit(
+    regression: LagRegression, coefficients: FloatArray, spread: FloatArray
+) -> FloatArray:
+    """Fit of the free response; minus infinity where that overflows."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        simulated = [
+            s.channels[: regression.outputs, regression.order :] - free
+            for s, free in zip(
+                regression.segments, _simulated(regression, coefficients), strict=True
+            )
+        ]
+        fit = 1 - _rms(simulated) / spread
+    return np.where(np.isnan(fit), -np.inf, fit)
+
+
+def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> FloatArray:
+    """The model as coefficients of a scaled regression, zero beyond its order and for the basis."""
     m = arx.outputs
     by_lag = np.zeros((regression.order + 1, m, regression.channels))
     by_lag[1 : arx.order + 1, :, :m] = arx.alpha
     by_lag[: arx.order + 1, :, m:] = arx.beta
+    with np.errstate(over="ignore", invalid="ignore"):  # then the predictions are not finite
+        by_lag *= scale / scale[:m, None]
     lagged = by_lag.transpose(0, 2, 1).reshape(-1, m)[m:]
     return np.vstack([lagged, np.zeros((regression.basis_size, m))])
 

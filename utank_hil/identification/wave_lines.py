@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from utank_hil.arrays import FloatArray
 from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.lag_regression import LagRegression
-from utank_hil.identification.okid import channel_scale, stacked_record
+from utank_hil.identification.record import channel_scale, stacked_record
 
 _ORDER = 12
 _RIDGE = 1e-4  # squared relative noise: 1 %

@@ -76,10 +76,11 @@ class SimulatedBus:
         self._order = count()
         self._in_flight: tuple[int, int, Frame] | None = None
         self._free_ns = 0  # the bus is, or was last, taken until then
-        self._busy_ns = 0
+        self._new_delays_ns: list[int] = []  # counted when a window closes: together is faster
         self._delays: Counter[int] = Counter()
         self._window_end_ns = WINDOW_NS
         self._window_busy_ns = 0
+        self._busy_before_ns = 0  # in all windows before this one
         self._window_loads = array("d")
 
     def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
@@ -97,51 +98,52 @@ class SimulatedBus:
         if self._free_ns < now_ns:
             self._free_ns = now_ns
 
-    def next_delivery(self, before_ns: int) -> tuple[int, int, Frame] | None:
-        """Let the bus work until `before_ns`, or until a frame arrives, whichever comes first.
+    def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
+        """Let the bus work until `before_ns`.
 
         Returns
         -------
-        tuple of (time in ns, sender, frame), or None
-            The frame whose last bit is over at that time; None if none is over before `before_ns`.
+        list of tuple of (time in ns, sender, frame)
+            The frames whose last bit is over, at that time, before `before_ns`; oldest first.
         """
-        arriving = self._in_flight or self._begin(before_ns)
-        if arriving is None or arriving[0] >= before_ns:
-            return None
-        self._in_flight = None
-        return arriving
-
-    def _begin(self, before_ns: int) -> tuple[int, int, Frame] | None:
-        """Arbitrate, if the bus becomes free before `before_ns` and anyone wants it."""
-        start_ns = self._free_ns
-        if not self._waiting or start_ns >= before_ns:
-            return None
-        _, _, frame, sender, queued_ns, duration_ns = heappop(self._waiting)
-        end_ns = start_ns + duration_ns
-        self._free_ns = end_ns
-        self._delays[start_ns - queued_ns] += 1
-        self._busy_ns += duration_ns
-        if end_ns < self._window_end_ns:
-            self._window_busy_ns += duration_ns
-        else:
-            self._close_windows(start_ns, end_ns)
-        self._in_flight = end_ns - self._intermission_ns, sender, frame
-        return self._in_flight
+        arrived = []
+        waiting, in_flight = self._waiting, self._in_flight
+        while in_flight is not None or (waiting and self._free_ns < before_ns):
+            if in_flight is None:
+                start_ns = self._free_ns
+                _, _, frame, sender, queued_ns, duration_ns = heappop(waiting)
+                self._free_ns = end_ns = start_ns + duration_ns
+                self._new_delays_ns.append(start_ns - queued_ns)
+                if end_ns < self._window_end_ns:
+                    self._window_busy_ns += duration_ns
+                else:
+                    self._close_windows(start_ns, end_ns)
+                in_flight = end_ns - self._intermission_ns, sender, frame
+            if in_flight[0] >= before_ns:
+                break
+            arrived.append(in_flight)
+            in_flight = None
+        self._in_flight = in_flight
+        return arrived
 
     def _close_windows(self, start_ns: int, end_ns: int) -> None:
         """Close every window that is over at `end_ns`; the bus is taken from `start_ns` to then."""
         while self._window_end_ns <= end_ns:
             in_window_ns = max(0, self._window_end_ns - start_ns)
-            self._window_loads.append((self._window_busy_ns + in_window_ns) / WINDOW_NS)
+            busy_ns = self._window_busy_ns + in_window_ns
+            self._busy_before_ns += busy_ns
+            self._window_loads.append(busy_ns / WINDOW_NS)
             start_ns += in_window_ns
             self._window_busy_ns = 0
             self._window_end_ns += WINDOW_NS
         self._window_busy_ns += end_ns - start_ns
+        self._delays.update(self._new_delays_ns)
+        self._new_delays_ns.clear()
 
     def statistics(self, now_ns: int) -> BusStatistics:
         """Return what the bus carried until `now_ns`, the time up to which it has worked."""
         self._close_windows(now_ns, now_ns)
-        busy_ns = self._busy_ns - max(0, self._free_ns - now_ns)
+        busy_ns = self._busy_before_ns + self._window_busy_ns - max(0, self._free_ns - now_ns)
         return BusStatistics(
             frames=self._delays.total(),
             load=busy_ns / now_ns if now_ns else 0.0,

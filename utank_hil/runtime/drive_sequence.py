@@ -33,7 +33,7 @@ class DriveSequence:
         wanted : bool
             Whether the supervisor wants the drive in operation enabled.
         """
-        if state is DriveState.FAULT and self._resetting:
+        if self._resetting and state is DriveState.FAULT:
             return ControlWord.FAULT_RESET
         self._resetting = False
         if wanted and state is not None:

@@ -8,13 +8,16 @@ from typing import Final
 from utank_hil.canbus.frame import Frame
 from utank_hil.runtime.errors import NodeError
 from utank_hil.runtime.hooks import LinkObserver, Stoppable
-from utank_hil.runtime.node import Node
+from utank_hil.runtime.node import Node, Selective
 
 OUTSIDE: Final = -1
 """The sender of a frame that comes from no node of the group."""
 
 Send = Callable[[int, Frame, int], None]
 """Called with (sender's index, frame, time in nanoseconds)."""
+
+Receive = Callable[[Frame, int], None]
+"""A node's `receive`."""
 
 
 class NodeGroup:
@@ -55,19 +58,27 @@ class NodeGroup:
         self._nodes = tuple(nodes)
         self._periods_ns = tuple(node.period_ns for node in nodes)
         self.base_period_ns: Final = gcd(*self._periods_ns)
-        # Methods are bound once, and who hears a sender is looked up: this is the hot path of
-        # lockstep. The last row hears everything, so that OUTSIDE = -1 finds it.
+        # Methods are bound once, and who hears what of whom is looked up: this is the hot path of
+        # lockstep. The last sender is no node, so that OUTSIDE = -1 finds it.
         self._ticks = tuple(node.tick for node in nodes)
-        receives = tuple(node.receive for node in nodes)
+        senders = range(len(nodes) + 1)
+        named = {can_id for node in nodes if isinstance(node, Selective) for can_id in node.hears}
         self._listeners = tuple(
-            tuple((index, receive) for index, receive in enumerate(receives) if index != sender)
-            for sender in range(len(nodes) + 1)
+            {can_id: self._who_hears(can_id, sender) for can_id in named} for sender in senders
         )
+        self._listeners_to_others = tuple(self._who_hears(None, sender) for sender in senders)
         self.start(0)
+
+    def _who_hears(self, can_id: int | None, sender: int) -> tuple[tuple[int, Receive], ...]:
+        """Find who hears this identifier of this sender; None is one that no node names."""
+        return tuple(
+            (index, node.receive)
+            for index, node in enumerate(self._nodes)
+            if index != sender and (not isinstance(node, Selective) or can_id in node.hears)
+        )
 
     def start(self, now_ns: int) -> None:
         """Put every node's grid at `now_ns`: all are due then, and every period after it."""
-        self._origin_ns = now_ns
         self._due_ns = [now_ns] * len(self._nodes)
         self.next_tick_ns = now_ns
 
@@ -82,13 +93,14 @@ class NodeGroup:
         NodeError
             If a node raises, or hands out a frame that `send` refuses.
         """
-        due_ns, since_ns = self._due_ns, now_ns - self._origin_ns
+        due_ns = self._due_ns
         index = 0
         try:
             for index, tick in enumerate(self._ticks):
-                if due_ns[index] <= now_ns:
+                late_ns = now_ns - due_ns[index]
+                if late_ns >= 0:
                     period_ns = self._periods_ns[index]
-                    due_ns[index] = now_ns + period_ns - since_ns % period_ns
+                    due_ns[index] += (late_ns // period_ns + 1) * period_ns
                     for frame in tick(now_ns):
                         send(index, frame, now_ns)
         except Exception as error:
@@ -96,16 +108,19 @@ class NodeGroup:
         self.next_tick_ns = min(due_ns)
 
     def deliver(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """Hand one frame to every node but its sender.
+        """Hand one frame to every node that hears it but its sender.
 
         Raises
         ------
         NodeError
             If a node raises.
         """
+        listeners = self._listeners[sender].get(frame.can_id)
+        if listeners is None:
+            listeners = self._listeners_to_others[sender]
         index = 0
         try:
-            for index, receive in self._listeners[sender]:  # noqa: B007 - names the node that raised
+            for index, receive in listeners:  # noqa: B007 - names the node that raised
                 receive(frame, now_ns)
         except Exception as error:
             raise NodeError(self.names[index], "receive", now_ns, error) from error

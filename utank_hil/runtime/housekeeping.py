@@ -1,5 +1,7 @@
 """What every node sends of itself: address claim at boot, then heartbeats."""
 
+import math
+
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -35,7 +37,7 @@ class Housekeeping:
         self._boot_ns: int | None = None
         self._beats = Schedule(HEARTBEAT_PERIOD_NS)
 
-    def frames(self, now_ns: int, state: NodeState = NodeState.OPERATIONAL) -> list[Frame]:
+    def frames(self, now_ns: int, *, faulted: bool = False) -> list[Frame]:
         """Return what is due at `now_ns`, mostly nothing."""
         if not self._beats.due(now_ns):
             return []
@@ -43,18 +45,18 @@ class Housekeeping:
             self._boot_ns = now_ns
             # arbitrary address capable 0, function and identity by address: unique on this bus
             claim = self._claim.frame(AddressClaim(int(self._address)))
-            return [claim, self._beat(0.0, state)]
-        return [self._beat((now_ns - self._boot_ns) * NANOSECONDS, state)]
+            return [claim, self._beat(0.0, faulted=faulted)]
+        return [self._beat((now_ns - self._boot_ns) * NANOSECONDS, faulted=faulted)]
 
-    def _beat(self, uptime_s: float, state: NodeState) -> Frame:
+    def _beat(self, uptime_s: float, *, faulted: bool) -> Frame:
         return self._heartbeat.frame(
             Heartbeat(
-                state=state,
+                state=NodeState.FAULT if faulted else NodeState.OPERATIONAL,
                 reset_cause=None,  # nothing tells a process why it was started
                 uptime_s=uptime_s,
                 catalogue_version=self._catalogue_version,
                 configuration_version=self._configuration_version,
-                transmit_error_count=float("nan"),
-                receive_error_count=float("nan"),
+                transmit_error_count=math.nan,
+                receive_error_count=math.nan,
             )
         )

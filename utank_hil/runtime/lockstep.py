@@ -67,8 +67,7 @@ class Lockstep:
         group, bus, trace = self._group, self.bus, self._trace
         while True:
             until_ns = min(group.next_tick_ns, time_ns)
-            while (arrived := bus.next_delivery(until_ns)) is not None:
-                now_ns, sender, frame = arrived
+            for now_ns, sender, frame in bus.carry_until(until_ns):
                 if trace is not None:
                     trace(now_ns, group.names[sender], frame)
                 group.deliver(sender, frame, now_ns)

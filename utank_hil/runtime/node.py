@@ -5,7 +5,7 @@ lockstep runner and the real-time runner drive the very same object.
 """
 
 from collections.abc import Iterable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from utank_hil.canbus.frame import Frame
 
@@ -29,3 +29,29 @@ class Node(Protocol):
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one period's work and return the frames to send, in order."""
+
+
+@runtime_checkable
+class Selective(Protocol):
+    """A node that says what it hears; one that does not say hears everything.
+
+    The runner need not hand it other frames, nor the kernel other frames to its process. So a node
+    that watches for strangers, or counts what is on the bus, has no such list.
+
+    Attributes
+    ----------
+    hears : frozenset of int
+        Identifiers; a runner asks once, before the first tick.
+    """
+
+    hears: frozenset[int]
+
+
+def heard_by(nodes: Iterable[Node]) -> frozenset[int] | None:
+    """Return the identifiers that a group of nodes hears, None if one of them hears everything."""
+    heard: frozenset[int] = frozenset()
+    for node in nodes:
+        if not isinstance(node, Selective):
+            return None
+        heard |= node.hears
+    return heard

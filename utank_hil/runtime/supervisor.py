@@ -9,6 +9,7 @@ while ready, so neither a restart nor a fault is ever followed by pressure on it
 import math
 from dataclasses import dataclass, fields
 from enum import Enum
+from typing import Final
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime import faults
@@ -16,6 +17,9 @@ from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 
 NEVER_NS = 1 << 62
 """Age of something that was never heard."""
+
+# read once: in Python 3.11 a member costs eight times as much from its class as from here
+_ACTIVE: Final = Mode.ACTIVE
 
 
 class Demand(Enum):
@@ -168,7 +172,7 @@ class Supervisor:
 
     def update(self, seen: Observations, now_ns: int) -> None:
         """Take one tick's observations and set `mode`, `fault`, `demand` and `drive_wanted`."""
-        if self.mode is Mode.ACTIVE:
+        if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
         elif self.mode is Mode.FAULT:
             self._while_faulted(seen, now_ns)
@@ -184,7 +188,7 @@ class Supervisor:
             self._latch(response, now_ns)
         elif seen.stop:
             self._disarm(Mode.STANDBY)
-        elif not seen.armed or seen.requested_mode is not Mode.ACTIVE:
+        elif not seen.armed or seen.requested_mode is not _ACTIVE:
             # through PASSIVE even on the way to STANDBY: there the pressure ramps down
             self._disarm(Mode.PASSIVE)
 

@@ -1,0 +1,178 @@
+"""Whatever a record holds, it ends in a finite model or in a refusal that says why."""
+
+import numpy as np
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from roll_plant import plant, pulses
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control import ARX
+from utank_hil.identification import (
+    IdentificationError,
+    OkidResult,
+    RecursiveArx,
+    era,
+    era_dc,
+    era_with_observer,
+    find_disturbance_frequencies,
+    mode_confidence,
+    okid,
+    validate,
+)
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+KINDS = "stuck", "still", "saturated", "clipped", "gap", "holes"
+Record = tuple[FloatArray, FloatArray]
+
+
+@st.composite
+def ship_records(draw: st.DrawFn) -> Record:
+    """A ship's record in any units, with any noise."""
+    samples = draw(st.integers(1, 400))
+    seed = draw(st.integers(0, 20))
+    u = pulses(seed)[:samples]
+    y = plant().respond(u, 0 * u)[:, : draw(st.integers(1, 2))]
+    noise = np.random.default_rng(seed).standard_normal(y.shape)
+    y = y + draw(st.sampled_from([0.0, 1e-12, 1e-4, 1.0])) * noise
+    exponents = st.integers(-150, 150)
+    return u * 10.0 ** draw(exponents), y * 10.0 ** draw(exponents)
+
+
+@st.composite
+def number_records(draw: st.DrawFn) -> Record:
+    """Any finite numbers, most of them equal."""
+    samples = draw(st.integers(1, 60))
+    shapes = (samples, draw(st.integers(1, 2))), (samples, draw(st.integers(1, 2)))
+    u, y = (draw(arrays(np.float64, shape, elements=FINITE, fill=FINITE)) for shape in shapes)
+    return u, y
+
+
+@st.composite
+def spoiled(draw: st.DrawFn) -> Record:
+    """A record as broken sensors, full actuators and bad lines leave it."""
+    u, y = draw(ship_records() | number_records())
+    u, y = u.copy(), y.copy()
+    begin = draw(st.integers(0, len(u)))
+    part = slice(begin, begin + draw(st.integers(0, len(u))))
+    kinds = draw(st.sets(st.sampled_from(KINDS)))
+    for kind in (kind for kind in KINDS if kind in kinds):
+        if kind == "stuck":
+            y[part] = y[min(begin, len(y) - 1)]
+        elif kind == "still":
+            u[part] = 0.0
+        elif kind in ("saturated", "clipped"):
+            array = u if kind == "saturated" else y
+            limit = draw(st.floats(0.0, 1.0)) * np.abs(array).max()
+            np.clip(array, -limit, limit, out=array)
+        elif kind == "gap":
+            y[part] = np.nan
+        else:
+            u[begin :: draw(st.integers(1, 50))] = draw(st.sampled_from([np.nan, np.inf, -np.inf]))
+    return u, y
+
+
+def says_why(refusal: ValueError) -> None:
+    assert len(str(refusal).split()) > 5
+
+
+def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
+    """The model, None for a refusal."""
+    try:
+        return okid(u, y, order)
+    except IdentificationError as refusal:
+        says_why(refusal)
+        return None
+
+
+@settings(max_examples=200, deadline=None)
+@given(spoiled(), st.integers(1, 30))
+def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) -> None:
+    result = model_of(*record, order)
+    if result is not None:
+        assert np.isfinite(result.markov).all()
+        assert np.isfinite(result.observer_gain).all()
+        assert np.isfinite(result.residual_covariance).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(spoiled(), st.integers(1, 12), st.integers(1, 40))
+@example((np.array([0.0, 0, 0, 1, 0, 1e-295, 0])[:, None], np.eye(7)[:, 5:6]), 1, 1)
+def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lags: int) -> None:
+    u, y = record
+    half = len(u) // 2
+    result = model_of(u[:half], y[:half], order)
+    outputs, inputs = y.reshape(len(y), -1).shape[1], u.reshape(len(u), -1).shape[1]
+    arx = ARX(np.full((2, outputs, outputs), 0.3), np.ones((3, outputs, inputs)), 0.2)
+    try:
+        check = validate(arx if result is None else result.arx, u[half:], y[half:], (), lags)
+    except IdentificationError as refusal:
+        says_why(refusal)
+        return
+    assert check.rows > lags
+    assert (check.one_step_fit <= 1).all()
+    assert (check.simulation_fit <= 1).all()
+    assert (np.abs(check.residual_correlation) <= 1 + 1e-9).all()
+    assert (np.abs(check.input_correlation) <= 1 + 1e-9).all()
+    for probability in (check.whiteness_probability, check.independence_probability):
+        assert ((probability >= 0) & (probability <= 1)).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(spoiled(), st.integers(3, 20))
+def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int) -> None:
+    result = model_of(*record, order)
+    if result is None:
+        return
+    try:
+        system = era(result.markov)
+        found, gain = era_with_observer(result.markov, result.observer_gain)
+    except IdentificationError as refusal:
+        says_why(refusal)
+        return
+    for matrix in (system.A, system.B, system.C, system.D, found.A, gain):
+        assert np.isfinite(matrix).all()
+    known = mode_confidence(result, system.nstates)
+    assert np.isfinite(known.modes.frequency_rad_s).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    arrays(
+        np.float64,
+        st.tuples(st.integers(3, 40), st.integers(1, 2), st.integers(1, 2)),
+        elements=FINITE,
+        fill=FINITE,
+    )
+)
+def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
+    for method in (era, era_dc):
+        try:
+            system = method(markov)
+        except ValueError as refusal:  # an IdentificationError is one
+            says_why(refusal)
+            continue
+        for matrix in (system.A, system.B, system.C, system.D):
+            assert np.isfinite(matrix).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(spoiled())
+def test_waves_are_looked_for_in_any_record(record: Record) -> None:
+    try:
+        lines = find_disturbance_frequencies(*record)
+    except IdentificationError as refusal:
+        says_why(refusal)
+        return
+    assert all(0 < line < 3 for line in lines)
+
+
+@settings(max_examples=100, deadline=None)
+@given(spoiled())
+def test_tracking_stays_finite_and_goes_on_afterwards(record: Record) -> None:
+    u, y = record
+    model = RecursiveArx(3, np.ones(y.shape[1]), np.ones(u.shape[-1] if u.ndim == 2 else 1))
+    for inputs, outputs in zip(u, y, strict=True):
+        model.update(inputs, outputs)
+    assert np.isfinite(model.arx.alpha).all()
+    assert np.isfinite(model.arx.beta).all()

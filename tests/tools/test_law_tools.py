@@ -1,0 +1,124 @@
+"""The tools behind the numbers of the control documents: they run, and say what they should."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TOOLS = Path(__file__).resolve().parents[2] / "tools"
+LIMIT_S = 280
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(TOOLS / arguments[0]), *arguments[1:]],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        check=False,
+    )
+
+
+def answer(*arguments: str):
+    done = run(*arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_campaign_compares_seed_by_seed_and_draws(tmp_path: Path):
+    found = answer(
+        "constrained_campaign.py", "--seeds", "2", "--seconds", "60", "--out", str(tmp_path)
+    )
+    assert len(found["cases"]) >= 4
+    assert (tmp_path / "campaign.png").stat().st_size > 10_000
+    for case in found["cases"]:
+        rolls = {name: [one["roll_rms_rad"] for one in runs] for name, runs in case["runs"].items()}
+        shares = [
+            1 - mine / theirs
+            for mine, theirs in zip(rolls["constrained"], rolls["clipped"], strict=True)
+        ]
+        assert case["below"]["clipped"]["mean"] == pytest.approx(sum(shares) / 2, abs=1e-12)
+    # where no limit is near, the plan is the clipped law itself
+    swell = found["cases"][0]
+    assert swell["runs"]["clipped"][0]["held_back"] == 0
+    assert swell["below"]["clipped"]["mean"] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passive():
+    rows = answer("share_of_possible.py", "--seeds", "2", "--seconds", "90")["rows"]
+    passive, best = rows["passive"]["roll_rms_deg"], rows["clairvoyant"]["roll_rms_deg"]
+    for name, row in rows.items():
+        if "share" in row:
+            assert row["roll_rms_deg"] > best, name
+    assert best < passive
+    assert rows["clairvoyant"]["level_peak_m"] <= 4.0 + 1e-6
+
+
+@pytest.mark.slow
+def test_model_errors_change_what_the_laws_take_away():
+    found = answer("model_errors.py", "--seeds", "2", "--seconds", "60")
+    nominal, weak = (found[name]["below_passive"] for name in ("none", "pump gain 0.8"))
+    assert nominal["GPC"]["mean"] != weak["GPC"]["mean"]
+    assert "GPC, designed for her" in found["roll period x 0.7"]["below_passive"]
+
+
+@pytest.mark.slow
+def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best():
+    found = answer("forecast_errors.py", "--seeds", "2", "--seconds", "900")
+    errors = {
+        name: [sum(column) / 2 for column in zip(*model["error_shares"], strict=True)]
+        for name, model in found["models"].items()
+    }
+    factor = next(values for name, values in errors.items() if name.startswith("factor"))
+    assert factor == sorted(factor)
+    assert all(one <= min(others) for one, *others in zip(factor, *errors.values(), strict=True))
+
+
+@pytest.mark.slow
+def test_tables_of_the_linear_laws_hold_the_printed_ratios():
+    found = answer("linear_law_tables.py", "index")["index"]
+    assert found["printed"]["GPC (roll)"] == pytest.approx(578 / 499)
+    assert found["printed laws, 25.2 m²"]["GPC (roll)"] == pytest.approx(578 / 499, rel=0.01)
+
+
+@pytest.mark.slow
+def test_undelayed_linearization_without_brake_or_shift_hardly_grows():
+    found = answer("nonlinear_law_tables.py", "growth")["growth"]
+    assert 0 < found["first ship, kL = 0"]["ideal, 10 ms: 1/s"] < 0.01
+    assert all(
+        value < 0
+        for name, value in found["first ship, level braked, zeta_h 0.4"].items()
+        if name.endswith("1/s")
+    )
+
+
+@pytest.mark.slow
+def test_benchmark_times_every_kind_of_controller():
+    found = answer("benchmark_controllers.py", "--steps", "100")
+    assert {"gpc", "constrained_gpc", "fuzzy_indirect", "clipped valve"} <= set(found)
+    for cost in found.values():
+        assert 0 < cost["p50_us"] <= cost["p99_us"] <= cost["max_us"] < math.inf
+    assert found["constrained_gpc"]["held_bytes"] > found["passive (floor)"]["held_bytes"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("share_of_possible.py", "--seeds", "1"), "--seeds must be 2 or more"),
+        (("constrained_campaign.py", "--horizon-s", "2"), "--horizon-s must be 12 or more"),
+        (("model_errors.py", "--seconds", "nan"), "--seconds must be 60 or more"),
+        (("storm_seeds.py", "nowhere.yaml"), "nowhere.yaml: can't be read"),
+        (("chapter4_contest.py", "--pump-pa", "-1"), "--pump-pa must be positive"),
+    ],
+)
+def test_wrong_arguments_are_refused_with_the_remedy(arguments, message):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert message in done.stderr

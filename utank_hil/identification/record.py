@@ -1,0 +1,78 @@
+"""A record as the methods here take it: channels side by side, gaps marked, usable or refused."""
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.identification.errors import IdentificationError
+
+_SMALLEST, _LARGEST = 1e-60, 1e60  # what is computed from such numbers, squared, stays finite
+_CLIPPED = 0.01  # share of the samples; at twice that the model of a clipped roll is 2 % off
+_FEWEST = 4  # samples that agree by chance
+
+
+def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
+    """Outputs and inputs side by side, shape (N, m + r), and m; gaps marked by NaN throughout."""
+    columns = []
+    for name, part in (("y", y), ("u", u)):
+        array = np.asarray(part, dtype=np.float64)
+        array = array[:, None] if array.ndim == 1 else array
+        if array.ndim != 2 or array.shape[1] == 0:
+            raise ValueError(f"{name} must have shape (N, channels), got {np.shape(part)}")
+        columns.append(array)
+    if len(columns[0]) != len(columns[1]):
+        raise ValueError(f"y has {len(columns[0])} samples and u has {len(columns[1])}")
+    z = np.hstack(columns)
+    z[~np.isfinite(z).all(axis=1)] = np.nan
+    return z, columns[0].shape[1]
+
+
+def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
+    """Root mean square of each channel, shape (q,), so that pascals and radians weigh the same.
+
+    Raises
+    ------
+    IdentificationError
+        If the record holds no finite row, a channel is constant or in an absurd unit, or an output
+        is clipped.
+    """
+    good = z[np.isfinite(z[:, 0])]
+    if len(good) == 0:
+        raise IdentificationError("the record has no row without a gap")
+    magnitude = np.abs(good).max(axis=0)
+    relative = good / np.where(magnitude > 0, magnitude, 1.0)
+    for c in np.flatnonzero(np.ptp(relative, axis=0) == 0).tolist():
+        raise IdentificationError(f"{_name(c, outputs)} does not move in the whole record")
+    for c in np.flatnonzero((magnitude < _SMALLEST) | (magnitude > _LARGEST)).tolist():
+        raise IdentificationError(
+            f"{_name(c, outputs)} holds values up to {magnitude[c]:.1e}; a unit is wrong, or they "
+            "are no measurements"
+        )
+    for c in range(outputs):
+        _refuse_clipped(relative[:, c], c)
+    scale: FloatArray = magnitude * np.sqrt(np.mean(relative**2, axis=0))
+    return scale
+
+
+def _name(channel: int, outputs: int) -> str:
+    return f"output {channel}" if channel < outputs else f"input {channel - outputs}"
+
+
+def _refuse_clipped(output: FloatArray, number: int) -> None:
+    """Refuse an output that stays at its largest or smallest value longer than a swing does.
+
+    A sine of amplitude a, read in steps of q, is in the last step before its peak for
+    sqrt(2 q / a) / pi of the time or less, and waves that differ from one another for less. The
+    step is seen in the values themselves.
+    """
+    values, counts = np.unique(output, return_counts=True)
+    # a low quantile: values that were seldom reached leave wider gaps, rounding narrower ones
+    step = float(np.quantile(np.diff(values), 0.1))
+    turning = 2 * np.sqrt(4 * step / (values[-1] - values[0])) / np.pi  # twice: peaks may be flat
+    for index, word in ((-1, "largest"), (0, "smallest")):
+        share = counts[index] / len(output)
+        if counts[index] >= _FEWEST and share > max(_CLIPPED, turning):
+            raise IdentificationError(
+                f"output {number} stays at its {word} value in {share:.1%} of the samples: its "
+                "sensor is clipped or stuck; widen its range, give weaker pulses, or mark those "
+                "samples as gaps (NaN)"
+            )
