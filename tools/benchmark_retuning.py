@@ -210,6 +210,8 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=8, help="half of them with retuning")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
+    if arguments.turns < 2:
+        parser.error("--turns must be 2 or more: one with retuning and one without")
     scenario = load_config(SCENARIO, Scenario)
     sums = {"without": LoopStatistics(), "with": LoopStatistics()}
     swaps, steepest = 0, 0.0

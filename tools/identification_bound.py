@@ -17,14 +17,17 @@ from collections.abc import Callable
 
 import control
 import numpy as np
-from benchmark_identification import (
+from peers.identification_records import (
+    MEASURED,
     SAMPLE_TIME_S,
     SEAS,
     SHIP,
     TANK,
+    Matrices,
     record,
     respond,
     response,
+    response_error,
     sampled_plant,
 )
 from scipy.signal import dlsim
@@ -41,9 +44,7 @@ ORDER = 120
 NOISE_ORDER, NOISE_SAMPLES = 40, 25_000
 NOISE = 0.01
 STEP = 1e-5
-MEASURED = ("roll_rad", "level_m")
 
-Matrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Noise = tuple[FloatArray, FloatArray]
 """Coefficients, shape (p, 2, 2), and whitening matrix of an autoregression."""
 
@@ -115,7 +116,7 @@ def bound(
     noise: Noise,
     right: FloatArray,
 ) -> FloatArray:
-    """Least relative error of each output's response, shape (2,)."""
+    """Least relative error of each output's response, shape (2,), for a model of `size` numbers."""
     alpha, whiten = noise
     slopes, moves = [], []
     for direction in STEP * np.eye(size):
@@ -167,15 +168,14 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=2500, help="of each record, 0.2 s apart")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
+    if arguments.records < 1 or arguments.samples < 1000:
+        parser.error("--records must be 1 or more and --samples 1000 or more")
     right = response(*of_physics(np.zeros(4)))
     squares: dict[str, list[FloatArray]] = {}
     for seed in range(arguments.records):
         u, y = record(arguments.samples, NOISE, sea="storm", seed=seed)
         calm = respond(u, np.zeros(len(u)))
-        errors = {
-            name: np.linalg.norm(response(*model) - right, axis=0) / np.linalg.norm(right, axis=0)
-            for name, model in found(u, y).items()
-        }
+        errors = {name: response_error(model) for name, model in found(u, y).items()}
         noise = noise_model(float(np.std(calm[:, 0])), NOISE * np.std(y, axis=0), seed)
         errors["bound, four states"] = bound(of_four_states, 28, u, noise, right)
         errors["bound, ship and tank"] = bound(of_physics, 4, u, noise, right)

@@ -26,7 +26,7 @@ from firmware_sim.run import Job, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.metrics import roll_statistics
 from utank_hil.canbus import RetuningState
-from utank_hil.config_files import load_config
+from utank_hil.config_files import ConfigError, load_config
 
 WORKERS = 2
 HEADINGS = (
@@ -149,7 +149,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", help="instead of the scenario's one")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    scenario = load_config(arguments.scenario, Scenario)
+    try:
+        scenario = load_config(arguments.scenario, Scenario)
+    except ConfigError as error:
+        parser.error(str(error))
     seeds = arguments.seeds or [scenario.seed]
     jobs = {seed: jobs_for(scenario, seed) for seed in seeds}
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:

@@ -31,3 +31,12 @@ def test_aggressive_design_is_found_out():
     failures = judge(hard).failures()
     assert any("peak sensitivity" in failure for failure in failures)
     assert any("roll period" in failure for failure in failures)
+
+
+@pytest.mark.parametrize("field", ["late_radius", "worst_radius"])
+def test_what_is_not_a_number_is_no_margin(field):
+    found = judge(GPC_ROLL)
+    assert dataclasses.replace(found, **{field: float("nan")}).failures()
+    for name in ("radius", "peak_sensitivity"):
+        nominal = dataclasses.replace(found.nominal, **{name: float("nan")})
+        assert dataclasses.replace(found, nominal=nominal).failures()

@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 DURATION_S = 30.0
 ENOUGH_S = 10.0
 HELD_UP_S = 0.3
-ATTEMPTS = 4
+ATTEMPTS = 3
 
 
 def scenario_file(folder: Path) -> Path:

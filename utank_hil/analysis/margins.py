@@ -18,6 +18,9 @@ from utank_hil.dynamics.sampling import LinearModel, sample
 if TYPE_CHECKING:
     from control import StateSpace
 
+DELAY_SAMPLES = 25
+"""Samples up to which a delay that destabilizes is looked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Margins:
@@ -37,7 +40,7 @@ class Margins:
     phase_margin_rad : float
         Least lag or lead, taken alone, that destabilizes; inf if none does.
     delay_margin_s : float
-        Least extra delay that destabilizes; inf if none up to 25 samples does.
+        Least extra delay that destabilizes; inf if none up to `DELAY_SAMPLES` samples does.
     disk_margin : float
         Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex
         abs(d) < 1, is harmless (symmetric disk); 2 is the most there is.
@@ -157,13 +160,13 @@ def _phase_margin(loop: ComplexArray) -> float:
 def _delay_margin(
     law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float, lag_s: float
 ) -> float:
-    """Search by eigenvalues: quarters of a sample up to 25 samples, then bisection to 0.1 ms."""
+    """Search by eigenvalues: by quarters of a sample, then by bisection to 0.1 ms."""
 
     def stable(extra_s: float) -> bool:
         plant = sample(system, law.sample_time_s, delay_s + extra_s, lag_s)
         return closed_loop_radius(law, plant) < 1
 
-    grid = law.sample_time_s * np.arange(1, 101) / 4
+    grid = law.sample_time_s * np.arange(1, 4 * DELAY_SAMPLES + 1) / 4
     first = next((i for i, extra_s in enumerate(grid) if not stable(extra_s)), None)
     if first is None:
         return float("inf")

@@ -42,18 +42,21 @@ class Robustness:
     worst_gain: float
 
     def failures(self) -> tuple[str, ...]:
-        """What is missing, in words; empty for a law that may be armed."""
+        """What is missing, in words; empty for a law that may be armed.
+
+        What is not a number is missing, too.
+        """
         found = []
-        if self.nominal.radius >= 1:
+        if not self.nominal.radius < 1:
             found.append(f"unstable on its own ship (eigenvalue {self.nominal.radius:.4f})")
-        if self.nominal.peak_sensitivity > PEAK_SENSITIVITY:
+        if not self.nominal.peak_sensitivity <= PEAK_SENSITIVITY:
             found.append(
                 f"peak sensitivity {self.nominal.peak_sensitivity:.2f} is above "
                 f"{PEAK_SENSITIVITY:g}"
             )
-        if self.late_radius >= 1:
+        if not self.late_radius < 1:
             found.append(f"unstable with {1e3 * EXTRA_DELAY_S:g} ms more delay")
-        if self.worst_radius >= 1:
+        if not self.worst_radius < 1:
             found.append(
                 f"unstable at {self.worst_period_scale:g} of the ship's roll period with "
                 f"{self.worst_gain:g} of the pump's gain"

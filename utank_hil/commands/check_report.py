@@ -9,16 +9,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.analysis.margins import Margins
+from utank_hil.analysis.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.commands.tables import print_table
 from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.config_laws import build_law
 from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
-
-DELAY_SAMPLES = 25
-"""Samples up to which the delay margin is searched for (`Margins.delay_margin_s`)."""
 
 NO_LOOP = "The law is nonlinear or passive: it has no margins of a linear loop."
 
