@@ -23,7 +23,8 @@ pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 DURATION_S = 30.0
 ENOUGH_S = 10.0
 HELD_UP_S = 0.3
-ATTEMPTS = 3
+QUIET_SHARE = 0.1
+ATTEMPTS = 4
 
 
 def scenario_file(folder: Path) -> Path:
@@ -52,15 +53,22 @@ def active(run: dict[str, np.ndarray]) -> slice:
     return slice(begin, begin + int(end[0]) + int(in_charge[begin + end[0]]))
 
 
+def lost_share(report: dict) -> float:
+    """Share of the last run's ticks that the machine left out."""
+    loop = report["runs"][-1]["loop"]
+    return loop["skipped"] / (loop["ticks"] + loop["skipped"])
+
+
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory):
-    """Scenario, report and recording; once more if the machine was too busy.
+    """Scenario, report and recording; the least disturbed attempt if the machine was too busy.
 
     A process that the machine holds up for longer than the drive's command timeout is a dead one
     to the drive, and the pump stays off from then on.
     """
     folder = tmp_path_factory.mktemp("bench")
     scenario = scenario_file(folder)
+    attempts = []
     for _ in range(ATTEMPTS):
         done = subprocess.run(
             [BIN / "utank-hil", "bench", scenario, "--realtime", "--bus", CHANNEL,
@@ -68,11 +76,14 @@ def bench(tmp_path_factory: pytest.TempPathFactory):
             capture_output=True, text=True, timeout=300, check=False,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
-        recording = read_recording(folder / "bench.rrd")
+        report, recording = json.loads(done.stdout), read_recording(folder / "bench.rrd")
         rows = recording["gpc"]["time_s"][active(recording["gpc"])]
-        if len(rows) and rows[-1] - rows[0] > ENOUGH_S:
+        short = len(rows) == 0 or rows[-1] - rows[0] < ENOUGH_S
+        attempts.append((short, lost_share(report), report, recording))
+        if not short and lost_share(report) < QUIET_SHARE:
             break
-    return load_config(scenario, Scenario), json.loads(done.stdout), recording
+    _, _, report, recording = min(attempts, key=lambda attempt: attempt[:2])
+    return load_config(scenario, Scenario), report, recording
 
 
 class Unwatched:
@@ -84,11 +95,6 @@ def lockstep(scenario: Scenario, index: int, arm_s: float = 0.5) -> Run:
     script = (TimedAction(arm_s, Action.ARM),)
     changed = scenario.model_copy(update={"operator": script})
     return run_lockstep(jobs_of(changed, scenario.seed, 2 * DURATION_S)[index], Unwatched())
-
-
-def loop_of(report: dict) -> str:
-    loop = report["runs"][-1]["loop"]
-    return f"{loop['overruns']} overruns, {loop['skipped']} of its ticks skipped"
 
 
 def roll_at(when_s: np.ndarray, run: Run) -> np.ndarray:
@@ -177,9 +183,7 @@ def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
     when_s = run["time_s"]
     in_charge = active(run)
     armed_s = when_s[in_charge.start]
-    assert (run["mode"] == Mode.ACTIVE).sum() > 0
-    if when_s[in_charge][-1] - armed_s < ENOUGH_S:
-        pytest.skip(f"in {ATTEMPTS} attempts the machine held every run up within {ENOUGH_S} s")
+    assert when_s[in_charge][-1] - armed_s > ENOUGH_S, f"held up in each of {ATTEMPTS} attempts"
     own = lockstep(scenario, 1)
     own_armed_s = own.column("time_s")[np.argmax(own.column("mode") == Mode.ACTIVE)]
     same = lockstep(scenario, 1, max(0.5 + armed_s - own_armed_s, 0.0))
@@ -187,10 +191,9 @@ def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
     expected = roll_at(when_s, same)
     passive = roll_at(when_s, lockstep(scenario, 0))
     error, effect = (np.sqrt(np.mean((roll - other) ** 2)) for other in (expected, passive))
-    steps_s = np.diff(run["time_s"][in_charge])
-    print(f"{steps_s.sum():.1f} s in charge, longest step {steps_s.max():.2f} s, {loop_of(report)}")
-    print(f"active: {error / effect:.2%} of what the pump does, which is {effect:.4f} rad")
+    lost = lost_share(report)
+    print(f"active: {error / effect:.2%} of what the pump does, {lost:.1%} of its ticks lost")
     assert np.std(roll) < np.std(passive)
-    # noise falls on other samples, the law samples at another phase, and where processes share one
-    # busy processor measurements and commands are late: worth a tenth then, a hundredth else
-    assert error < effect / 3
+    # noise falls on other samples and the law samples at another phase: a hundredth; what ticks are
+    # lost, measurements and commands are late
+    assert error < (1 / 4 + 2 * lost) * effect
