@@ -26,6 +26,7 @@ with quietly_interruptible():
         LoopStatistics,
         Node,
         RealTimeLoop,
+        heard_by,
         real_time_scheduling,
         stop_on_signals,
     )
@@ -55,22 +56,21 @@ def firmware_sim(
     """
     loaded = load(scenario, Scenario)
     length_s = loaded.duration_s if duration is None else duration
+    statistics = LoopStatistics()
+    ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
+    table = Table(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
+    nodes: list[Node] = [*ship.nodes] if operator else [ship.sensors, ship.drive]
+    nodes.append(TruthRecorder(ship.plant, table, RECORD_NS))
     try:
-        port = SocketCanPort(bus)
+        port = SocketCanPort(bus, heard_by(nodes))
     except OSError as error:
         fail(error)
-    statistics = LoopStatistics()
     try:
-        ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
-        table = Table(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
-        nodes: list[Node] = [*ship.nodes] if operator else [ship.sensors, ship.drive]
         with stop_on_signals() as stop, real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
             notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
-            RealTimeLoop(
-                [*nodes, TruthRecorder(ship.plant, table, RECORD_NS)], port, statistics=statistics
-            ).run(stop, round(length_s * SECOND_NS))
+            RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
     finally:
         port.close()
     rows = table.rows

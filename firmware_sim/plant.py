@@ -46,7 +46,7 @@ class Plant:
         self._change_ns: int | None = None
         self._area_m2 = tank.reservoir_area_m2
         self._pump = pump
-        self._coefficients = pump.coefficients
+        self._coefficients = tuple(pump.coefficients)
         self._weights = kernel.interpolation_weights()
         frequency, phase = wave_moment.frequency_rad_s, wave_moment.phase_rad
         self._rotations = np.exp(1j * frequency * kernel.TICK_S)

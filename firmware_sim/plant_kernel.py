@@ -45,7 +45,7 @@ def interpolation_weights() -> FloatArray:
 def advance_tick(
     state: FloatArray,
     model: FloatArray,
-    coefficients: PumpCoefficients,
+    coefficients: tuple[float, ...],
     phasors: ComplexArray,
     rotations: ComplexArray,
     weights: FloatArray,
@@ -58,12 +58,14 @@ def advance_tick(
     model : ndarray, shape (4, 7)
         Columns: state matrix, effect of pressure, effect of wave moment, and in its first row the
         tank area that turns the level's rate into flow.
-    coefficients : PumpCoefficients
+    coefficients : tuple of float
+        `PumpCoefficients` as a plain tuple: a named one takes numba 2 us to take in.
     phasors, rotations : ndarray, shape (n,)
         Wave components two ticks ahead, and their turn in one tick; `phasors` moves on.
     weights : ndarray
         From `interpolation_weights`.
     """
+    pump_coefficients = PumpCoefficients(*coefficients)
     pump = PumpState(
         state[SPEED],
         state[REFERENCE],
@@ -80,9 +82,9 @@ def advance_tick(
     for step in range(STEPS):
         flow_m3_s = model[0, 6] * x[3]
         if state[ENABLED] > 0.5:
-            pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, coefficients)
+            pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, pump_coefficients)
         else:
-            pump = pump_coast(pump, flow_m3_s, STEP_S, coefficients)
+            pump = pump_coast(pump, flow_m3_s, STEP_S, pump_coefficients)
         energy_j += pump.power_w * STEP_S
         middle = _interpolated(weights, 2 * step + 1, moments)
         last = _interpolated(weights, 2 * step + 2, moments)

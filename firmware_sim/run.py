@@ -23,6 +23,7 @@ from utank_hil.runtime import (
     RealTimeLoop,
     SchedulingReport,
     SimulatedBus,
+    heard_by,
     real_time_scheduling,
 )
 from utank_hil.runtime.assembly import build_controller_node
@@ -278,7 +279,7 @@ def _run_loop(
     watch: Watch,
     begin_ns: Callable[[], int] | None = None,
 ) -> LoopResult:
-    port = None if channel is None else SocketCanPort(channel)
+    port = None if channel is None else SocketCanPort(channel, heard_by(nodes))
     loop = RealTimeLoop(nodes, port, statistics=statistics)
     tick_s = TICK_NS / SECOND_NS
 

@@ -5,7 +5,7 @@ from utank_hil.runtime.clock import Clock, MonotonicClock
 from utank_hil.runtime.errors import NodeError
 from utank_hil.runtime.hooks import LinkObserver, Stoppable
 from utank_hil.runtime.lockstep import Lockstep
-from utank_hil.runtime.node import Node
+from utank_hil.runtime.node import Node, heard_by
 from utank_hil.runtime.realtime import RealTimeLoop
 from utank_hil.runtime.scheduling import SchedulingReport, real_time_scheduling
 from utank_hil.runtime.statistics import Histogram, LoopStatistics
@@ -27,6 +27,7 @@ __all__ = [
     "SimulatedBus",
     "Stoppable",
     "frame_bits",
+    "heard_by",
     "real_time_scheduling",
     "stop_on_signals",
 ]

@@ -87,6 +87,7 @@ class OperatorPanel:
     ) -> None:
         self._sender = catalogue.transmitter(OperatorCommand)
         self._listener = catalogue.receiver(ControllerStatus)
+        self.hears = frozenset([self._listener.can_id])
         self._housekeeping = Housekeeping(Address.OPERATOR, catalogue, configuration_version)
         self._script = sorted(script, key=lambda timed: timed.time_s, reverse=True)
         self._start_ns: int | None = None
