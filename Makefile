@@ -10,13 +10,14 @@ COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 
 # the matrices here are small: threads of the linear-algebra library only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help setup bench test test-fast check format benchmark peers docs lock clean
+.PHONY: help setup bench test test-fast test-quiet check format benchmark peers docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
 	@echo "make test       lint, types and all tests, those on a real CAN bus included"
 	@echo "make test-fast  the tests that take seconds, without CAN"
+	@echo "make test-quiet retuning on a real CAN bus, for a machine with nothing else to do"
 	@echo "make check      lint, format, strict types, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
 	@echo "make peers      the environment of those packages, 480 MB, for tools/compare_*.py"
@@ -48,7 +49,10 @@ check: setup
 
 test: check
 	$(VENV)/bin/pytest -m "not socketcan"
-	tools/vcan $(VENV)/bin/pytest -m socketcan tests/socketcan
+	tools/vcan $(VENV)/bin/pytest -m "socketcan and not quiet_machine" tests/socketcan
+
+test-quiet: setup
+	tools/vcan $(VENV)/bin/pytest -m quiet_machine tests/socketcan
 
 test-fast: setup
 	$(VENV)/bin/pytest -m "not socketcan and not slow"

@@ -8,6 +8,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 from rich.console import Console
@@ -106,6 +107,8 @@ def run_shown(trials: Sequence[Trial]) -> list[dict[str, TrialFigures]]:
             return run_trials(trials, lambda done: bar.update(task, completed=done))
         except KeyboardInterrupt:
             sys.exit("interrupted")
+        except BrokenProcessPool:
+            sys.exit("a process of the trials was ended from outside: run the command again")
 
 
 def table_console() -> Console:
