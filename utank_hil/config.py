@@ -6,6 +6,7 @@ is the parameter of the same name.
 
 import hashlib
 import json
+import warnings
 from dataclasses import asdict
 from typing import Annotated, Any, Final
 
@@ -196,14 +197,16 @@ class ControllerConfig(Section):
             reason = f"must be a whole number of ticks of {TICK_S:g} s, got {period_s:g}"
             return [(f"law.{name}", reason)]
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                # an equation that was solved for another matrix than the one given
+                warnings.simplefilter("error", RuntimeWarning)
                 linear = build_law(self.law, self.vessel, self.delay_s, self.limits).linear
                 sound = linear is None or all(
                     np.isfinite(matrix).all() for matrix in linear.matrices()[:4]
                 )
         except ParameterError as error:
             return [(f"law.{name}", reason) for name, reason in error.problems]
-        except (ValueError, ArithmeticError) as error:
+        except (ValueError, ArithmeticError, RuntimeWarning) as error:
             return [("law", f"can't be designed for this vessel: {error}")]
         if not sound:
             return [("law", "gives no finite law: its weights or noises are beyond all scale")]
