@@ -10,7 +10,7 @@ COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 
 # the matrices here are small: threads of the linear-algebra library only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help setup bench test test-fast test-quiet check format benchmark peers docs lock clean
+.PHONY: help setup bench test test-fast test-quiet search check format benchmark peers docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -18,6 +18,7 @@ help:
 	@echo "make test       lint, types and all tests, those on a real CAN bus included"
 	@echo "make test-fast  the tests that take seconds, without CAN"
 	@echo "make test-quiet retuning on a real CAN bus, for a machine with nothing else to do"
+	@echo "make search     the property tests with new random examples, until one fails or they end"
 	@echo "make check      lint, format, strict types, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
 	@echo "make peers      the environment of those packages, 480 MB, for tools/compare_*.py"
@@ -56,6 +57,10 @@ test-quiet: setup
 
 test-fast: setup
 	$(VENV)/bin/pytest -m "not socketcan and not slow"
+
+# in `make test` they draw the same examples each time
+search: setup
+	$(VENV)/bin/pytest -m "not socketcan" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
 
 format: setup
 	$(VENV)/bin/ruff check --fix .

@@ -29,8 +29,9 @@ def test_sine_has_the_textbook_figures(
     assert statistics.maximum_rad == pytest.approx(amplitude, rel=2e-3)
     assert statistics.significant_rad == pytest.approx(amplitude, rel=2e-3)
     # significant amplitude is of the motion about its mean; RMS is of the angle itself
+    # (rounding of the mean decides which of the waves at the ends are whole)
     shifted = roll_statistics(signal + mean)
-    assert shifted.significant_rad == pytest.approx(statistics.significant_rad, rel=1e-6)
+    assert shifted.significant_rad == pytest.approx(statistics.significant_rad, rel=2e-3)
     assert shifted.rms_rad == pytest.approx(math.hypot(amplitude / math.sqrt(2), mean), rel=1e-6)
 
 

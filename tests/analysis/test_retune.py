@@ -121,7 +121,7 @@ def _with(record: FloatArray, rows: slice, value: float) -> FloatArray:
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(max_examples=60, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=60, phases=(Phase.explicit, Phase.generate))
 @given(
     period=st.integers(1, 40).flatmap(
         lambda rows: arrays(np.float64, (rows, 3), elements=FINITE, fill=FINITE)
@@ -179,7 +179,7 @@ KINDS = (
 
 @pytest.mark.slow
 # a failing record takes minutes to shrink and says no more when it is small
-@settings(max_examples=60, deadline=None, phases=(Phase.explicit, Phase.generate))
+@settings(max_examples=60, phases=(Phase.explicit, Phase.generate))
 @given(
     kind=st.sampled_from(KINDS),
     at=st.floats(0.0, 1.0),

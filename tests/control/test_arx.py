@@ -31,7 +31,7 @@ def respond(system, x, u):
     return np.array(y)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     states=st.integers(1, 6),
@@ -78,7 +78,7 @@ def test_continuous_model_is_refused():
         ARX.from_state_space(control.ss(-1, 1, 1, 0), 1)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     order=st.integers(1, 5),

@@ -31,7 +31,7 @@ def respond(arx, u, y, newest_u):
     return now
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), order=st.integers(1, 5), targeted=st.booleans())
 def test_without_active_limits_it_is_the_analytic_law(seed, order, targeted):
     rng = np.random.default_rng(seed)
@@ -171,7 +171,6 @@ def saturating(iteration_limit=100) -> ConstrainedController:
     ),
     st.integers(1, 50),
 )
-@settings(deadline=None)
 def test_pressure_and_rate_hold_for_any_measurement_and_budget(sequence, budget):
     controller = saturating(budget)
     last = 0.0

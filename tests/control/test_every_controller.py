@@ -175,7 +175,7 @@ def test_answer_is_one_command_of_the_caller_s_own(name):
 
 
 @every_law
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(
         st.lists(st.floats(-1e6, 1e6), min_size=4, max_size=4).map(np.array),

@@ -4,7 +4,7 @@ import math
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.dynamics.pump import (
@@ -181,7 +181,6 @@ def test_integral_takes_out_what_the_feed_forward_has_wrong():
     assert states[-1].integral_pa == pytest.approx(0.0, abs=50.0)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-1e6, 1e6), rated_flows), min_size=1, max_size=60),
     st.sampled_from([0.001, 0.005, 0.01, 0.02]),

@@ -85,7 +85,7 @@ def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
         return None
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(spoiled(), st.integers(1, 30))
 def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) -> None:
     result = model_of(*record, order)
@@ -95,7 +95,7 @@ def test_okid_ends_in_a_finite_model_or_a_refusal(record: Record, order: int) ->
         assert np.isfinite(result.residual_covariance).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(spoiled(), st.integers(1, 12), st.integers(1, 40))
 @example((np.array([0.0, 0, 0, 1, 0, 1e-295, 0])[:, None], np.eye(7)[:, 5:6]), 1, 1)
 def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lags: int) -> None:
@@ -118,7 +118,7 @@ def test_validation_ends_in_figures_or_a_refusal(record: Record, order: int, lag
         assert ((probability >= 0) & (probability <= 1)).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(spoiled(), st.integers(3, 20))
 def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int) -> None:
     result = model_of(*record, order)
@@ -136,7 +136,7 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
     assert np.isfinite(known.modes.frequency_rad_s).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     arrays(
         np.float64,
@@ -156,7 +156,7 @@ def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
             assert np.isfinite(matrix).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(spoiled())
 def test_waves_are_looked_for_in_any_record(record: Record) -> None:
     try:
@@ -167,7 +167,7 @@ def test_waves_are_looked_for_in_any_record(record: Record) -> None:
     assert all(0 < line < 3 for line in lines)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(spoiled())
 def test_tracking_stays_finite_and_goes_on_afterwards(record: Record) -> None:
     u, y = record

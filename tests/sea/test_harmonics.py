@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.sea import Harmonics, Sea, jonswap
@@ -28,7 +28,6 @@ def test_direct_sum_does_not_depend_on_how_it_is_cut(elevation):
 
 
 @given(st.integers(0, 300), st.floats(1e-3, 10.0), st.floats(-100, 4000))
-@settings(deadline=None)
 def test_series_is_the_direct_sum_on_any_grid(elevation, count, step, start):
     times = start + step * np.arange(count)
     assert (

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -28,21 +28,18 @@ def integral(density, peak):
     )
 
 
-@settings(deadline=None)
 @given(heights, periods, st.floats(1.0, 7.0))
 def test_jonswap_integrates_to_the_significant_height_exactly(hs, tp, gamma):
     m0 = integral(lambda omega: jonswap_density(omega, hs, tp, gamma), 2 * math.pi / tp)
     assert 4 * math.sqrt(m0) == pytest.approx(hs, rel=1e-10)
 
 
-@settings(deadline=None)
 @given(heights, periods)
 def test_ittc_integrates_to_the_significant_height_exactly(hs, tp):
     m0 = integral(lambda omega: ittc_density(omega, hs, tp), 2 * math.pi / tp)
     assert 4 * math.sqrt(m0) == pytest.approx(hs, rel=1e-10)
 
 
-@settings(deadline=None)
 @given(heights)
 def test_pierson_moskowitz_is_the_printed_formula_and_integrates_to_its_height(hs):
     g = 9.80665
