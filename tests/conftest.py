@@ -5,7 +5,7 @@ from hypothesis import settings
 import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads
 
 # machines are shared: an example that takes long says nothing about the code
-settings.register_profile("search", print_blob=True)
+settings.register_profile("search", deadline=None, print_blob=True)
 # the same examples each time: what lands is not left to chance; `make search` draws new ones
 settings.register_profile("same", settings.get_profile("search"), derandomize=True)
 settings.load_profile("same")
