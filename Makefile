@@ -2,6 +2,8 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
+# a worker on each core; a file's tests stay together, for their fixtures
+PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -49,18 +51,18 @@ check: setup
 	$(PYTHON) tools/document_catalogue.py --check
 
 test: check
-	$(VENV)/bin/pytest -m "not socketcan"
+	$(PARALLEL) -m "not socketcan"
 	tools/vcan $(VENV)/bin/pytest -m "socketcan and not quiet_machine" tests/socketcan
 
 test-quiet: setup
 	tools/vcan $(VENV)/bin/pytest -m quiet_machine tests/socketcan
 
 test-fast: setup
-	$(VENV)/bin/pytest -m "not socketcan and not slow"
+	$(PARALLEL) -m "not socketcan and not slow"
 
 # in `make test` they draw the same examples each time
 search: setup
-	$(VENV)/bin/pytest -m "not socketcan" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
+	$(PARALLEL) -m "not socketcan" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
 
 format: setup
 	$(VENV)/bin/ruff check --fix .
