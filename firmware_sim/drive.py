@@ -6,7 +6,8 @@ with the last one), and refuses a command outside its own limits, whatever the c
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 from firmware_sim.drive_states import DriveStates
 from firmware_sim.plant import Plant
@@ -21,6 +22,7 @@ from utank_hil.canbus import (
     Frame,
     PumpCommand,
 )
+from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 
 NANOSECONDS = 1e-9
@@ -48,25 +50,24 @@ class DriveLimits:
     pressure_rate_pa_s : float
         Largest change of the set-point away from zero.
     longest_timeout_ms : float
-        Longest command timeout the drive agrees to.
+        Longest command timeout the drive agrees to, 100 at most: so long after the last command
+        the safety manual has a dead controller's pressure on its way to zero.
     bus_voltage_v : float
-        Direct-current bus the drive feeds from.
+        Direct-current bus the drive feeds from; 4 to 1000, what DRIVE_STATUS_2 can tell.
 
     Raises
     ------
     ValueError
-        If a limit is not positive.
+        If a limit is out of its range.
     """
 
-    pressure_pa: float = 50e3
-    pressure_rate_pa_s: float = 250e3
-    longest_timeout_ms: float = 100.0
-    bus_voltage_v: float = 1000.0
+    pressure_pa: Positive = 50e3
+    pressure_rate_pa_s: Positive = 250e3
+    longest_timeout_ms: Annotated[float, Range(above=0, most=100)] = 100.0
+    bus_voltage_v: Annotated[float, Range(least=4, most=1000)] = 1000.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) > 0:
-                raise ValueError(f"drive {field.name} must be positive")
+        refuse("drive", range_problems(self))
 
 
 class PumpDrive:

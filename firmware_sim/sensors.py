@@ -2,7 +2,8 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
+from utank_hil.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 
 MOTION_PERIOD_NS = 10_000_000
@@ -36,7 +38,8 @@ class SensorErrors:
     roll_noise_rad, roll_rate_noise_rad_s : float
         Noise of the motion sensor.
     motion_delay_ms : float
-        Age of the motion sensor's sample when it is sent, a whole number of its 10 ms cycles.
+        Age of the motion sensor's sample when it is sent, a whole number of its 10 ms cycles; a
+        second at most, the longest delay that a law can be designed for.
     level_noise_m : float
         Noise of each level gauge.
     pressure_noise_pa : float
@@ -47,24 +50,22 @@ class SensorErrors:
     Raises
     ------
     ValueError
-        If a noise is negative, or the delay no whole number of cycles.
+        If a value is out of its range, or the delay no whole number of cycles.
     """
 
-    roll_noise_rad: float = 2e-4
-    roll_rate_noise_rad_s: float = 5e-4
-    motion_delay_ms: float = 20.0
-    level_noise_m: float = 0.005
-    pressure_noise_pa: float = 100.0
-    high_level_m: float = 4.6
+    roll_noise_rad: NotNegative = 2e-4
+    roll_rate_noise_rad_s: NotNegative = 5e-4
+    motion_delay_ms: Annotated[float, Range(least=0, most=1000)] = 20.0
+    level_noise_m: NotNegative = 0.005
+    pressure_noise_pa: NotNegative = 100.0
+    high_level_m: Positive = 4.6
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if not getattr(self, field.name) >= 0:
-                raise ValueError(f"sensors {field.name} must be zero or more")
-        if self.motion_delay_ms * 1_000_000 % MOTION_PERIOD_NS:
-            raise ValueError(
-                f"sensors motion_delay_ms must be a multiple of 10, got {self.motion_delay_ms}"
-            )
+        problems = range_problems(self)
+        if not problems and self.motion_delay_ms * 1_000_000 % MOTION_PERIOD_NS:
+            reason = f"must be a multiple of 10, got {self.motion_delay_ms}"
+            problems.append(("motion_delay_ms", reason))
+        refuse("sensors", problems)
 
 
 def _standard_normal(seed: int) -> Iterator[float]:

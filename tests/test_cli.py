@@ -110,9 +110,12 @@ def test_check_lists_every_error_with_file_key_and_reason(tmp_path: Path) -> Non
     [
         ("limits: {pressure_pa: 60000.0}", "the vessel's pump gives 50000 at most"),
         ("limits: {level_m: 6.0}", "the vessel's tank is full or empty at 4.88"),
-        ("safety: {motion_age_ms: -1.0}", "motion_age_ms must be positive"),
+        ("safety: {motion_age_ms: -1.0}", "safety.motion_age_ms: must be above 0"),
         ("safety: {motion_age_ms: .inf}", "finite"),
-        ("safety: {bus_load_limit: 80.0}", "bus_load_limit must be 1 at most"),
+        (
+            "safety: {bus_load_limit: 80.0}",
+            "safety.bus_load_limit: must be above 0 and at most 0.85",
+        ),
         ("command_timeout_ms: 500", "100"),
         ("bit_rate: '[/oops] [red]'", "[/oops] [red]"),
     ],

@@ -1,5 +1,6 @@
 """The configuration files of the project are fit to be used."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ from firmware_sim.sensors import SensorErrors
 from utank_hil.canbus import Mode
 from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.config_files import load_config
-from utank_hil.config_laws import LQGLaw
+from utank_hil.config_laws import LQGLaw, RobustFuzzyLaw, build_law
 from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
+from utank_hil.dynamics.linear import STATES
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.panel import Action, TimedAction
@@ -101,3 +103,14 @@ def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
     passive = roll_rms_rad(scenario, None, 400)
     for config in scenario.controllers.values():
         assert roll_rms_rad(scenario, config, 400) < (1 - below) * passive
+
+
+@pytest.mark.parametrize("inputs", [2, 3, 4])
+def test_fuzzy_law_measures_what_it_has_ranges_for(inputs: int) -> None:
+    config = load_config(CONFIGS / "controllers" / "fuzzy_robust.yaml", ControllerConfig)
+    assert isinstance(config.law, RobustFuzzyLaw)
+    design = replace(config.law.design, ranges=config.law.design.ranges[:inputs])
+    law = config.law.model_copy(update={"design": design})
+    built = build_law(law, config.vessel, config.delay_s, config.limits)
+    assert built.measured == STATES[:inputs]
+    assert built.controller.step(np.full(inputs, 0.1)).shape == (1,)

@@ -3,14 +3,17 @@
 import math
 import pickle
 import re
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from firmware_sim.scenario import Scenario
+from utank_hil.config import ControllerConfig, Vessel
 from utank_hil.parameters import (
     NotNegative,
     ParameterError,
@@ -31,6 +34,8 @@ class Thing:
     roof: Annotated[float, Range(above=0, infinite=True)] = math.inf
     stds: tuple[Positive, ...] = ()
     hold: tuple[Positive, Positive] | None = None
+    every: Positive | None = None
+    gain: Annotated[float, Range(above=0, below=1)] = 0.5
 
     def __post_init__(self) -> None:
         refuse("thing", range_problems(self))
@@ -38,7 +43,7 @@ class Thing:
 
 def test_every_parameter_out_of_its_range_is_named() -> None:
     with pytest.raises(ParameterError) as caught:
-        Thing(-1.0, -2.0, 1.5, 10, 0.0, (1.0, math.nan), (1.0, 0.0))
+        Thing(-1.0, -2.0, 1.5, 10, 0.0, (1.0, math.nan), (1.0, 0.0), 0.0, 1.0)
     assert dict(caught.value.problems) == {
         "size": "must be positive and finite, got -1.0",
         "loss": "must be zero or more and finite, got -2.0",
@@ -47,6 +52,8 @@ def test_every_parameter_out_of_its_range_is_named() -> None:
         "roof": "must be positive, got 0.0",
         "stds": "must be positive and finite, got (1.0, nan)",
         "hold": "must be positive and finite, got (1.0, 0.0)",
+        "every": "must be positive and finite, got 0.0",
+        "gain": "must be above 0 and below 1, got 1.0",
     }
     assert str(caught.value).startswith("thing size must be positive and finite, got -1.0; ")
 
@@ -60,7 +67,15 @@ def test_error_survives_the_way_from_another_process() -> None:
 @given(
     st.floats(),
     st.sampled_from(
-        [Range(), Range(above=0), Range(least=0, most=1), Range(above=0, infinite=True)]
+        [
+            Range(),
+            Range(above=0),
+            Range(least=0, most=1),
+            Range(above=0, below=1),
+            Range(least=0, below=1),
+            Range(below=1),
+            Range(above=0, infinite=True),
+        ]
     ),
 )
 def test_files_and_code_agree_on_what_a_range_holds(value: float, mark: Range) -> None:
@@ -74,3 +89,63 @@ def test_files_and_code_agree_on_what_a_range_holds(value: float, mark: Range) -
 
 def test_number_of_hundreds_of_digits_is_in_no_range() -> None:
     assert not Range().holds(10**400)
+
+
+@pytest.mark.parametrize(
+    ("mark", "demand"),
+    [
+        (Range(least=1, most=9), "must be 1 to 9"),
+        (Range(above=0, most=9), "must be above 0 and at most 9"),
+        (Range(least=1, below=9), "must be 1 or more and below 9"),
+        (Range(most=9), "must be at most 9"),
+        (Range(below=9), "must be below 9"),
+        (Range(above=2), "must be above 2 and finite"),
+    ],
+)
+def test_demand_says_which_ends_are_allowed(mark: Range, demand: str) -> None:
+    assert mark.demand == demand
+
+
+def parts(hint: Any) -> Iterator[Any]:
+    """An annotation and everything in it."""
+    yield hint
+    for inner in get_args(hint):
+        yield from parts(inner)
+
+
+def dataclasses_in(model: type, found: set[type]) -> set[type]:
+    """The dataclasses that a section of a configuration file may hold."""
+    if issubclass(model, BaseModel):
+        hints = [field.annotation for field in model.model_fields.values()]
+    else:
+        found.add(model)
+        hints = list(get_type_hints(model).values())
+    for hint in hints:
+        for part in parts(hint):
+            known = isinstance(part, type) and part not in found
+            if known and (is_dataclass(part) or issubclass(part, BaseModel)):
+                dataclasses_in(part, found)
+    return found
+
+
+def bare_numbers(hint: Any) -> bool:
+    """Whether an annotation has a number in it without a range."""
+    if get_origin(hint) is Annotated and any(isinstance(mark, Range) for mark in get_args(hint)):
+        return False
+    return hint in (int, float) or any(map(bare_numbers, get_args(hint)))
+
+
+def test_every_number_of_a_file_s_dataclasses_has_its_range() -> None:
+    owners: set[type] = set()
+    for model in (Vessel, ControllerConfig, Scenario):
+        dataclasses_in(model, owners)
+    assert {"SafetyLimits", "RetuningSettings", "DriveLimits", "SensorErrors", "TimedAction",
+            "SeaModel", "EffectiveSlope", "ErrorDynamics", "IndirectFuzzy", "Pump",
+            } <= {owner.__name__ for owner in owners}  # fmt: skip
+    bare = set()
+    for owner in owners:
+        hints = get_type_hints(owner, include_extras=True)
+        names = [field.name for field in fields(owner) if field.init]
+        bare |= {f"{owner.__name__}.{name}" for name in names if bare_numbers(hints[name])}
+    told_by_other_rules = {"knots", "displacement_n", "gz_step_rad"}
+    assert {name.partition(".")[2] for name in bare} == told_by_other_rules

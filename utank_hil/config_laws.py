@@ -176,4 +176,5 @@ def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) ->
             )
             return BuiltLaw(plan.controller(), STATES)
         case _:
-            return BuiltLaw(law.design.controller(), STATES)
+            design = law.design
+            return BuiltLaw(design.controller(), STATES[: len(design.ranges)])

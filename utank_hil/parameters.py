@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -47,8 +47,8 @@ class Range:
     ----------
     least, most : float
         Bounds, themselves allowed.
-    above : float, optional
-        Bound that is not itself allowed, instead of `least`.
+    above, below : float, optional
+        Bounds that are not themselves allowed, instead of `least` and `most`.
     infinite : bool
         Whether infinity is a value, for limits that need not be there.
     """
@@ -56,6 +56,7 @@ class Range:
     least: float = -math.inf
     most: float = math.inf
     above: float | None = None
+    below: float | None = None
     infinite: bool = False
 
     def holds(self, value: float) -> bool:
@@ -67,15 +68,14 @@ class Range:
         if not (self.infinite or math.isfinite(value)):
             return False
         low = value >= self.least if self.above is None else value > self.above
-        return low and value <= self.most
+        high = value <= self.most if self.below is None else value < self.below
+        return low and high
 
     @property
     def demand(self) -> str:
         """What a value must be, in words."""
-        if self.most < math.inf:
-            if self.above is not None:
-                return f"must be above {self.above:g} and at most {self.most:g}"
-            return f"must be {self.least:g} to {self.most:g}"
+        if self.below is not None or self.most < math.inf:
+            return f"must be {self._between}"
         if self.above == 0:
             low = "positive"
         elif self.above is not None:
@@ -87,6 +87,18 @@ class Range:
         else:
             return "must be finite"
         return f"must be {low}" if self.infinite else f"must be {low} and finite"
+
+    @property
+    def _between(self) -> str:
+        """The two ends of a range that has an upper one, in words."""
+        high = f"at most {self.most:g}" if self.below is None else f"below {self.below:g}"
+        if self.above is not None:
+            return f"above {self.above:g} and {high}"
+        if self.least == -math.inf:
+            return high
+        if self.below is None:
+            return f"{self.least:g} to {self.most:g}"
+        return f"{self.least:g} or more and {high}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Let configuration files check the field as they read it."""
@@ -145,6 +157,6 @@ def _missed(hint: Any, value: Any) -> str | None:
         parts = [(arguments[0], item) for item in value]
     elif origin is tuple:
         parts = list(zip(arguments, value, strict=False))
-    elif origin is UnionType and value is not None:
+    elif origin in (Union, UnionType) and value is not None:
         parts = [(inner, value) for inner in arguments if inner is not NoneType]
     return next((demand for demand in (_missed(*part) for part in parts) if demand), None)

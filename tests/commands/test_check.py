@@ -12,6 +12,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
+from wrong_values import WRONG
 
 from firmware_sim.assembly import build_ship_side
 from firmware_sim.scenario import Scenario
@@ -89,50 +90,6 @@ def scenario(folder: Path, path: Path) -> Path:
     return file
 
 
-WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
-    ("gpc", {"law__prediction_horizon": 5},
-     {"law.control_horizon": "must be prediction_horizon at most, got 58 and 5"}),
-    ("gpc", {"law__control_horizon": 400_000}, {"law.control_horizon": "must be 1 to 1000"}),
-    ("gpc", {"law__first_output": 71}, {"law.first_output": "must be below prediction_horizon"}),
-    ("gpc", {"law__output_weight": None}, {"law.output_weight": "GPC needs an output_weight"}),
-    ("gpc", {"law__output_weight": [1.0, 2.0]},
-     {"law.output_weight": "must have one value per measured output"}),
-    ("gpc", {"law__washout_rad_s": -0.02}, {"law.washout_rad_s": "must be zero or more"}),
-    ("gpc", {"law__predictor__order": 1_000_000}, {"law.predictor.order": "must be 1 to 500"}),
-    ("gpc", {"law__predictor__sample_time_s": 0.013},
-     {"law.predictor.sample_time_s": "must be a whole number of ticks of 0.01 s"}),
-    ("gpc", {"law__predictor__measured": ["yaw_rad"]},
-     {"law.predictor.measured": "must name outputs among roll_rad, "}),
-    ("gpc", {"law__predictor__pressure_noise_pa_rt_s": 1e250},
-     {"law": "can't be designed for this vessel: "}),
-    ("gpc", {"law__predictor__order": -1, "law__control_horizon": -3, "law__output_weight": [-1.0]},
-     {"law.predictor.order": "(got -1)", "law.control_horizon": "(got -3)",
-      "law.output_weight.0": "(got -1.0)"}),
-    ("dpc", {"law__prediction_horizon": 57},
-     {"law.control_horizon": "must be below prediction_horizon"}),
-    ("lqg", {"law__design__state_weight": [1.0]}, {"law.design.state_weight": "must have 4"}),
-    ("constrained_gpc", {"law__knots": [0, 3, 3]}, {"law.knots": "must increase from 0"}),
-    ("constrained_gpc", {"limits__level_m": 0.1}, {"law": "leaves nothing of the level limit"}),
-    ("feedback_linearization", {"law__frequency_rad_s": -1},
-     {"law.frequency_rad_s": "must be positive"}),
-    ("feedback_linearization", {"law__soft_level_m": 4.0},
-     {"law.soft_level_m": "must be below hard_level_m"}),
-    ("feedback_linearization", {"law__shift_rad_m": 5.0, "law__shift_length_m": 1.0},
-     {"law.shift_rad_m": "loses its grip"}),
-    ("stimulate", {"law__period_s": -1}, {"law.period_s": "must be positive"}),
-    ("stimulate", {"law__roll_limit_rad": 0.05}, {"law.amplitude_rad": "below roll_limit_rad"}),
-    ("stimulate", {"law__period_s": 4.0}, {"law.amplitude_rad": "nearer to the natural period"}),
-    ("gpc", {"bit_rate": 300_000}, {"bit_rate": "must divide 1e9"}),
-    ("gpc", {"limits__pressure_pa": 60e3, "limits__level_m": 6.0},
-     {"limits.pressure_pa": "set it to 50000 or less", "limits.level_m": "set it to 4.88 or less"}),
-    ("gpc", {"limits__pressure": 60e3}, {"limits.pressure": "did you mean pressure_pa?"}),
-    ("gpc", {"law__predictor__ordr": 3}, {"law.predictor.ordr": "did you mean order?"}),
-    ("adaptive_gpc", {"retuning__order": 2000, "retuning__pulse_hold_s": [3.0, 0.6]},
-     {"retuning.order": "must be 500 at most", "retuning.pulse_hold_s": "must rise",
-      "retuning.identification_s": "must be 800"}),
-]  # fmt: skip
-
-
 @pytest.mark.parametrize(("shipped", "changes", "expected"), WRONG, ids=lambda v: str(v)[:50])
 def test_wrong_value_is_told_with_file_key_and_reason_by_check_bench_and_run(
     tmp_path: Path, shipped: str, changes: dict[str, object], expected: dict[str, str]
@@ -145,6 +102,33 @@ def test_wrong_value_is_told_with_file_key_and_reason_by_check_bench_and_run(
         assert reason in reasons[key]
     assert told(invoke("run", path, "--bus", "nowhere0")) == errors
     assert told(invoke("bench", scenario(tmp_path, path), "--out", tmp_path)) == errors
+
+
+def test_every_wrong_value_of_a_scenario_s_sections_has_its_own_key(tmp_path: Path) -> None:
+    path = scenario(tmp_path, controller(tmp_path, "pd"))
+    content = yaml.safe_load(path.read_text())
+    content["sea"]["effective_slope"] = {"coefficient": -1, "depth_m": -2.0, "beam_m": "wide"}
+    content["sensors"] = {"roll_noise_rad": -1, "motion_delay_ms": 1010, "high_level_m": 0}
+    content["drive"] = {"pressure_pa": 0, "longest_timeout_ms": 60e3, "bus_voltage_v": 1500}
+    content["operator"] = [{"time_s": -1, "action": "arm"}, {"time_s": 5, "action": "amr"}]
+    path.write_text(yaml.safe_dump(content))
+    reasons = {key: reason for _, key, reason in told(invoke("check", path))}
+    expected = {
+        "sea.effective_slope.coefficient": "must be zero or more",
+        "sea.effective_slope.depth_m": "must be zero or more",
+        "sea.effective_slope.beam_m": "valid number",
+        "sensors.roll_noise_rad": "must be zero or more",
+        "sensors.motion_delay_ms": "must be 0 to 1000",
+        "sensors.high_level_m": "must be positive",
+        "drive.pressure_pa": "must be positive",
+        "drive.longest_timeout_ms": "must be above 0 and at most 100",
+        "drive.bus_voltage_v": "must be 4 to 1000",
+        "operator.0.time_s": "must be zero or more",
+        "operator.1.action": "amr",
+    }
+    assert set(reasons) == set(expected)
+    for key, reason in expected.items():
+        assert reason in reasons[key]
 
 
 def test_missing_vessel_does_not_hide_what_else_is_wrong(tmp_path: Path) -> None:

@@ -160,12 +160,12 @@ def test_nothing_is_learnt_while_the_command_is_cut_short(law):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"gamma": 1.0}, "gamma below 1"),
+        ({"gamma": 1.0}, "gamma must be above 0 and below 1"),
         ({"rho": 0.0}, "rho"),
         ({"initial": -1.0}, "initial"),
         ({"ranges": (1.0,)}, "at least roll"),
         ({"ranges": (1.0, -1.0)}, "ranges"),
-        ({"error": ErrorDynamics(1.0, 1.0, 2.0)}, "q above 2"),
+        ({"error": ErrorDynamics(1.0, 1.0, 2.0)}, "error.q must be above 2"),
     ],
 )
 def test_parameters_out_of_range_are_refused_by_name(change, message):
@@ -185,7 +185,8 @@ def test_parameters_out_of_range_are_refused_by_name(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"gamma": 1.0}, "gamma below 1"),
+        ({"gamma": 1.0}, "gamma must be above 0 and below 1"),
+        ({"error": ErrorDynamics(1.0, 1.0, 1.0)}, "error.q must be above 1"),
         ({"epsilon": 0.0}, "epsilon"),
         ({"leakage": (1.0, 0.0)}, "leakage"),
         ({"adaptation": (np.nan, 1.0)}, "adaptation"),

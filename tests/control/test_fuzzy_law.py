@@ -39,9 +39,10 @@ def test_pressure_is_acceleration_per_nominal_gain(law):
     ("change", "message"),
     [
         ({"gain_rad_s2_pa": 0.0}, "gain_rad_s2_pa must be positive"),
-        ({"sample_time_s": np.nan}, "sample_time_s must be positive"),
+        ({"sample_time_s": np.nan}, "sample_time_s must be 0.001 to 10"),
         ({"brake_pa_s_m": -1.0}, "brake_pa_s_m must be zero or more"),
-        ({"ranges": (0.5,)}, "at least roll"),
+        ({"ranges": (0.5,)}, "ranges must be those of at least roll"),
+        ({"ranges": (0.5,) * 5}, "level_rate_m_s, got 5 numbers"),
         ({"ranges": (0.5, 0.5), "brake_pa_s_m": 1e3}, "level rate as fourth"),
         ({"ranges": (0.5, 0.0, 1.0, 1.0)}, "ranges must be positive"),
     ],

@@ -165,7 +165,7 @@ def test_high_level_switches_close_on_the_true_level_of_their_own_side() -> None
     ("errors", "message"),
     [
         ({"roll_noise_rad": -1e-4}, "roll_noise_rad must be zero or more"),
-        ({"motion_delay_ms": -20.0}, "motion_delay_ms must be zero or more"),
+        ({"motion_delay_ms": -20.0}, "motion_delay_ms must be 0 to 1000"),
         ({"motion_delay_ms": 25.0}, "motion_delay_ms must be a multiple of 10, got 25"),
         ({"level_noise_m": math.nan}, "level_noise_m must be zero or more"),
     ],

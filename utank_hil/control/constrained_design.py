@@ -37,7 +37,6 @@ from utank_hil.parameters import (
 _LEVEL = STATES.index("level_m")
 # a metre above the level limit costs as much as this roll over the whole horizon
 _PENALTY_ROLL_RAD = 0.05
-_MOST_SMOOTHING_RAD_S = 1.0  # wider than any sea's peak
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,13 +115,6 @@ class ConstrainedDesign:
                     f"got {self.knots}",
                 )
             )
-        if self.sea.smoothing_rad_s > _MOST_SMOOTHING_RAD_S:
-            problems.append(
-                (
-                    "sea.smoothing_rad_s",
-                    f"must be {_MOST_SMOOTHING_RAD_S:g} at most, got {self.sea.smoothing_rad_s}",
-                )
-            )
         refuse("constrained design", problems)
 
     def law(
@@ -142,10 +134,11 @@ class ConstrainedDesign:
         """
         limits = limits or PumpLimits()
         if not self.level_margin_m < limits.level_m:
-            raise ValueError(
-                f"level_margin_m {self.level_margin_m} leaves nothing of the level limit "
-                f"{limits.level_m} m"
+            reason = (
+                f"{self.level_margin_m} leaves nothing of the level limit {limits.level_m} m: "
+                "lower it, or raise the limit"
             )
+            refuse("constrained design", [("level_margin_m", reason)])
         plant, covariance = sea_plant(
             self.sea,
             ship,

@@ -24,8 +24,12 @@ Derivation, and where the print differs: docs/controllers.md.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from utank_hil.control.fuzzy_law import FuzzyController, FuzzyInputs, FuzzyLaw
+from utank_hil.parameters import NotNegative, Positive, Problem, Range
+
+_Gamma = Annotated[float, Range(above=0, below=1)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,18 +54,14 @@ class SmallGainFuzzy(FuzzyLaw):
         If a parameter is out of its range.
     """
 
-    gamma: float
-    rho: float
-    adaptation: float
-    leakage: float
-    initial: float = 0.0
+    gamma: _Gamma
+    rho: Positive
+    adaptation: Positive
+    leakage: Positive
+    initial: NotNegative = 0.0
 
-    def __post_init__(self) -> None:
-        FuzzyLaw.__post_init__(self)
-        self._require_positive("gamma", "rho", "adaptation", "leakage")
-        self._require_not_negative("initial")
-        if not (self.error.q > 2 and self.gamma < 1):
-            raise ValueError("the law needs q above 2 and gamma below 1")
+    def _problems(self) -> list[Problem]:
+        return [*FuzzyLaw._problems(self), *_q_problems(self, above=2)]
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -108,18 +108,14 @@ class RobustFuzzy(FuzzyLaw):
         If a parameter is out of its range.
     """
 
-    gamma: float
-    epsilon: float
-    adaptation: tuple[float, float]
-    leakage: tuple[float, float]
-    initial: tuple[float, float] = (0.0, 0.0)
+    gamma: _Gamma
+    epsilon: Positive
+    adaptation: tuple[Positive, Positive]
+    leakage: tuple[Positive, Positive]
+    initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        FuzzyLaw.__post_init__(self)
-        self._require_positive("gamma", "epsilon", "adaptation", "leakage")
-        self._require_not_negative("initial")
-        if not (self.error.q > 1 and self.gamma < 1):
-            raise ValueError("the law needs q above 1 and gamma below 1")
+    def _problems(self) -> list[Problem]:
+        return [*FuzzyLaw._problems(self), *_q_problems(self, above=1)]
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -143,6 +139,12 @@ class RobustFuzzy(FuzzyLaw):
     def controller(self) -> "DirectFuzzyController":
         """A new steppable controller."""
         return DirectFuzzyController(self)
+
+
+def _q_problems(law: FuzzyLaw, above: float) -> list[Problem]:
+    """Too small an eigenvalue for the proof of a law."""
+    q = law.error.q
+    return [] if q > above else [("error.q", f"must be above {above:g} for this law, got {q}")]
 
 
 class DirectFuzzyController(FuzzyController):

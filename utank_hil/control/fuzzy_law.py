@@ -6,7 +6,6 @@ water may be added. Nothing is learnt from a command that was cut short: what fo
 what the law asked for.
 """
 
-import math
 from dataclasses import KW_ONLY, dataclass
 from typing import NamedTuple
 
@@ -16,6 +15,14 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.fuzzy_basis import FuzzyBasis
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.linear import STATES
+from utank_hil.parameters import (
+    NotNegative,
+    Positive,
+    Problem,
+    SampleTime,
+    range_problems,
+    refuse,
+)
 
 _OBEYED = 0.9  # part of a command that must have left for the law to learn from what followed
 _REACH = 2.0  # the inputs are held within so many times their ranges
@@ -30,7 +37,7 @@ class FuzzyLaw:
     ----------
     error : ErrorDynamics
     ranges : tuple of float
-        Ranges of the fuzzy inputs; the first two are roll and roll rate, then level, level rate.
+        Ranges of the fuzzy inputs, the first two to four of `STATES`.
     gain_rad_s2_pa : float
         Nominal g: roll acceleration per pressure.
     brake_pa_s_m : float
@@ -44,36 +51,25 @@ class FuzzyLaw:
     """
 
     error: ErrorDynamics
-    ranges: tuple[float, ...]
-    gain_rad_s2_pa: float
+    ranges: tuple[Positive, ...]
+    gain_rad_s2_pa: Positive
     _: KW_ONLY
-    brake_pa_s_m: float = 0.0
-    sample_time_s: float = 0.01
+    brake_pa_s_m: NotNegative = 0.0
+    sample_time_s: SampleTime = 0.01
 
     def __post_init__(self) -> None:
-        self._require_positive("gain_rad_s2_pa", "sample_time_s")
-        self._require_not_negative("brake_pa_s_m")
-        if len(self.ranges) < 2:
-            raise ValueError("a fuzzy law needs at least roll and roll rate as inputs")
-        if self.brake_pa_s_m and len(self.ranges) <= _LEVEL_RATE:
-            raise ValueError("a fuzzy law with brake_pa_s_m needs the level rate as fourth input")
-        FuzzyBasis(self.ranges)
+        refuse("fuzzy law", self._problems())
 
-    def _require_positive(self, *names: str) -> None:
-        for name in names:
-            if not all(math.isfinite(value) and value > 0 for value in self._numbers(name)):
-                raise ValueError(f"fuzzy law {name} must be positive, got {getattr(self, name)}")
-
-    def _require_not_negative(self, *names: str) -> None:
-        for name in names:
-            if not all(math.isfinite(value) and value >= 0 for value in self._numbers(name)):
-                raise ValueError(
-                    f"fuzzy law {name} must be zero or more, got {getattr(self, name)}"
-                )
-
-    def _numbers(self, name: str) -> tuple[float, ...]:
-        value: float | tuple[float, ...] = getattr(self, name)
-        return value if isinstance(value, tuple) else (value,)
+    def _problems(self) -> list[Problem]:
+        """What is wrong with the parameters; laws add to it what their proofs ask for."""
+        problems = range_problems(self)
+        inputs = len(self.ranges)
+        if not 2 <= inputs <= len(STATES):
+            reason = f"must be those of at least roll and roll rate of {', '.join(STATES)}"
+            problems.append(("ranges", f"{reason}, got {inputs} numbers"))
+        if self.brake_pa_s_m and inputs <= _LEVEL_RATE:
+            problems.append(("brake_pa_s_m", "needs the level rate as fourth of the ranges"))
+        return problems
 
 
 class FuzzyInputs(NamedTuple):

@@ -19,11 +19,13 @@ so that g is near one.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.fuzzy_law import FuzzyController, FuzzyInputs, FuzzyLaw
+from utank_hil.parameters import Finite, Positive, Problem, Range
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +51,17 @@ class IndirectFuzzy(FuzzyLaw):
         If a parameter is out of its range.
     """
 
-    adaptation_f: float
-    adaptation_g: float
-    leakage: float
-    least_gain: float = 0.3
-    prior: tuple[float, ...] | None = None
+    adaptation_f: Positive
+    adaptation_g: Positive
+    leakage: Positive
+    least_gain: Annotated[float, Range(above=0, below=1)] = 0.3
+    prior: tuple[Finite, ...] | None = None
 
-    def __post_init__(self) -> None:
-        FuzzyLaw.__post_init__(self)
-        self._require_positive("adaptation_f", "adaptation_g", "leakage")
-        if not 0 < self.least_gain < 1:
-            raise ValueError(f"fuzzy law least_gain must be 0 to 1, got {self.least_gain}")
-        if self.prior is not None and len(self.prior) != len(self.ranges) + 1:
-            raise ValueError(f"fuzzy law prior must have {len(self.ranges) + 1} numbers")
+    def _problems(self) -> list[Problem]:
+        problems, needed = FuzzyLaw._problems(self), len(self.ranges) + 1
+        if self.prior is not None and len(self.prior) != needed:
+            problems.append(("prior", f"must have {needed} numbers, got {len(self.prior)}"))
+        return problems
 
     def controller(self) -> "IndirectFuzzyController":
         """A new steppable controller."""

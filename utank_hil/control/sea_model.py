@@ -18,12 +18,15 @@ Asilomar 1978.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import NotNegative, Positive, Problem, Range, range_problems, refuse
 from utank_hil.sea import Spectrum
 
 _POINTS = 8192  # frequencies of the factorization: 0.004 rad/s apart at 0.2 s
@@ -37,18 +40,19 @@ class SeaModel:
     Parameters
     ----------
     frequency_hz : tuple of float
-        Centres of the spectrum's bands (`utank_hil.sea.Spectrum`).
+        Centres of the spectrum's bands, two or more (`utank_hil.sea.Spectrum`).
     density_m2_hz : tuple of float
         Density of the surface elevation in each band.
     effective_slope : float
         Ratio of effective to true wave slope.
     order : int
-        States of the model.
+        States of the model, fewer than the samples of the impulse response that count.
     floor : float
         Added to the slope's density, as a share of its maximum: the less of it, the further the
         forecast reaches, and the more it is lost where spectrum or ship are not as expected.
     smoothing_rad_s : float
-        Standard deviation of the Gaussian that the slope's density is smoothed with.
+        Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
+        wider than any sea's peak.
 
     Raises
     ------
@@ -56,19 +60,32 @@ class SeaModel:
         If a value is out of its range.
     """
 
-    frequency_hz: tuple[float, ...]
-    density_m2_hz: tuple[float, ...]
-    effective_slope: float = 0.5
-    order: int = 8
-    floor: float = 1.3e-3
-    smoothing_rad_s: float = 0.007
+    frequency_hz: tuple[Positive, ...]
+    density_m2_hz: tuple[NotNegative, ...]
+    effective_slope: Positive = 0.5
+    order: Annotated[int, Range(least=1, below=_MEMORY)] = 8
+    floor: Annotated[float, Range(above=0, most=1)] = 1.3e-3
+    smoothing_rad_s: Annotated[float, Range(above=0, most=1)] = 0.007
 
     def __post_init__(self) -> None:
-        if not self.spectrum.moment(0) > 0:
-            raise ValueError("sea density_m2_hz must hold some energy")
-        for name in ("effective_slope", "order", "floor", "smoothing_rad_s"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"sea {name} must be positive, got {getattr(self, name)}")
+        problems = [*range_problems(self), *self._band_problems()]
+        if not problems and not self.spectrum.moment(0) > 0:
+            problems.append(("density_m2_hz", "must hold some energy"))
+        refuse("sea", problems)
+
+    def _band_problems(self) -> list[Problem]:
+        bands, densities = len(self.frequency_hz), len(self.density_m2_hz)
+        problems = []
+        if bands < 2:
+            problems.append(("frequency_hz", f"must name two bands or more, got {bands}"))
+        falls = [pair for pair in pairwise(self.frequency_hz) if not pair[0] < pair[1]]
+        if falls:
+            low, high = falls[0]
+            problems.append(("frequency_hz", f"must rise, got {high} after {low}"))
+        if densities != bands:
+            reason = f"must have one value per frequency, {bands} of them, got {densities}"
+            problems.append(("density_m2_hz", reason))
+        return problems
 
     @property
     def spectrum(self) -> Spectrum:
@@ -115,8 +132,6 @@ def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearMo
     from scipy.sparse.linalg import eigsh
 
     kept = impulse[:_MEMORY]
-    if order >= _MEMORY:
-        raise ValueError(f"sea order must be below {_MEMORY}, got {order}")
     values, vectors = eigsh(hankel(kept), k=order, which="LM", v0=np.ones(_MEMORY))
     root = np.sqrt(np.abs(values))
     observability = vectors * root

@@ -7,12 +7,12 @@ With e = (phi - y_d, phi'), the wanted dynamics e'' + 2 zeta w e' + w^2 e = 0 an
 the laws are driven by the one number s = B' P e = p12 e + p22 e'.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.parameters import Positive, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +32,12 @@ class ErrorDynamics:
         If a parameter is not positive.
     """
 
-    frequency_rad_s: float
-    damping_ratio: float
-    q: float
+    frequency_rad_s: Positive
+    damping_ratio: Positive
+    q: Positive
 
     def __post_init__(self) -> None:
-        for name in ("frequency_rad_s", "damping_ratio", "q"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"error dynamics {name} must be positive, got {value}")
+        refuse("error dynamics", range_problems(self))
 
     @property
     def gains(self) -> tuple[float, float]:

@@ -1,6 +1,5 @@
 """The operator panel: requests modes, arms and disarms."""
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -13,6 +12,7 @@ from utank_hil.canbus import (
     Mode,
     OperatorCommand,
 )
+from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 
 EDGE_NS = 500_000_000
@@ -50,12 +50,11 @@ class TimedAction:
         If the time is negative or not finite.
     """
 
-    time_s: float
+    time_s: NotNegative
     action: Action
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.time_s < math.inf:
-            raise ValueError(f"time_s is {self.time_s}, must be 0 or later")
+        refuse("action", range_problems(self))
 
 
 class OperatorPanel:

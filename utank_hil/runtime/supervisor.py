@@ -6,17 +6,24 @@ resets and arms again: arming needs a *rising* edge of the arm bit that this ver
 while ready, so neither a restart nor a fault is ever followed by pressure on its own.
 """
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Annotated, Final
 
 from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.parameters import Range, range_problems, refuse
 from utank_hil.runtime import faults
 from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 
 NEVER_NS = 1 << 62
 """Age of something that was never heard."""
+
+RollLimit = Annotated[float, Range(above=0, most=0.7)]
+"""Roll at which something is given up; why not more, see `SafetyLimits`."""
+_HeelLimit = Annotated[float, Range(above=0, most=0.28)]
+_Silence = Annotated[float, Range(above=0, most=1000)]
+_Patience = Annotated[float, Range(above=0, most=10_000)]
+_BusLoad = Annotated[float, Range(above=0, most=0.85)]
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
@@ -33,6 +40,19 @@ class Demand(Enum):
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
     """Thresholds of the fault table, see the safety manual; times in milliseconds.
+
+    The defaults are the table's. A ship or a machine may need others, but none at which a
+    protection is as good as switched off:
+
+    * Messages, the drive and the loop itself may be away for 1 s at most, the longest that the
+      table lets any sensor be silent under pressure: a tenth of the roll of a ship like the first.
+    * The operator's panel while armed, and a drive that is being enabled, get 10 s at most: a roll
+      period, for which an operator may find his stop unheard, or his arming come late.
+    * Roll 0.7 rad at most: 40 degrees, to which the IS Code 2008 (part A, 2.2.1) counts a ship's
+      righting levers. Heel 0.28 rad at most: 16 degrees, which it lets a steady wind cause (2.3.1).
+    * Bus load 0.85 at most: it is counted in mean frames of 143 bits, of which a bus that is full
+      of the longest, 160 bits, shows 0.89.
+    * Late ticks 10 of ten at most: there are no more to be counted.
 
     Attributes
     ----------
@@ -51,7 +71,7 @@ class SafetyLimits:
     roll_limit_rad, heel_limit_rad : float
         Largest roll angle, and largest mean roll angle, while armed.
     bus_load_limit : float
-        Largest share of the bus in use over a second, 0 to 1.
+        Largest share of the bus in use over a second.
     long_overrun_ms : float
         One tick this late cuts the pressure.
     overruns_in_ten : int
@@ -60,32 +80,27 @@ class SafetyLimits:
     Raises
     ------
     ValueError
-        If a threshold is not positive and finite, or the load limit above 1.
+        If a threshold is out of its range.
     """
 
-    motion_age_ms: float = 30.0
-    tank_age_ms: float = 1000.0
-    tank_degraded_age_ms: float = 100.0
-    pump_age_ms: float = 1000.0
-    drive_age_ms: float = 60.0
-    echo_age_ms: float = 100.0
-    drive_enabled_within_ms: float = 40.0
-    panel_age_to_arm_ms: float = 600.0
-    panel_age_armed_ms: float = 5000.0
-    arming_timeout_ms: float = 2000.0
-    roll_limit_rad: float = 0.35
-    heel_limit_rad: float = 0.14
-    bus_load_limit: float = 0.8
-    long_overrun_ms: float = 50.0
-    overruns_in_ten: int = 3
+    motion_age_ms: _Silence = 30.0
+    tank_age_ms: _Silence = 1000.0
+    tank_degraded_age_ms: _Silence = 100.0
+    pump_age_ms: _Silence = 1000.0
+    drive_age_ms: _Silence = 60.0
+    echo_age_ms: _Silence = 100.0
+    drive_enabled_within_ms: _Silence = 40.0
+    panel_age_to_arm_ms: _Silence = 600.0
+    panel_age_armed_ms: _Patience = 5000.0
+    arming_timeout_ms: _Patience = 2000.0
+    roll_limit_rad: RollLimit = 0.35
+    heel_limit_rad: _HeelLimit = 0.14
+    bus_load_limit: _BusLoad = 0.8
+    long_overrun_ms: _Silence = 50.0
+    overruns_in_ten: Annotated[int, Range(least=1, most=10)] = 3
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"safety {field.name} must be positive and finite, got {value}")
-        if self.bus_load_limit > 1:
-            raise ValueError(f"safety bus_load_limit must be 1 at most, got {self.bus_load_limit}")
+        refuse("safety", range_problems(self))
 
 
 @dataclass(slots=True)

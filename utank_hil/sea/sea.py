@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum
@@ -47,15 +48,12 @@ class EffectiveSlope:
         If a value is negative or not finite.
     """
 
-    coefficient: float = 1.0
-    depth_m: float = 0.0
-    beam_m: float = 0.0
+    coefficient: NotNegative = 1.0
+    depth_m: NotNegative = 0.0
+    beam_m: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("coefficient", "depth_m", "beam_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"effective slope {name} must be zero or more, got {value}")
+        refuse("effective slope", range_problems(self))
 
     def factor(self, wavenumber_rad_m: FloatArray, heading_rad: FloatArray) -> FloatArray:
         """Return the ratio r of effective to true slope, per component."""

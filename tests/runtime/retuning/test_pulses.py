@@ -53,6 +53,10 @@ def test_pumps_own_limit_counts_too() -> None:
         {"every_s": -1.0},
         {"change_factor": 1.0},
         {"trial_s": float("inf")},
+        {"trial_s": 29.0},  # before the earliest verdict
+        {"answer_within_s": 601.0},
+        {"roll_limit_rad": 0.71},
+        {"seed": -1},
     ],
 )
 def test_settings_out_of_range_are_refused_by_name(wrong: dict[str, object]) -> None:

@@ -26,14 +26,13 @@ from utank_hil.runtime.retuning.answer import Candidate, Refusal
 from utank_hil.runtime.retuning.history import SampleHistory
 from utank_hil.runtime.retuning.monitor import ChangeMonitor
 from utank_hil.runtime.retuning.retuner import Retuner
-from utank_hil.runtime.retuning.settings import RetuningSettings
+from utank_hil.runtime.retuning.settings import EARLIEST_VERDICT_S, RetuningSettings
 from utank_hil.runtime.retuning.trial import Effort, MovingEffort, worsening
 
 FADE_SAMPLES: Final = 15
 FILL_SAMPLES: Final = 1000
 """Past samples a new law's memory is filled from: more than any law or washout remembers."""
 FILL_AT_ONCE: Final = 50
-EARLIEST_VERDICT_S: Final = 30.0
 EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is taken back before the trial's end."""
 GAIN_FACTOR: Final = 30.0

@@ -1,7 +1,13 @@
 """What a configuration says about retuning."""
 
-import math
 from dataclasses import dataclass
+from typing import Annotated, Final
+
+from utank_hil.parameters import Positive, Range, range_problems, refuse
+from utank_hil.runtime.supervisor import RollLimit
+
+EARLIEST_VERDICT_S: Final = 30.0
+"""A few rolls: what a trial tells before is chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,19 +32,21 @@ class RetuningSettings:
     added_roll_rad : float
         Greatest roll that the pulses alone may cause in still water, on the configured ship.
     roll_limit_rad : float
-        Roll at which identification is given up.
+        Roll at which identification is given up; at most what `SafetyLimits` may allow.
     every_s : float or None
         Retune by itself so long after the last time; None: never on schedule.
     change_factor : float or None
         Retune by itself when the running model's prediction errors, compared with the roll, have
         changed by this factor since it was taken into service; None: not watched.
     trial_s : float
-        Time for which a new law is on trial, and the old one's is remembered for comparison.
+        Time for which a new law is on trial, and the old one's is remembered for comparison: from
+        `EARLIEST_VERDICT_S` to an hour, beyond which a sea is not the same any more.
     roll_factor, effort_factor : float
         A new law is taken back when roll or pressure, root mean square over the trial, exceed the
         old law's by this factor.
     answer_within_s : float
-        Longest time identification and design may take.
+        Longest time identification and design may take, ten minutes at most: they take seconds,
+        and what hangs is not to go unnoticed.
     seed : int
         Of the pulses.
 
@@ -48,44 +56,25 @@ class RetuningSettings:
         If a value is out of its range.
     """
 
-    roll_period_range_s: tuple[float, float]
-    order: int = 120
-    identification_s: float = 500.0
-    pulse_pa: float = 30e3
-    pulse_hold_s: tuple[float, float] = (1.0, 5.0)
+    roll_period_range_s: tuple[Positive, Positive]
+    order: Annotated[int, Range(least=2)] = 120
+    identification_s: Positive = 500.0
+    pulse_pa: Positive = 30e3
+    pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)
     alone: bool = False
-    added_roll_rad: float = 0.05
-    roll_limit_rad: float = 0.3
-    every_s: float | None = None
-    change_factor: float | None = None
-    trial_s: float = 120.0
-    roll_factor: float = 1.25
-    effort_factor: float = 2.0
-    answer_within_s: float = 60.0
-    seed: int = 1
+    added_roll_rad: Positive = 0.05
+    roll_limit_rad: RollLimit = 0.3
+    every_s: Positive | None = None
+    change_factor: Annotated[float, Range(above=1)] | None = None
+    trial_s: Annotated[float, Range(least=EARLIEST_VERDICT_S, most=3600)] = 120.0
+    roll_factor: Positive = 1.25
+    effort_factor: Positive = 2.0
+    answer_within_s: Annotated[float, Range(above=0, most=600)] = 60.0
+    seed: Annotated[int, Range(least=0)] = 1
 
     def __post_init__(self) -> None:
+        problems = range_problems(self)
         low, high = self.roll_period_range_s
-        if not 0 < low < high < math.inf:
-            raise ValueError(
-                f"retuning roll_period_range_s must rise from above zero, got [{low}, {high}]"
-            )
-        if self.order < 2:
-            raise ValueError(f"retuning order must be 2 or more, got {self.order}")
-        for name in (
-            "identification_s",
-            "pulse_pa",
-            "added_roll_rad",
-            "roll_limit_rad",
-            "trial_s",
-            "roll_factor",
-            "effort_factor",
-            "answer_within_s",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"retuning {name} must be positive and finite, got {value}")
-        if self.every_s is not None and not self.every_s > 0:
-            raise ValueError(f"retuning every_s must be positive, got {self.every_s}")
-        if self.change_factor is not None and not self.change_factor > 1:
-            raise ValueError(f"retuning change_factor must be above 1, got {self.change_factor}")
+        if not low < high:
+            problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
+        refuse("retuning", problems)
