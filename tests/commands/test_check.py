@@ -229,7 +229,7 @@ def test_scenario_refuses_a_controller_of_another_ship(tmp_path: Path) -> None:
     ("actual", "key", "reason"),
     [
         ({"mass_kg": 1.0}, "actual_ship.mass_kg", "a ship has inertia_kg_m2, stiffness_nm_rad"),
-        ({"inertia_kg_m2": -1.0}, "actual_ship.inertia_kg_m2", "must be positive"),
+        ({"inertia_kg_m2": -1.0}, "actual_ship.inertia_kg_m2", "must be above 0"),
         ({"stiffness_nm_rad": 1e7}, "actual_ship", "takes all of the ship's stability"),
         ({"gz_m": 1.0}, "actual_ship", "object"),
     ],

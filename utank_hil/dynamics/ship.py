@@ -2,8 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from utank_hil.parameters import Finite, NotNegative, Positive, Problem, range_problems, refuse
+from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
+
+# thousands of times the inertia (kg m^2) and stiffness (N m/rad) of the largest ship afloat
+_MOST = 1e15
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +44,14 @@ class RollShip:
     Raises
     ------
     ValueError
-        If inertia or stiffness is not positive, a damping is negative, a number is not finite, or
-        the table of levers is incomplete or given beside a polynomial.
+        If inertia or stiffness is not positive, a damping is negative, a number is not finite or
+        beyond any ship's, or the table of levers is incomplete or given beside a polynomial.
     """
 
-    inertia_kg_m2: Positive
-    stiffness_nm_rad: Positive
-    damping_nms_rad: NotNegative = 0.0
-    quadratic_damping_nms2_rad2: NotNegative = 0.0
+    inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)]
+    stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)]
+    damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
+    quadratic_damping_nms2_rad2: Annotated[float, Range(least=0, most=_MOST)] = 0.0
     restoring_odd_nm: tuple[Finite, ...] = ()
     displacement_n: float = 0.0
     gz_step_rad: float = 0.0
