@@ -7,10 +7,15 @@ reduced model starts a search for the one whose whitened output error is least::
     e(k) = A(q) (y(k) - yhat(k)) - c psi(k),    A(q) = I - alpha_1 q^-1 - ... - alpha_p q^-p
 
 with A(q) and the errors' covariance from OKID: maximum likelihood for a noise model of high order
-(Box-Jenkins structure; Ljung, System Identification, 7.4). The model is in modal form, yhat = D u +
-sum over poles of c_l b_l u / (q - lambda_l), so that slopes are exact; free oscillations at the
-start of each stretch and the disturbance basis enter linearly and are projected out (Golub and
-Pereyra 1973). Damped Gauss-Newton steps; a step that does not help is not taken.
+(Box-Jenkins structure; Ljung, System Identification, 7.4). OKID had to estimate A(q) before the
+ship was known. So the errors of the model of least plain output error are asked whether a short
+A(q) explains them (`noise_model`); with sensors' noise alone, or beside regular waves, one does,
+and the search goes on with it.
+
+The model is in modal form, yhat = D u + sum over poles of c_l b_l u / (q - lambda_l), so that
+slopes are exact; free oscillations at the start of each stretch and the disturbance basis enter
+linearly and are projected out (Golub and Pereyra 1973). Damped Gauss-Newton steps; a step that does
+not help is not taken.
 """
 
 from dataclasses import dataclass
@@ -19,8 +24,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.lag_regression import LagRegression, unbroken
 from utank_hil.identification.modes import ModeConfidence, Modes, frequency_and_damping_std
+from utank_hil.identification.noise_model import NoiseModel, short_noise_model
 from utank_hil.identification.okid import OkidResult
 from utank_hil.identification.record import channel_scale, stacked_record
 
@@ -31,6 +37,7 @@ _STEPS = 15
 _DAMPINGS = (1e-8, 1e-6, 1e-4, 1e-2, 1.0)  # tried in turn until a step helps
 _SETTLED = 1e-7  # relative gain of a step that is not worth another
 _ROUNDING = 1e-15  # of an output's root mean square
+_DEPENDENT = 1e-10  # singular values of the linear part's unit columns, below: no direction
 _NULL = 1e-8  # singular values of the slopes below this part are free scaling of c_l against b_l
 
 
@@ -44,11 +51,15 @@ class Refinement:
     confidence : ModeConfidence
     gain : float
         Part by which the whitened squared error fell; 0 when the model was the best already.
+    noise_order : int
+        Of the autoregression that whitens: 0 where the errors are white, OKID's order where no
+        short one explains them, as in an irregular sea.
     """
 
     system: "StateSpace"
     confidence: ModeConfidence
     gain: float
+    noise_order: int
 
 
 def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArray) -> Refinement:
@@ -81,10 +92,39 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
             f"do not belong to a record of {m} outputs and {z.shape[1] - m} inputs"
         )
     scale = channel_scale(z, m)
-    problem = _Problem(z, scale, m, result)
-    model = _modal(system, scale[:m], scale[m:])
-    largest = max(np.abs(model.poles).max(), np.exp(3.0 / len(z)))
-    first = squares = problem.squares(model)
+    y_scale, u_scale = scale[:m], scale[m:]
+    functions = result.basis.evaluate(len(z), result.arx.sample_time_s)
+
+    def whitened(noise: NoiseModel) -> _Problem:
+        return _Problem(z / scale, m, functions, noise)
+
+    given = _modal(system, y_scale, u_scale)
+    largest = max(np.abs(given.poles).max(), np.exp(3.0 / len(z)))
+    noise = _noise_of(result, y_scale)
+    problem = whitened(noise)
+    model = _fitted(problem, given, largest)
+    # the errors of the model of least output error, which has no bias whatever colours them; in
+    # OKID's filter free oscillations vanish, and would then be left in the errors
+    plain = whitened(NoiseModel(np.zeros((0, m, m)), np.eye(m)))
+    unbiased = _fitted(plain, model, largest)
+    short = short_noise_model(plain.errors(unbiased), result.arx.order)
+    if short is not None:
+        noise, problem = short, whitened(short)
+        # from the best of them, so that it ends no worse than any
+        best = min(given, model, unbiased, key=problem.squares)
+        model = _fitted(problem, best, largest)
+    before = problem.squares(given)
+    return Refinement(
+        model.state_space(y_scale, u_scale, result.arx.sample_time_s),
+        _confidence(model, problem, y_scale, result.arx.sample_time_s),
+        1 - problem.squares(model) / before if before > 0 else 0.0,
+        noise.order,
+    )
+
+
+def _fitted(problem: "_Problem", model: "_Modal", largest: float) -> "_Modal":
+    """The model of least squared errors, no pole of it beyond the largest magnitude."""
+    squares = problem.squares(model)
     for _ in range(_STEPS):
         errors, slopes = problem.linearized(model)
         size = np.linalg.norm(slopes, axis=0)
@@ -102,11 +142,15 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
                     break
         if before - squares <= _SETTLED * before:
             break
-    return Refinement(
-        model.state_space(scale[:m], scale[m:], result.arx.sample_time_s),
-        _confidence(model, problem, scale[:m], result.arx.sample_time_s),
-        1 - squares / first if first > 0 else 0.0,
-    )
+    return model
+
+
+def _noise_of(result: OkidResult, y_scale: FloatArray) -> NoiseModel:
+    """OKID's noise model, for outputs of unit size."""
+    covariance = result.residual_covariance / np.outer(y_scale, y_scale)
+    # data without noise may leave no errors, or the same ones in two outputs
+    covariance = covariance + (1e-12 * np.trace(covariance) + _ROUNDING**2) * np.eye(len(y_scale))
+    return NoiseModel(result.arx.alpha * y_scale / y_scale[:, None], covariance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,22 +234,29 @@ class _Modal:
 class _Problem:
     """Whitened errors of a model on a record, with the linear part projected out."""
 
-    def __init__(self, z: FloatArray, scale: FloatArray, m: int, result: OkidResult) -> None:
-        arx, y_scale = result.arx, scale[:m]
-        functions = result.basis.evaluate(len(z), arx.sample_time_s)
+    def __init__(self, z: FloatArray, m: int, functions: FloatArray, noise: NoiseModel) -> None:
         self._m = m
-        self._segments = LagRegression(z / scale, m, arx.order, functions).segments
-        covariance = result.residual_covariance / np.outer(y_scale, y_scale)
-        # data without noise may leave no errors, or the same ones in two outputs
-        covariance = covariance + (1e-12 * np.trace(covariance) + _ROUNDING**2) * np.eye(m)
-        self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        alpha = arx.alpha * y_scale / y_scale[:, None]
-        self._taps = self._whiten @ np.concatenate([np.eye(m)[None], -alpha])
+        self._order = noise.order
+        self._samples = len(z)
+        self._stretches = [(a, b) for a, b in unbroken(z) if b - a > noise.order]
+        self._segments = LagRegression(z, m, noise.order, functions).segments
+        self._taps = noise.whitening()
 
     def squares(self, model: _Modal) -> float:
         """Squared errors."""
         errors, _ = self._projected(model, with_slopes=False)
         return float(errors @ errors)
+
+    def errors(self, model: _Modal) -> FloatArray:
+        """Errors in their places, shape (N, m), NaN where there are none."""
+        found, _ = self._projected(model, with_slopes=False)
+        placed = np.full((self._samples, self._m), np.nan)
+        start = 0
+        for a, b in self._stretches:
+            stop = start + self._m * (b - a - self._order)
+            placed[a + self._order : b] = found[start:stop].reshape(self._m, -1).T
+            start = stop
+        return placed
 
     def linearized(self, model: _Modal) -> tuple[FloatArray, FloatArray]:
         """Errors (rows,) and slopes of the model's output (rows, parameters), both projected."""
@@ -218,14 +269,16 @@ class _Problem:
             signals = [segment.channels[: self._m] - response, *(slopes if with_slopes else [])]
             white = self._filtered(np.array(signals + free))
             columns.append(white[:, : len(signals)])
-            waves = np.einsum("ao,fk->akof", self._whiten, segment.basis)
+            waves = np.einsum("ao,fk->akof", self._taps[0], segment.basis)
             waves = waves.reshape(len(white), -1)
             # each stretch oscillates freely by itself; the disturbance is one for all
             own = np.zeros((len(white), len(free) * len(self._segments)))
             own[:, i * len(free) : (i + 1) * len(free)] = white[:, len(signals) :]
             linear.append(np.hstack([own, waves]))
         basis = np.vstack(linear)
-        basis, _ = np.linalg.qr(basis / np.maximum(np.linalg.norm(basis, axis=0), 1e-300))
+        size = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+        basis, values, _ = np.linalg.svd(basis / size, full_matrices=False)
+        basis = basis[:, values > _DEPENDENT]  # a stretch may be shorter than its oscillations
         stacked = np.vstack(columns)
         stacked = stacked - basis @ (basis.T @ stacked)
         return stacked[:, 0], stacked[:, 1:]
