@@ -16,11 +16,12 @@ TICK_NS = 10_000_000
 
 
 def _model(ship: RollShip, tank: Tank) -> FloatArray:
-    """State and input matrices side by side, and the reservoir area, as the kernel takes them."""
+    """Matrices, reservoir area and what heels the ship, as the kernel takes them."""
     system = coupled_model(ship, tank)
     model = np.zeros((4, 7))
     model[:, :4] = system.A
     model[:, 4:6] = system.B
+    model[:, 6] = system.B[:, 1] * ship.heeling_moment_nm
     model[0, 6] = tank.reservoir_area_m2
     return model
 
@@ -28,8 +29,9 @@ def _model(ship: RollShip, tank: Tank) -> FloatArray:
 class Plant:
     """Ship, tank and pump in waves, integrated at 1 kHz.
 
-    It starts at rest, at the time of the first `advance`. The pump follows its set-point through
-    its own pressure loop; switched off, its rotor turns freely in the water.
+    It starts upright and at rest, at the time of the first `advance`; off-centre weight and steady
+    wind heel it from then on, and the water runs to the low side. The pump follows its set-point
+    through its own pressure loop; switched off, its rotor turns freely in the water.
 
     Parameters
     ----------

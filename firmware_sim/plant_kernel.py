@@ -56,8 +56,9 @@ def advance_tick(
     ----------
     state : ndarray, shape (STATES,)
     model : ndarray, shape (4, 7)
-        Columns: state matrix, effect of pressure, effect of wave moment, and in its first row the
-        tank area that turns the level's rate into flow.
+        Columns: state matrix, effect of pressure, effect of wave moment; the last holds in its
+        first row the tank area that turns the level's rate into flow, and in the second and fourth
+        the accelerations by what heels the ship steadily.
     coefficients : tuple of float
         `PumpCoefficients` as a plain tuple: a named one takes numba 2 us to take in.
     phasors, rotations : ndarray, shape (n,)
@@ -143,7 +144,7 @@ def _rates(
     level = m[3, 0] * a + m[3, 1] * b + m[3, 2] * c + m[3, 3] * d
     return (
         b,
-        roll + m[1, 4] * pressure_pa + m[1, 5] * moment_nm,
+        roll + m[1, 4] * pressure_pa + m[1, 5] * moment_nm + m[1, 6],
         d,
-        level + m[3, 4] * pressure_pa + m[3, 5] * moment_nm,
+        level + m[3, 4] * pressure_pa + m[3, 5] * moment_nm + m[3, 6],
     )

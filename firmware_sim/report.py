@@ -6,10 +6,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from rich.markup import escape
 from rich.table import Table as RichTable
 
 from firmware_sim.bench import BenchResult
-from firmware_sim.retuning_figures import retuning_figures
+from firmware_sim.on_board import on_board_json
+from firmware_sim.retuning_figures import (
+    SETTLING_S,
+    RetuningFigures,
+    events_on_ships_time,
+    retuning_figures,
+)
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import PASSIVE
 from utank_hil.analysis.metrics import (
@@ -148,6 +155,56 @@ def pump_table(result: BenchResult) -> RichTable:
     return table
 
 
+def retuning_table(result: BenchResult) -> RichTable | None:
+    """Table of what retuning found and gained; None where nothing retuned."""
+    told = {
+        run.name: retuning_figures(run, result.scenario, result.settle_s) for run in result.runs
+    }
+    if not any(told.values()):
+        return None
+    table = _table(
+        "Retuning",
+        "retuned\nat s",
+        "roll RMS\nbefore °",
+        "roll RMS\nafter °",
+        "\nless",
+        "roll period s\nfound ± / true",
+        "ship damping MN m s\nfound / true",
+        "tank damping ratio\nfound / true",
+    )
+    table.add_column("\nended in", no_wrap=True)
+    table.add_column("\nbecause")
+    table.caption = (
+        f"± one standard deviation; before the first identification, and from {SETTLING_S:g} s "
+        "after the new law took charge"
+    )
+    for name, figures in told.items():
+        if figures is not None:
+            table.add_row(name, *_retuning_cells(figures))
+    return table
+
+
+def _retuning_cells(told: RetuningFigures) -> tuple[str, ...]:
+    found, true = told.found, told.truth
+    period = ship = tank = ""
+    if found is not None:
+        deviation_s = found.roll_period_s * found.period_deviation
+        period = f"{found.roll_period_s:.3f} ± {deviation_s:.3f} / {true.roll_period_s:.3f}"
+        ship = f"{found.damping_nms_rad / 1e6:#.4g} / {true.damping_nms_rad / 1e6:#.4g}"
+        tank = f"{found.tank_damping_ratio:.4f} / {true.tank_damping_ratio:.4f}"
+    rolls = (told.roll_before_rad, told.roll_after_rad)
+    return (
+        "" if told.retuned_at_s is None else f"{told.retuned_at_s:.0f}",
+        *("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls),
+        _percent(told.roll_after_below_before),
+        period,
+        ship,
+        tank,
+        told.state if told.attempts <= 1 else f"{told.state}, attempt {told.attempts}",
+        escape("; ".join(told.reasons)),
+    )
+
+
 def endings(result: BenchResult) -> list[str]:
     """What is to be said of how runs ended; nothing where all went as the operator wanted."""
     said = []
@@ -156,6 +213,11 @@ def endings(result: BenchResult) -> list[str]:
     if result.not_run:
         said.append(f"not run: {', '.join(result.not_run)}")
     said += [_why_not_compared(result, run) for run in result.runs if not result.compares(run)]
+    said += [
+        f"{run.name}: {run.fallbacks} plans were not found in time; the one before went on"
+        for run in result.runs
+        if run.fallbacks
+    ]
     for run in figures(result)[1]:
         if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
             said.append(f"{run.name}: the controller ended in {run.mode}, fault {run.fault}")
@@ -209,6 +271,7 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
         "not_run": list(result.not_run),
         "wall_s": result.wall_s,
         "no_tank": asdict(bare),
+        "on_board": on_board_json(result),
         "runs": [
             {
                 "name": run.name,
@@ -218,14 +281,20 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
                 "end_s": run.end_s,
                 "bus_load": run.bus_load,
                 "refused_commands": run.refused_commands,
+                "fallbacks": run.fallbacks,
                 **by_name.get(run.name, {}),
                 "loop": None if run.loop is None else run.loop.statistics.summary(),
-                "retuning": retuning_figures(run, result.settle_s),
+                "retuning": _retuning_json(result, run),
             }
             for run in result.runs
         ],
         "files": {name: str(path) for name, path in files.items()},
     }
+
+
+def _retuning_json(result: BenchResult, run: Run) -> dict[str, Any] | None:
+    told = retuning_figures(run, result.scenario, result.settle_s)
+    return None if told is None else told.as_json()
 
 
 def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], list[str]]:
@@ -269,6 +338,7 @@ def _draw(result: BenchResult, path: Path) -> None:
                 run.column("true_roll_rad"),
                 run.column("true_level_m"),
                 run.column("true_pressure_pa"),
+                run.column("retuning") if run.retuning else None,
             )
             for run in result.runs
         ],
@@ -287,4 +357,9 @@ def _legend(name: str, told: RunFigures | None) -> str:
 
 
 def _record(result: BenchResult, path: Path) -> None:
-    write_recording(path, COLUMNS, {run.name: run.rows for run in result.runs})
+    write_recording(
+        path,
+        COLUMNS,
+        {run.name: run.rows for run in result.runs},
+        {run.name: events_on_ships_time(run) for run in result.runs if run.retuning},
+    )

@@ -1,60 +1,175 @@
 """What retuning did for a run, in figures."""
 
+import math
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
-from firmware_sim.run import Run
+import numpy as np
+import numpy.typing as npt
+
+from firmware_sim.run import RECORD_S, Run
+from firmware_sim.scenario import Scenario
 from utank_hil.analysis.metrics import roll_statistics
+from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
+from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
 
 SETTLING_S: Final = 60.0
 """Left out after a new law came into service."""
+_NEW_LAW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 
 
-def retuning_figures(run: Run, settle_s: float) -> dict[str, Any] | None:
-    """Events of a run, and its roll before the first identification and after the last trial began.
+@dataclass(frozen=True, slots=True)
+class ShipInFigures:
+    """Ship and tank as they are, beside what is identified of them.
+
+    Attributes
+    ----------
+    roll_period_s, damping_nms_rad : float
+        Of the ship without tank water.
+    tank_damping_ratio : float
+    """
+
+    roll_period_s: float
+    damping_nms_rad: float
+    tank_damping_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class RetuningFigures:
+    """What retuning did for a run; all times are the ship's.
+
+    Attributes
+    ----------
+    attempts : int
+        Identifications begun.
+    retuned_at_s : float or None
+        When the last new law took charge, on trial at first; None if none did.
+    roll_before_rad : float or None
+        Root mean square before the first identification; None if there is no such time.
+    roll_after_rad : float or None
+        From `SETTLING_S` after the last new law took charge for as long as it stayed there and
+        nothing was identified; None if there is no such time.
+    roll_after_below_before : float or None
+        Share by which the roll after is less than before.
+    found : ModelSummary or None
+        What the last new law was made for.
+    truth : ShipInFigures
+        When the identification began that found it, or the last one.
+    state : str
+        At the end.
+    reasons : tuple of str
+        Why the last identification began, and why it ended as it did; what was found apart.
+    events : tuple of RetuningEvent
+        `time_ns` on the ship's time.
+    """
+
+    attempts: int
+    retuned_at_s: float | None
+    roll_before_rad: float | None
+    roll_after_rad: float | None
+    roll_after_below_before: float | None
+    found: ModelSummary | None
+    truth: ShipInFigures
+    state: str
+    reasons: tuple[str, ...]
+    events: tuple[RetuningEvent, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it, ready for `json.dumps`."""
+        events = [
+            {
+                "time_s": event.time_ns * 1e-9,
+                "state": event.state.name,
+                "reasons": list(event.reasons),
+                "found": None if event.found is None else asdict(event.found),
+            }
+            for event in self.events
+        ]
+        return asdict(replace(self, events=())) | {"events": events}
+
+
+def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningFigures | None:
+    """Figures of a run's retuning; None if nothing happened.
 
     Parameters
     ----------
     run : Run
+    scenario : Scenario
+        Whose ship is the truth.
     settle_s : float
-        Left out at the start.
-
-    Returns
-    -------
-    dict or None
-        Ready for `json.dumps`; None if nothing was retuned. The rolls are None where there is no
-        such time.
+        Left out at the start. Where the ship changes later, the time before that is left out, too.
     """
     if not run.retuning:
         return None
+    events = events_on_ships_time(run)
     time_s, state = run.column("time_s"), run.column("retuning")
-    times = {kind: time_s[state == kind] for kind in (RetuningState.IDENTIFY, RetuningState.TRIAL)}
-    before = after = None
-    if len(times[RetuningState.IDENTIFY]):
-        shown = (time_s >= settle_s) & (time_s < times[RetuningState.IDENTIFY][0])
-        before = _rms(run, shown)
-    if len(times[RetuningState.TRIAL]):
-        began = times[RetuningState.TRIAL]
-        # of several trials the last: where one sample follows another by more than its step
-        breaks = (began[1:] - began[:-1]) > 2 * (time_s[1] - time_s[0])
-        start_s = began[1:][breaks][-1] if breaks.any() else began[0]
-        after = _rms(run, time_s >= start_s + SETTLING_S)
-    first_ns = run.retuning[0].time_ns
-    return {
-        "roll_before_rad": before,
-        "roll_after_rad": after,
-        "roll_after_below_before": None if not before or after is None else 1 - after / before,
-        "events": [
-            {
-                "after_first_s": (event.time_ns - first_ns) * 1e-9,
-                "state": event.state.name,
-                "reasons": list(event.reasons),
-            }
-            for event in run.retuning
-        ],
-    }
+    begun = [event for event in events if event.state is RetuningState.IDENTIFY]
+    begun_s = begun[0].time_ns * 1e-9 if begun else math.inf
+    if scenario.actual_ship and scenario.actual_from_s < begun_s:
+        settle_s = max(settle_s, scenario.actual_from_s)
+    before = _rms(run, settle_s, begun_s) if begun else None
+    after = retuned_at_s = None
+    spans = _spans(time_s, np.isin(state, _NEW_LAW))
+    if spans:
+        retuned_at_s, end_s = spans[-1]
+        after = _rms(run, retuned_at_s + SETTLING_S, end_s)
+    found_by = next((event for event in reversed(events) if event.found), events[-1])
+    looked_ns = max((e.time_ns for e in begun if e.time_ns <= found_by.time_ns), default=0)
+    last = events[events.index(begun[-1]) :] if begun else events
+    return RetuningFigures(
+        attempts=len(begun),
+        retuned_at_s=retuned_at_s,
+        roll_before_rad=before,
+        roll_after_rad=after,
+        roll_after_below_before=None if not before or after is None else 1 - after / before,
+        found=found_by.found,
+        truth=_truth(scenario, looked_ns * 1e-9),
+        state=RetuningState(int(state[-1])).name,
+        reasons=tuple(
+            reason
+            for event in last
+            if event.state is not RetuningState.TRIAL  # says what `found` does
+            for reason in event.reasons
+        ),
+        events=events,
+    )
 
 
-def _rms(run: Run, shown: Any) -> float | None:
-    roll_rad = run.column("true_roll_rad")[shown]
+def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:
+    """A run's events with `time_ns` as in its rows, to the time between two of those.
+
+    The controller counts on a clock of its own; what both know is when the state changed.
+    """
+    time_s, state = run.column("time_s"), run.column("retuning")
+    shift_ns = round(run.end_s * 1e9) - run.retuning[-1].time_ns  # of what no row shows
+    for event in run.retuning:
+        seen = time_s[state == event.state]
+        if event.state is not RetuningState.IDLE and len(seen):
+            shift_ns = round(float(seen[0]) * 1e9) - event.time_ns
+            break
+    return tuple(replace(event, time_ns=event.time_ns + shift_ns) for event in run.retuning)
+
+
+def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """When each unbroken stretch of rows for which `here` is true begins and has ended."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], here.astype(np.int8), [0]))))
+    return [
+        (float(time_s[start]), float(time_s[stop - 1]) + RECORD_S)
+        for start, stop in edges.reshape(-1, 2)
+    ]
+
+
+def _truth(scenario: Scenario, time_s: float) -> ShipInFigures:
+    changed = time_s >= scenario.actual_from_s
+    ship = scenario.sailing_ship if changed else scenario.vessel.ship
+    return ShipInFigures(
+        2 * math.pi / ship.natural_frequency_rad_s,
+        ship.damping_nms_rad,
+        scenario.vessel.tank.damping_ratio,
+    )
+
+
+def _rms(run: Run, start_s: float, end_s: float) -> float | None:
+    roll_rad = run.column("true_roll_rad")[run.between(start_s, end_s)]
     return roll_statistics(roll_rad).rms_rad if len(roll_rad) else None

@@ -117,6 +117,8 @@ class Run:
         Of the loop with the controller; None in simulated time.
     retuning : tuple of RetuningEvent
         What the controller did to retune itself.
+    fallbacks : int or None
+        As `ControllerNode.fallbacks`.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Run:
     energy_j: float
     loop: LoopResult | None = None
     retuning: tuple[RetuningEvent, ...] = ()
+    fallbacks: int | None = None
 
     def column(self, name: str) -> FloatArray:
         """One column of `rows`, shape (n,)."""
@@ -160,6 +163,7 @@ class ControllerRun:
     start_ns: int
     loop: LoopResult
     retuning: tuple[RetuningEvent, ...]
+    fallbacks: int | None = None
 
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
@@ -181,6 +185,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         ship.drive.refused,
         ship.plant.pump_energy_j,
         retuning=controller.retuning_events,
+        fallbacks=controller.fallbacks,
     )
 
 
@@ -201,6 +206,7 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
         ship.plant.pump_energy_j,
         loop,
         controller.retuning_events,
+        controller.fallbacks,
     )
 
 
@@ -219,7 +225,9 @@ def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     with _retuner(job.controller) as retuner:
         controller, table = _controller(job, retuner, statistics)
         loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
-    return ControllerRun(table.rows, controller.start_ns, loop, controller.retuning_events)
+    return ControllerRun(
+        table.rows, controller.start_ns, loop, controller.retuning_events, controller.fallbacks
+    )
 
 
 def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
@@ -234,6 +242,7 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         ship.energy_j,
         controller.loop,
         controller.retuning,
+        controller.fallbacks,
     )
 
 

@@ -1,5 +1,6 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
+import math
 from dataclasses import fields, replace
 from typing import Annotated, Any, Final
 
@@ -7,10 +8,12 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from firmware_sim.drive import DriveLimits
+from firmware_sim.on_board import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
 from utank_hil.config import ControllerConfig, Vessel, tank_problems
 from utank_hil.config_files import Section
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.parameters import ParameterError, Problem, refuse
 from utank_hil.runtime.panel import TimedAction
@@ -21,6 +24,15 @@ MOST_CONTROLLERS = 7
 
 PASSIVE = "passive"
 """Name of the run with the tank alone."""
+
+SAILED: Final = (
+    "inertia_kg_m2",
+    "stiffness_nm_rad",
+    "damping_nms_rad",
+    "offset_moment_nm",
+    "wind_moment_nm",
+)
+"""What the bench's ship has, being linear: the last two heel her."""
 
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
@@ -48,8 +60,13 @@ class Scenario(Section):
     settle_s: Annotated[float, Field(ge=0)]
     """Left out of the statistics at the start."""
     seed: Annotated[int, Field(ge=0)] = 1
+    place: Place | None = None
+    """Where people are judged; over the starboard reservoir if not given."""
     actual_ship: dict[str, float] = Field(default_factory=dict)
-    """Keys of the ship that differ from the vessel's, which is what the controller believes."""
+    """Keys of the ship that differ from the vessel's, which is what the controller believes.
+
+    Those of `SAILED` only.
+    """
     actual_from_s: Annotated[float, Field(ge=0)] = 0.0
     """When the difference comes about: cargo moved, fuel burnt."""
     retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
@@ -90,6 +107,11 @@ class Scenario(Section):
         return self
 
     @property
+    def place_on_board(self) -> Place:
+        """Where people are judged."""
+        return self.place or Place.over_reservoir(self.vessel.tank)
+
+    @property
     def sailing_ship(self) -> RollShip:
         """The ship as she is from `actual_from_s` on."""
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
@@ -128,17 +150,40 @@ class Scenario(Section):
 
     def _ship_problems(self) -> list[Problem]:
         known = [field.name for field in fields(RollShip)]
-        unknown = [key for key in self.actual_ship if key not in known]
-        if unknown:
-            reason = f"is not a known key; a ship has {', '.join(known)}"
-            return [(f"actual_ship.{key}", reason) for key in unknown]
+        wrong = [
+            (
+                f"actual_ship.{key}",
+                "would change nothing, the bench's ship is linear" if key in known
+                else "is not a known key",
+            )
+            for key in self.actual_ship
+            if key not in SAILED
+        ]  # fmt: skip
+        if wrong:
+            return [(key, f"{reason}; it takes {', '.join(SAILED)}") for key, reason in wrong]
         try:
-            wrong = tank_problems(self.sailing_ship, self.vessel.tank)
+            unstable = tank_problems(self.sailing_ship, self.vessel.tank)
         except ParameterError as error:
             return [(f"actual_ship.{name}", reason) for name, reason in error.problems]
-        except TypeError as error:  # a single number where the ship has several
-            return [("actual_ship", str(error))]
-        return [("actual_ship", f"with it, the tank {reason}") for _, reason in wrong]
+        if unstable:
+            return [("actual_ship", f"with it, the tank {reason}") for _, reason in unstable]
+        return [
+            (key, reason)
+            for key, ship in (("vessel", self.vessel.ship), ("actual_ship", self.sailing_ship))
+            for reason in self._heel_problems(ship)
+        ]
+
+    def _heel_problems(self, ship: RollShip) -> list[str]:
+        """Why a ship can't be heeled as she is: the water would be at the tank's roof."""
+        tank = self.vessel.tank
+        _, _, stiffness = coupled_matrices(ship, tank)
+        roll_rad, level_m = np.linalg.solve(stiffness, [ship.heeling_moment_nm, 0.0]).tolist()
+        if abs(level_m) <= tank.level_limit_m:
+            return []
+        return [
+            f"heels steadily by {math.degrees(roll_rad):.0f} degrees, at which the tank is full or "
+            f"empty at one side: lower {' or '.join(SAILED[-2:])}"
+        ]
 
     def _sea_problems(self) -> list[Problem]:
         try:

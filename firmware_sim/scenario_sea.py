@@ -5,7 +5,6 @@ same keys for all of them.
 """
 
 import math
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -13,19 +12,15 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from utank_hil.arrays import FloatArray
 from utank_hil.config_files import Section
-from utank_hil.parameters import Problem, refuse
-from utank_hil.sea import (
-    EffectiveSlope,
-    MeasuredSpectra,
-    Sea,
-    Spectrum,
-    ittc,
-    jonswap,
-    load_ndbc,
-    pierson_moskowitz,
+from utank_hil.config_sea import (
+    IttcSpectrum,
+    JonswapSpectrum,
+    MeasuredSpectrum,
+    PiersonMoskowitzSpectrum,
+    read_spectra,
 )
-
-Positive = Annotated[float, Field(gt=0)]
+from utank_hil.parameters import Positive, Problem, refuse
+from utank_hil.sea import EffectiveSlope, Sea, Spectrum
 
 
 class _AnySea(Section):
@@ -64,76 +59,32 @@ class _IrregularSea(_AnySea):
         )
 
 
-class JonswapSea(_IrregularSea):
+class JonswapSea(JonswapSpectrum, _IrregularSea):
     """A growing sea."""
 
-    kind: Literal["jonswap"]
-    hs_m: Positive
-    tp_s: Positive
-    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
 
-    def spectrum(self) -> Spectrum:
-        """JONSWAP spectrum."""
-        return jonswap(self.hs_m, self.tp_s, self.gamma)
+class IttcSea(IttcSpectrum, _IrregularSea):
+    """A sea of given height and period."""
 
 
-class IttcSea(_IrregularSea):
-    """A sea of given height and period, Bretschneider's two-parameter spectrum."""
-
-    kind: Literal["ittc"]
-    hs_m: Positive
-    tp_s: Positive
-
-    def spectrum(self) -> Spectrum:
-        """ITTC spectrum."""
-        return ittc(self.hs_m, self.tp_s)
+class PiersonMoskowitzSea(PiersonMoskowitzSpectrum, _IrregularSea):
+    """A fully developed sea."""
 
 
-class PiersonMoskowitzSea(_IrregularSea):
-    """A fully developed sea: the height settles the period."""
-
-    kind: Literal["pierson_moskowitz"]
-    hs_m: Positive
-
-    def spectrum(self) -> Spectrum:
-        """Pierson-Moskowitz spectrum."""
-        return pierson_moskowitz(self.hs_m)
-
-
-class MeasuredSea(_IrregularSea):
+class MeasuredSea(MeasuredSpectrum, _IrregularSea):
     """One hour of a buoy's record, in one direction or in the directions measured."""
 
-    kind: Literal["measured"]
-    file: Path
-    """Spectral density, NDBC's yearly or 45-day layout."""
     direction_file: Path | None = None
     """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
-    time: datetime
-    """Start of the record's hour as written in the file, UTC unless it names another zone."""
     course_deg: float | None = None
     """The ship's course, degrees clockwise from true north."""
-
-    @field_validator("file")
-    @classmethod
-    def _readable(cls, file: Path) -> Path:
-        _load(file)
-        return file
 
     @field_validator("direction_file")
     @classmethod
     def _belongs_to_file(cls, direction_file: Path | None, info: ValidationInfo) -> Path | None:
         if direction_file is not None and "file" in info.data:
-            _load(info.data["file"], direction_file)
+            read_spectra(info.data["file"], direction_file)
         return direction_file
-
-    @field_validator("time")
-    @classmethod
-    def _hour_is_there(cls, time: datetime, info: ValidationInfo) -> datetime:
-        if time.tzinfo is not None:
-            time = time.astimezone(UTC).replace(tzinfo=None)
-        if "file" in info.data and _load(info.data["file"]).at(time.isoformat()).moment(0) == 0:
-            raise ValueError("the spectrum holds no energy: choose another hour")
-        return time
 
     @model_validator(mode="after")
     def _one_direction_for_each_band(self) -> Self:
@@ -156,8 +107,8 @@ class MeasuredSea(_IrregularSea):
         return self
 
     def spectrum(self) -> Spectrum:
-        """The hour's spectrum."""
-        return _load(self.file, self.direction_file).at(self.time.isoformat())
+        """The hour's spectrum, with the directions where there are any."""
+        return read_spectra(self.file, self.direction_file).at(self.time.isoformat())
 
     def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:
         """As measured, or `heading_deg` for all bands."""
@@ -188,11 +139,3 @@ ScenarioSea = Annotated[
     Field(discriminator="kind"),
 ]
 """The section ``sea`` of a scenario."""
-
-
-def _load(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
-    """Spectra of a file; pydantic lists ValueErrors with their key, and no other errors."""
-    try:
-        return load_ndbc(file, direction_file)
-    except OSError as error:
-        raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error

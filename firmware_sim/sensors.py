@@ -46,6 +46,8 @@ class SensorErrors:
         Noise of the pressure sensor.
     high_level_m : float
         Level above still water at which a reservoir's high-level switch closes.
+    roll_bias_rad : float
+        Steady error of the motion sensor's roll, which is mounted askew by so much; 0.2 at most.
 
     Raises
     ------
@@ -59,6 +61,7 @@ class SensorErrors:
     level_noise_m: NotNegative = 0.005
     pressure_noise_pa: NotNegative = 100.0
     high_level_m: Positive = 4.6
+    roll_bias_rad: Annotated[float, Range(least=-0.2, most=0.2)] = 0.0
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -126,7 +129,7 @@ class SensorNode:
         frames = [
             self._motion_sender.frame(
                 SensorMotion(
-                    roll_rad + errors.roll_noise_rad * draw(),
+                    roll_rad + errors.roll_bias_rad + errors.roll_noise_rad * draw(),
                     rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
                     _GOOD,
                 )

@@ -9,6 +9,7 @@ import pytest
 
 from firmware_sim import report
 from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
+from firmware_sim.on_board import Place, on_board, on_board_table
 from firmware_sim.report import as_json, endings, figures, motion_table, write_report
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
@@ -48,6 +49,36 @@ def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(stor
     assert endings(result) == []
     assert {name for name, _ in progress} == {run.name for run in result.runs}
     assert max(done_s for _, done_s in progress) <= DURATION_S
+
+
+def test_people_on_board_are_judged_over_the_window_and_stand_in_the_json(storm) -> None:
+    result, _ = storm
+    told = as_json(result, {})["on_board"]
+    assert list(told["runs"]) == ["no tank", *(run.name for run in result.runs)]
+    assert told["place"] == {"height_m": 4.88 + 4.88 - 1.83, "starboard_m": 8.55}
+    roll = result.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
+    expected = on_board(roll, RECORD_S, Place(**told["place"]))
+    assert told["runs"][result.runs[1].name] == dataclasses.asdict(expected)
+    table = on_board_table(result)
+    assert table.row_count == len(told["runs"])
+    assert "7.9 m above" in str(table.caption)
+
+
+def test_plans_that_were_not_found_in_time_are_told() -> None:
+    path = Path("configs/scenarios/patti_b.yaml")
+    scenario = load_config(path, Scenario)
+    hurried = scenario.controllers["constrained"]
+    starved = hurried.model_copy(
+        update={"law": dataclasses.replace(hurried.law, iteration_limit=1)}
+    )
+    scenario = scenario.model_copy(update={"controllers": {"starved": starved}, "settle_s": 5.0})
+    result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
+    passive, run = result.runs
+    assert passive.fallbacks is None
+    assert run.fallbacks is not None
+    assert run.fallbacks > 0
+    assert [each["fallbacks"] for each in as_json(result, {})["runs"]] == [None, run.fallbacks]
+    assert f"starved: {run.fallbacks} plans were not found in time" in " ".join(endings(result))
 
 
 def test_all_runs_are_in_the_same_waves_and_those_are_the_scenarios(storm) -> None:

@@ -70,6 +70,45 @@ def test_refused_model_leaves_reasons_and_no_configuration(tmp_path: Path) -> No
     assert not (tmp_path / "out" / "identified_controller.yaml").exists()
 
 
+def test_refusal_leaves_nothing_of_an_earlier_acceptance(tmp_path: Path) -> None:
+    assert _identify(tmp_path, 9.0)[0] == 0
+    assert _identify(tmp_path, 4.0)[0] == 1
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["identification.png"]
+
+
+def test_configuration_that_is_read_is_not_written_over(tmp_path: Path) -> None:
+    assert _identify(tmp_path, 9.0)[0] == 0
+    given = tmp_path / "out" / "identified_controller.yaml"
+    content = given.read_text()
+    arguments = ["identify", str(tmp_path / "log.rrd"), str(given), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "choose another --out" in " ".join(result.stderr.split())
+    assert given.read_text() == content
+
+
+def test_tables_hold_what_an_engineer_asks_for(tmp_path: Path) -> None:
+    write_recording(tmp_path / "log.rrd", COLUMNS, {"run": _rows(9.0)})
+    arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, ["identify", *arguments, "--order", "60"])
+    words = " ".join(result.stdout.split())
+    for part in (
+        "roll period, s", "± 95 %", "tank damping ratio", "later than configured: roll_rad",
+        "1: frequency, rad/s", "2: frequency, rad/s", "white", "with the",
+        "predictions", "Waves:", "Accepted: peak sensitivity",
+    ):  # fmt: skip
+        assert part in words, part
+    assert max(len(line) for line in result.stdout.splitlines()[:30]) <= 80
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_time_that_is_no_number_is_refused_by_its_option(tmp_path: Path, value: str) -> None:
+    arguments = [str(tmp_path / "log.rrd"), str(CONFIG), "--from", value]
+    result = CliRunner().invoke(app, ["identify", *arguments])
+    assert result.exit_code == 2
+    assert "--from must be a number of seconds" in result.stderr
+
+
 def test_file_that_is_no_recording_is_said_to_be_none(tmp_path: Path) -> None:
     (tmp_path / "log.rrd").write_bytes(b"not a recording")
     result = CliRunner().invoke(app, ["identify", str(tmp_path / "log.rrd"), str(CONFIG)])

@@ -48,7 +48,7 @@ from utank_hil.runtime.signals import SIGNALS
 
 SCENARIO = Path(__file__).resolve().parents[1] / "configs" / "scenarios" / "adaptive.yaml"
 CONTROLLER = "gpc-roll"
-ORDERED_S, REAL_TIME_S = 15.0, 20.0
+ORDERED_S, REAL_TIME_S = 40.0, 20.0
 SECOND_NS = 1_000_000_000
 PERIOD_S = 7.5  # of the ship that the costs are measured with
 WAVE_NM, WAVE_RAD_S = 2e7, 0.6

@@ -22,6 +22,7 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import ParameterError, Problem, refuse
+from utank_hil.record_rules import record_problems
 from utank_hil.runtime.bus_model import SimulatedBus
 from utank_hil.runtime.retuning.settings import RetuningSettings
 from utank_hil.runtime.supervisor import SafetyLimits
@@ -178,15 +179,16 @@ class ControllerConfig(Section):
                     f"most, got {shortest_s:g} and {longest_s:g}",
                 )
             )
-        least_s = 2 * settings.order * period_s
-        if not least_s <= settings.identification_s <= MOST_PULSES_S:
-            problems.append(
-                (
-                    "identification_s",
-                    f"must be {least_s:g} (two samples per order) to {MOST_PULSES_S:g}, got "
-                    f"{settings.identification_s:g}",
-                )
-            )
+        if settings.identification_s > MOST_PULSES_S:
+            reason = f"must be {MOST_PULSES_S:g} at most, got {settings.identification_s:g}"
+            problems.append(("identification_s", reason))
+        problems += record_problems(
+            settings.order,
+            round(settings.identification_s / period_s),
+            len(law.predictor.measured),
+            period_s,
+            settings.roll_period_range_s[0],
+        )
         return [(f"retuning.{name}", reason) for name, reason in problems]
 
     def _law_problems(self) -> list[Problem]:

@@ -1,11 +1,14 @@
 """The laws that a controller configuration can name, and the controllers they become."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 from pydantic import Field
 
 from utank_hil.config_files import Section
+from utank_hil.config_sea import LawSea
 from utank_hil.control import Controller, LinearLaw, PassiveController, PredictiveDesign, PumpLimits
 from utank_hil.control.constrained_design import ConstrainedDesign
 from utank_hil.control.direct_fuzzy import RobustFuzzy, SmallGainFuzzy
@@ -13,9 +16,10 @@ from utank_hil.control.feedback_linearization import FeedbackLinearization
 from utank_hil.control.indirect_fuzzy import IndirectFuzzy
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.pd import PD_MEASURED, design_pd
+from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.stimulate import Stimulation
 from utank_hil.dynamics.linear import STATES
-from utank_hil.parameters import NotNegative, Positive
+from utank_hil.parameters import NotNegative, ParameterError, Positive, Range
 
 if TYPE_CHECKING:
     from utank_hil.config import Vessel
@@ -32,7 +36,8 @@ class BuiltLaw:
     measured : tuple of str
         What it measures, in order; names of `STATES`.
     linear : LinearLaw or None
-        The law for the analysis of its loop, where it is linear and has a loop.
+        The law for the analysis of its loop; of a nonlinear one its slope at rest, with the
+        parameters that it starts from. None where there is no loop.
     """
 
     controller: Controller
@@ -57,6 +62,13 @@ class LQGLaw(Section):
 
     kind: Literal["lqg"]
     design: LQGDesign
+
+
+@dataclass(frozen=True, slots=True)
+class ConstrainedGPCLaw(ConstrainedDesign):
+    """Predictive law that plans within limits; its sea may be named as a scenario's is."""
+
+    sea: LawSea
 
 
 class FeedbackLinearizationLaw(Section):
@@ -102,6 +114,7 @@ class StimulationLaw(Section):
     ramp_s: Positive
     roll_limit_rad: Positive
     correction_s: Positive = 120.0
+    duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
 
 
 Law = Annotated[
@@ -109,7 +122,7 @@ Law = Annotated[
     | PDLaw
     | LQGLaw
     | PredictiveDesign
-    | ConstrainedDesign
+    | ConstrainedGPCLaw
     | FeedbackLinearizationLaw
     | SmallGainFuzzyLaw
     | RobustFuzzyLaw
@@ -117,6 +130,12 @@ Law = Annotated[
     | StimulationLaw,
     Field(discriminator="kind"),
 ]
+
+ADAPTIVE: Final = (SmallGainFuzzyLaw, RobustFuzzyLaw, IndirectFuzzyLaw)
+"""Laws that learn: their margins are those of what they start from."""
+
+NONLINEAR: Final = (FeedbackLinearizationLaw, *ADAPTIVE)
+"""Laws whose margins are those of their slope at rest."""
 
 
 def sample_time(law: Law) -> tuple[str, float]:
@@ -153,7 +172,11 @@ def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) ->
             pd = design_pd(ship, tank)
             return BuiltLaw(pd.controller(), PD_MEASURED, pd)
         case LQGLaw():
-            lqg = law.design.law(ship, tank, delay_s, lag_s)
+            try:
+                lqg = law.design.law(ship, tank, delay_s, lag_s)
+            except ParameterError as error:
+                within = [(f"design.{name}", reason) for name, reason in error.problems]
+                raise ParameterError(error.owner, within) from error
             return BuiltLaw(lqg.controller(), law.design.predictor.measured, lqg)
         case PredictiveDesign():
             predictive = law.law(ship, tank, delay_s, lag_s)
@@ -164,7 +187,7 @@ def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) ->
         case FeedbackLinearizationLaw():
             parameters = law.model_dump(exclude={"kind"})
             linearization = FeedbackLinearization(ship=ship, tank=tank, **parameters)
-            return BuiltLaw(linearization.controller(), STATES)
+            return _nonlinear(linearization.controller, STATES)
         case StimulationLaw():
             parameters = law.model_dump(exclude={"kind"})
             plan = Stimulation(
@@ -177,4 +200,8 @@ def build_law(law: Law, vessel: "Vessel", delay_s: float, limits: PumpLimits) ->
             return BuiltLaw(plan.controller(), STATES)
         case _:
             design = law.design
-            return BuiltLaw(design.controller(), STATES[: len(design.ranges)])
+            return _nonlinear(design.controller, STATES[: len(design.ranges)])
+
+
+def _nonlinear(controller: Callable[[], Controller], measured: tuple[str, ...]) -> BuiltLaw:
+    return BuiltLaw(controller(), measured, slope_at_rest(controller, len(measured)))

@@ -23,6 +23,7 @@ def integrated(
 
     def rates(t: float, x: np.ndarray) -> list[float]:
         k = float(moment.amplitude @ np.cos(moment.frequency_rad_s * t + moment.phase_rad))
+        k += ship.wind_moment_nm + ship.offset_moment_nm
         acceleration = k - ship.damping_nms_rad * x[1] - ship.stiffness_nm_rad * x[0]
         return [x[1], acceleration / ship.inertia_kg_m2]
 
@@ -65,9 +66,12 @@ def test_step_only_samples_the_answer() -> None:
     np.testing.assert_allclose(fine[::10], coarse, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("heel", [{}, {"wind_moment_nm": 3e7, "offset_moment_nm": -1e7}])
 @pytest.mark.parametrize("change_s", [0.01, 60.0, 60.02, 99.99])
-def test_ship_that_is_loaded_differently_rolls_on_from_where_she_is(change_s: float) -> None:
-    later = replace(SHIP, inertia_kg_m2=1.73475e9, stiffness_nm_rad=6.74625e8)
+def test_ship_that_is_loaded_differently_rolls_on_from_where_she_is(
+    change_s: float, heel: dict[str, float]
+) -> None:
+    later = replace(SHIP, inertia_kg_m2=1.73475e9, stiffness_nm_rad=6.74625e8, **heel)
     moment = Harmonics(np.array([2e7, -3e7]), np.array([0.5, 0.62]), np.array([2.0, -0.3]))
     step_s, count = 0.05, 2001
     time_s = step_s * np.arange(count)
@@ -91,6 +95,14 @@ def test_change_after_the_end_changes_nothing_and_one_at_the_start_everything() 
     assert np.array_equal(roll, roll_without_tank(SHIP, moment, 0.1, 100))
     at_once = roll_without_tank(SHIP, moment, 0.1, 100, later_ship=stiffer)
     np.testing.assert_allclose(at_once, roll_without_tank(stiffer, moment, 0.1, 100), atol=1e-15)
+
+
+def test_wind_heels_the_ship_to_where_her_stiffness_holds_it() -> None:
+    calm = Harmonics(np.zeros(1), np.ones(1), np.zeros(1))
+    roll = roll_without_tank(replace(SHIP, wind_moment_nm=2e7), calm, 1.0, 3000)
+    assert roll[0] == 0
+    assert roll.max() > 1.8 * 2e7 / 4.81875e8  # a gust overshoots
+    assert roll[-1] == pytest.approx(2e7 / 4.81875e8, rel=1e-9)
 
 
 def test_overdamped_ship_is_refused() -> None:

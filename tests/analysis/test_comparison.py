@@ -12,6 +12,8 @@ from rich.console import Console
 from utank_hil.analysis.comparison import Loop, compare, comparison_table
 from utank_hil.analysis.loop_pictures import draw_bode, draw_nyquist
 from utank_hil.analysis.record_pictures import draw_phase, draw_time
+from utank_hil.analysis.sea_response import CalmSeaError
+from utank_hil.analysis.trade import trade
 from utank_hil.control import GPC_ROLL, PD_MEASURED, PredictiveLaw, design_pd
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.sea import Harmonics
@@ -108,3 +110,12 @@ def test_no_record_and_too_many_are_refused(tmp_path: Path):
         records = {str(n): time for n in range(number)}
         with pytest.raises(ValueError, match=f"got {number}"):
             draw_time(time, {"x": records}, tmp_path / "t.png", "None")
+
+
+@pytest.mark.parametrize("amplitude_nm", [0.0, 1.0])
+def test_a_sea_that_does_not_roll_the_ship_is_refused_by_name(amplitude_nm):
+    calm = Harmonics(np.array([amplitude_nm]), np.array([0.5]), np.zeros(1))
+    with pytest.raises(CalmSeaError, match="does not roll the ship"):
+        compare([GPC], SHIP, TANK, calm)
+    with pytest.raises(CalmSeaError, match="does not roll the ship"):
+        trade(GPC_ROLL, SHIP, TANK, calm)

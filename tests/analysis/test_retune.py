@@ -9,7 +9,7 @@ from recorded_ship import DELAY_S, LAG_S, TANK, record_of, ship_of, task_of
 
 from utank_hil.analysis.closed_loop import closed_loop_radius
 from utank_hil.analysis.margins import margins
-from utank_hil.analysis.retune import identify, retune
+from utank_hil.analysis.retune import identify, judge, retune
 from utank_hil.arrays import FloatArray
 from utank_hil.control import pump_model
 from utank_hil.dynamics.sampling import sample
@@ -32,6 +32,25 @@ def test_law_for_the_ship_of_the_record_is_found_under_a_regular_wave(
     plant = pump_model(ship_of(period_s), TANK, task.design.predictor.measured)
     assert margins(answer.whole_law(), plant, DELAY_S, LAG_S).peak_sensitivity < 2.0
     assert isinstance(read_answer(answer_bytes(answer)), Candidate)
+
+
+@pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
+def test_steady_heel_of_two_degrees_changes_neither_ship_nor_verdict(
+    outputs: int, order: int
+) -> None:
+    task = task_of(outputs, order)
+    upright, heeled = record_of(outputs), record_of(outputs)
+    heeled[:, 1] += np.radians(2.0)
+    heeled[:, 2:] += 0.3  # the water runs to the low side
+    found = [identify(record, task) for record in (upright, heeled)]
+    assert found[1].validation.one_step_fit.min() > 0.95
+    for name in ("inertia_kg_m2", "stiffness_nm_rad"):
+        one, other = (getattr(each.fit.ship, name) for each in found)
+        assert other == pytest.approx(one, rel=2e-3)
+    answers = [
+        judge(record, each, task) for record, each in zip((upright, heeled), found, strict=True)
+    ]
+    assert type(answers[0]) is type(answers[1]), answers
 
 
 def test_wave_and_modes_are_found_on_the_way() -> None:
@@ -90,7 +109,7 @@ def test_record_without_a_ship_in_it_is_refused(record: FloatArray) -> None:
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (lambda record: record[:400], "too short: order 40 needs 140 s, it has 80"),
+        (lambda record: record[:400], "the record is too short: order 40 needs 140 s, it has 80"),
         (lambda record: _with(record, slice(2100, 2500, 45), np.nan), "gaps leave"),
         (lambda record: _with(record, slice(2050, 2200), np.nan), "too much of the record"),
         (lambda record: np.clip(record, -1e9, 0.6 * record.max(axis=0)), "clipped or stuck"),

@@ -228,10 +228,10 @@ def test_scenario_refuses_a_controller_of_another_ship(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("actual", "key", "reason"),
     [
-        ({"mass_kg": 1.0}, "actual_ship.mass_kg", "a ship has inertia_kg_m2, stiffness_nm_rad"),
+        ({"mass_kg": 1.0}, "actual_ship.mass_kg", "it takes inertia_kg_m2, stiffness_nm_rad"),
         ({"inertia_kg_m2": -1.0}, "actual_ship.inertia_kg_m2", "must be above 0"),
         ({"stiffness_nm_rad": 1e7}, "actual_ship", "takes all of the ship's stability"),
-        ({"gz_m": 1.0}, "actual_ship", "object"),
+        ({"gz_m": 1.0}, "actual_ship.gz_m", "it takes inertia_kg_m2"),
     ],
 )
 def test_ship_that_a_scenario_changes_is_checked_too(
@@ -334,3 +334,43 @@ def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data:
         work = retuner_work(each)
         retuner = None if work is None else SimulatedRetuner(work[0], 5.0)
         build_controller_node(each, retuner=retuner)
+
+
+@pytest.mark.parametrize(
+    ("shipped", "changes", "missed"),
+    [
+        ("feedback_linearization", {"law__level_damping_ratio": 0.0}, "unstable on its own ship"),
+        ("feedback_linearization", {"law__frequency_rad_s": 50.0}, "unstable on its own ship"),
+        ("fuzzy_robust", {"law__design__initial": [500.0, 0.0]}, "unstable on its own ship"),
+    ],
+)
+def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accepts_it(
+    tmp_path: Path, shipped: str, changes: dict[str, object], missed: str
+) -> None:
+    refused = invoke("check", controller(tmp_path, shipped, **changes))
+    assert refused.exit_code == 1
+    assert missed in refused.stdout
+    assert "margins of its slope at rest" in refused.stdout
+    started = invoke("run", controller(tmp_path, shipped, **changes), "--bus", "nowhere0")
+    assert started.exit_code == 2
+    assert "the law misses its margins" in started.stderr
+    accepted = invoke("check", controller(tmp_path, shipped, **changes, accept_low_margins=True))
+    assert accepted.exit_code == 0
+    assert "accepted by the configuration" in accepted.stdout
+
+
+@pytest.mark.parametrize(("weight", "hardly"), [(1e-6, True), (1.23e12, False)])
+def test_law_that_hardly_acts_is_told_so(tmp_path: Path, weight: float, hardly: bool) -> None:
+    text = invoke("check", controller(tmp_path, "gpc", law__output_weight=[weight])).stdout
+    assert "All requirements are met." in text
+    assert ("It hardly acts" in text) == hardly
+
+
+@pytest.mark.parametrize("shipped", ["feedback_linearization", "fuzzy_robust"])
+def test_shipped_nonlinear_law_has_the_margins_that_are_required(shipped: str) -> None:
+    path = CONFIGS / "controllers" / f"{shipped}.yaml"
+    report = json.loads(invoke("check", path, "--json").stdout)
+    assert report["accepted"]
+    assert report["failures"] == []
+    assert report["robustness"]["nominal"]["radius"] < 1
+    assert ("parameters it starts from" in report["at_rest"]) == (shipped == "fuzzy_robust")

@@ -59,3 +59,38 @@ def test_tank_command_says_how_far_the_tank_is_from_the_best():
     assert found["best"]["frequency_ratio"] == pytest.approx(1.0, abs=0.01)
     table = run("tank", CONFIGS / "ships" / "thesis_first.yaml").stdout
     assert f"{found['best']['duct_area_m2']:.2f}" in table
+
+
+def test_a_calm_sea_is_refused_with_the_scenario_s_name(two_factors, tmp_path: Path):
+    still = CONFIGS / "scenarios" / "still_water.yaml"
+    result = run("controller", GPC, "--scenario", still, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    for word in ("still_water.yaml", "does not roll the ship", "--scenario"):
+        assert word in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "sea"),
+    [
+        ("gpc", "Storm of 10 February 2019"),
+        ("patti_b_constrained_gpc", "Patti-B in a beam sea"),
+        ("naval_constrained_gpc", "Naval vessel in a beam sea"),
+    ],
+)
+def test_a_law_is_traded_in_the_sea_of_its_own_vessel(name: str, sea: str, monkeypatch, tmp_path):
+    monkeypatch.setattr(trade, "WEIGHT_FACTORS", (1.0,))
+    path = CONFIGS / "controllers" / f"{name}.yaml"
+    found = json.loads(run("controller", path, "--out", tmp_path, "--json").stdout)
+    assert found["scenario"] == sea
+
+
+def test_a_vessel_without_a_scenario_needs_one_to_be_named(tmp_path: Path):
+    ship = CONFIGS / "ships" / "thesis_first.yaml"
+    path = tmp_path / "own.yaml"
+    path.write_text(GPC.read_text().replace("../ships/thesis_first.yaml", str(tmp_path / "s.yaml")))
+    (tmp_path / "s.yaml").write_text(ship.read_text().replace("1.9275e+9", "1.93e+9"))
+    result = run("controller", path, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "no shipped scenario is for" in result.stderr
+    assert "--scenario" in result.stderr

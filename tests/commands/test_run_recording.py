@@ -41,7 +41,9 @@ class Instant:
 
     url = None
 
-    def __init__(self, ring: str, file: Path, live: bool = False) -> None:
+    def __init__(
+        self, ring: str, file: Path, live: bool = False, events: str | None = None
+    ) -> None:
         file.write_text(ring)
 
     def stop(self) -> RecorderReport:
@@ -90,7 +92,7 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
     # a folder that is gone when the recorder comes to it, as a disk may be
     folder = tmp_path / "gone"
 
-    def unplugged(ring: str, file: Path, live: bool = False) -> Instant:
+    def unplugged(ring: str, file: Path, **others: object) -> Instant:
         shutil.rmtree(folder)
         raise RecorderError(f"the recorder of {file} did not start: no such folder")
 

@@ -1,5 +1,7 @@
 """Constrained GPC: the analytic law inside the limits, an independent optimum at them."""
 
+import math
+
 import clarabel
 import numpy as np
 import pytest
@@ -32,14 +34,18 @@ def respond(arx, u, y, newest_u):
 
 
 @settings(max_examples=40)
-@given(seed=st.integers(0, 2**32 - 1), order=st.integers(1, 5), targeted=st.booleans())
-def test_without_active_limits_it_is_the_analytic_law(seed, order, targeted):
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    order=st.integers(1, 5),
+    targets=st.sampled_from([None, (2,), (12, 2)]),
+)
+def test_without_active_limits_it_is_the_analytic_law(seed, order, targets):
     rng = np.random.default_rng(seed)
     arx = random_arx(rng, order)
     args = (8, 12, (1.0, 0.3), 0.7, 2)
     one = design_gpc(arx, *args).controller()
     other = design_constrained_gpc(arx, WIDE, *args, level_output=1).controller()
-    target = rng.normal(size=2) if targeted else None
+    target = None if targets is None else rng.normal(size=targets)
     for _ in range(20):
         y, left = rng.normal(size=2), rng.normal(size=1)
         expected = one.step(y, target)
@@ -228,3 +234,71 @@ def test_reset_makes_it_as_new():
     controller.reset()
     y = np.array([1.0, -2.0])
     np.testing.assert_allclose(controller.step(y), fresh.step(y), rtol=1e-9)
+
+
+def test_power_limit_bounds_pressure_times_the_water_s_speed():
+    # water with inertia, driven to a level far away
+    drag, push = 0.05, 2e-3
+    arx = ARX(np.array([[[2 - drag]], [[drag - 1]]]), np.array([[[0.0]], [[push]], [[0.0]]]), 0.2)
+    area, target = 3.0, np.array([50.0])
+
+    def powers(power_w):
+        limits = PumpLimits(pressure_pa=10.0, rate_pa_s=1e3, level_m=1e3, power_w=power_w)
+        controller = design_constrained_gpc(
+            arx,
+            limits,
+            8,
+            8,
+            (100.0,),
+            0.01,
+            level_output=0,
+            level_penalty=100.0,
+            reservoir_area_m2=area,
+        ).controller()
+        level = step_m = 0.0
+        found = []
+        for _ in range(100):
+            command = float(controller.step(np.array([level]), target)[0])
+            step_m = (1 - drag) * step_m + push * command
+            level += step_m
+            found.append(area * command * step_m / 0.2)
+        return np.array(found)
+
+    assert powers(math.inf).max() == pytest.approx(
+        area * 10.0 * (push * 10.0 / drag) / 0.2, rel=0.02
+    )
+    assert 19.0 < powers(20.0).max() < 22.0  # the speed it reckons with is that of the last plan
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"level_penalty": -1.0}, "level_penalty must be positive"),
+        ({"level_penalty": math.nan}, "level_penalty must be positive"),
+        ({"iteration_limit": 0}, "iteration_limit must be 1 or more"),
+        ({"level_output": 7}, "level_output must be one of the 2 outputs, 0 to 1, got 7"),
+        ({"level_output": -1}, "level_output must be"),
+        ({"input_weight": math.inf}, "input_weight positive, and both finite"),
+        ({"input_weight": 0.0}, "input_weight positive"),
+        ({"output_weight": (1.0, math.nan)}, "output_weight must be zero or more"),
+        ({"output_weight": (1.0,)}, "output_weight must have 2 numbers"),
+        ({"first_output": 12}, "first_output must be 0 to 11"),
+        ({"control_horizon": 13}, "control_horizon <= prediction_horizon"),
+        ({"reservoir_area_m2": None}, "needs the reservoir_area_m2"),
+        ({"reservoir_area_m2": -1.0}, "reservoir_area_m2 must be positive"),
+        ({"level_output": None}, "name the level_output"),
+    ],
+)
+def test_what_is_out_of_range_is_refused_by_name(change, message):
+    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=1.0, level_m=1.0, power_w=1.0)
+    settings = {
+        "control_horizon": 8,
+        "prediction_horizon": 12,
+        "output_weight": (1.0, 1.0),
+        "level_output": 1,
+        "reservoir_area_m2": 1.0,
+    }
+    arx = random_arx(np.random.default_rng(3), 2)
+    design_constrained_gpc(arx, limits, **settings)
+    with pytest.raises(ValueError, match=message):
+        design_constrained_gpc(arx, limits, **{**settings, **change})

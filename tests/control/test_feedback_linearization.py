@@ -151,6 +151,8 @@ def test_controller_gives_the_blended_pressure():
     [
         ({"frequency_rad_s": 0.0}, "frequency_rad_s"),
         ({"soft_level_m": 2.0}, "soft_level_m"),
+        ({"hard_level_m": 2.1}, "hard_level_m 2.1: the reservoirs end at 2 m"),
+        ({"hard_level_m": 9.0}, "hard_level_m"),
         ({"shift_rad_m": -0.1}, "shift_rad_m"),
         ({"sample_time_s": np.inf}, "sample_time_s"),
     ],

@@ -56,7 +56,7 @@ def test_nothing_near_the_unlimited_plan_is_cheaper_and_the_hessian_tells_by_how
     terminal = rng.normal(size=(3, 4))
     horizon = condense(plant, KNOTS, 9, WEIGHT, 0.3, first_output=2, terminal=terminal)
     state, target = rng.normal(size=4), rng.normal(size=2)
-    best = horizon.unlimited_state @ state + horizon.unlimited_target @ target
+    best = horizon.unlimited_state @ state + horizon.unlimited_target.sum(axis=0) @ target
 
     def cost(plan):
         return cost_of(plant, state, horizon.interpolation @ plan, target, terminal)

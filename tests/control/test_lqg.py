@@ -150,6 +150,31 @@ def test_constant_reference_is_reached_where_inputs_suffice():
     np.testing.assert_allclose(y, target, atol=1e-8)
 
 
+def test_nothing_is_solved_in_a_step(monkeypatch):
+    controller = small_law().controller()
+
+    def refuse(*_):
+        raise AssertionError("solved in a step")
+
+    for name in ("solve", "pinv", "inv", "lstsq"):
+        monkeypatch.setattr(np.linalg, name, refuse)
+    controller.step(np.ones(3), np.ones(3))
+
+
+def test_model_with_an_integrator_is_controlled_but_takes_no_reference():
+    a = np.array([[1.0, 0.2], [0.0, 0.9]])
+    model = LinearModel(a, np.array([[0.0], [0.2]]), np.eye(2)[:1], np.zeros((1, 1)), 0.2)
+    law = design_lqg(model, design_lqr(model, 1.0, 1.0), np.eye(2), np.eye(1))
+    controller, x, u = law.controller(), np.array([1.0, 0.0]), np.zeros(1)
+    for _ in range(200):
+        y = model.C @ x
+        x = a @ x + model.B @ u
+        u = controller.step(y)
+    assert abs(x[0]) < 1e-6
+    with pytest.raises(ValueError, match="reference: the law's model has a pole at 1"):
+        controller.step(y, np.ones(1))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -59,7 +59,18 @@ def test_trends_of_the_thesis():
     assert peaks == sorted(peaks, reverse=True)
 
 
-@pytest.mark.parametrize("bad", [(0.0, 0.2, 0.0), (1.2, 0.2, 0.0), (0.05, np.nan), (0.05, 1, -1)])
-def test_ratios_out_of_range_are_refused(bad):
-    with pytest.raises(ValueError, match="_ratio must"):
+@pytest.mark.parametrize(
+    ("bad", "name"),
+    [
+        ((0.0, 0.2, 0.0), "mass_ratio"),
+        ((1.2, 0.2, 0.0), "mass_ratio"),
+        ((0.05, np.nan), "coupling_ratio"),
+        ((0.05, 1, -1), "roll_damping_ratio"),
+        ((0.05, 1, np.inf), "roll_damping_ratio"),
+        ((0.05, 1, 0.0, np.nan), "static_coupling"),
+        ((0.05, 1, 0.0, -np.inf), "static_coupling"),
+    ],
+)
+def test_ratios_out_of_range_are_refused_by_name(bad, name):
+    with pytest.raises(ValueError, match=f"{name} must"):
         ShipTankRatios(*bad)

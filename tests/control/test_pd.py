@@ -58,3 +58,9 @@ def test_gain_law_answers_the_newest_measurement_less_its_reference():
     a, b, c, d, _ = law.matrices()
     for point, response in zip(z, law.response(z), strict=True):
         np.testing.assert_allclose(response, c @ np.linalg.solve(point * np.eye(2) - a, b) + d)
+
+
+@pytest.mark.parametrize("sample_time_s", [-1.0, 0.0, np.nan])
+def test_impossible_sample_time_is_refused(sample_time_s):
+    with pytest.raises(ValueError, match="sample_time_s must be"):
+        design_pd(SHIP, TANK, sample_time_s)

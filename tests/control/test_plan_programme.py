@@ -12,6 +12,7 @@ from utank_hil.dynamics.sampling import LinearModel
 PLANT = LinearModel(np.full((1, 1), 0.9), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)), 1.0)
 LIMITS = PumpLimits(pressure_pa=0.5, rate_pa_s=0.2, level_m=1.0)
 HORIZON = condense(PLANT, tuple(range(12)), 12, np.ones(1), 1e-3)
+TO_TARGET = HORIZON.unlimited_target.sum(axis=0)[:, 0]  # a constant one
 LOW, HIGH = np.full(12, -0.5), np.full(12, 0.5)
 
 
@@ -28,7 +29,7 @@ def levels_of(plan, start):
 
 def solve(start: float, target: float = 2.0, last: float = 0.0):
     one = programme()
-    best = HORIZON.unlimited_state[:, 0] * start + HORIZON.unlimited_target[:, 0] * target
+    best = HORIZON.unlimited_state[:, 0] * start + TO_TARGET * target
     free = HORIZON.outputs_state[one.held, 0, 0] * start
     assert not one.respects(best, LOW, HIGH, last, free)
     plan = one.solve(-HORIZON.hessian @ best, LOW, HIGH, last, free)
@@ -62,6 +63,6 @@ def test_a_plan_is_accepted_only_within_every_limit():
 def test_without_a_level_output_nothing_holds_the_level():
     one = PlanProgramme(HORIZON, LIMITS, 1.0, None, 1.0, 100)
     assert len(one.held) == 0
-    best = HORIZON.unlimited_target[:, 0] * 5.0
+    best = TO_TARGET * 5.0
     plan = one.solve(-HORIZON.hessian @ best, LOW, HIGH, 0.0, np.zeros(0))
     assert levels_of(plan, 0.0).max() > 2.0

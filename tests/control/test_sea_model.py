@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov, solve_toeplitz
 
-from utank_hil.analysis.closed_loop import state_space_response
 from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
 
 SPECTRUM = jonswap(4.7, 10.0)
@@ -55,6 +55,26 @@ def test_one_step_forecast_error_is_that_of_a_long_regression():
     error = covariance[0] - weights @ covariance[1:]
     shaping = model.shaping_filter(TS)
     assert (shaping.C @ shaping.B).item() ** 2 == pytest.approx(error, rel=0.1)
+
+
+@pytest.mark.parametrize("sample_time_s", [0.2, 0.1, 0.05, 0.02, 0.01])
+def test_front_of_the_sea_is_as_steep_at_any_sample_time(sample_time_s):
+    omega = np.linspace(0.05, 2.0, 400)
+    model = sea(order=8, floor=1.3e-3)
+    shaping = model.shaping_filter(sample_time_s)
+    found = state_space_response(shaping, np.exp(1j * omega * sample_time_s))[:, 0, 0]
+    density = np.abs(found) ** 2 * sample_time_s / np.pi
+    expected = model.slope_density(omega)
+    expected += model.floor * expected.max()
+    calm = omega < 0.5  # below the front there is little but the floor
+    assert density[calm].sum() == pytest.approx(expected[calm].sum(), rel=0.2)
+    assert density[~calm].sum() == pytest.approx(expected[~calm].sum(), rel=0.02)
+
+
+def test_sample_time_with_too_few_samples_for_the_order_is_refused():
+    assert len(sea(order=15).shaping_filter(10.0).A) == 15
+    with pytest.raises(ValueError, match=r"order 16 must be below 16, the samples in 160 s"):
+        sea(order=16).shaping_filter(10.0)
 
 
 @pytest.mark.parametrize("field", ["effective_slope", "order", "floor", "smoothing_rad_s"])

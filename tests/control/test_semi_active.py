@@ -118,6 +118,15 @@ def test_range_out_of_order_is_refused(losses):
         ValveRange(*losses)
 
 
-def test_negative_threshold_is_refused():
-    with pytest.raises(ValueError, match="threshold"):
-        OnOffValve(VALVE, -1.0)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"threshold_rad_m_s2": -1.0}, "threshold_rad_m_s2 must be zero or more"),
+        ({"threshold_rad_m_s2": math.inf}, "threshold_rad_m_s2 must be"),
+        ({"sample_time_s": -1.0}, "sample_time_s must be 0.001 to 10"),
+        ({"sample_time_s": math.nan}, "sample_time_s must be"),
+    ],
+)
+def test_valve_law_out_of_range_is_refused_by_name(change, message):
+    with pytest.raises(ValueError, match=message):
+        OnOffValve(VALVE, **change)

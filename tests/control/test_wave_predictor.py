@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
-from utank_hil.analysis.closed_loop import state_space_response
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.control.ship_design import pump_model
 from utank_hil.control.wave_predictor import sea_plant
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, coupled_model
 from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +148,28 @@ def test_with_the_motor_off_and_no_wave_energy_never_grows() -> None:
         assert after_j <= before_j * (1 + 1e-6)
         before_j = after_j
     assert plant.pump_energy_j > 0
+
+
+@pytest.mark.parametrize("after_s", [0.0, 2.0])
+def test_wind_and_cargo_heel_the_ship_and_the_water_runs_to_the_low_side(after_s: float) -> None:
+    heeled = replace(VESSEL.ship, wind_moment_nm=2.5e7, offset_moment_nm=-5e6)
+    upright = VESSEL.ship if after_s else heeled
+    plant = Plant(upright, VESSEL.tank, VESSEL.pump, CALM)
+    plant.change_ship(heeled, round(after_s * 1e9))
+    plant.advance(0)
+    for tick in range(80_000):
+        plant.drive_pump(0.0, enabled=True)
+        plant.advance((tick + 1) * TICK_NS)
+        if tick == 199 and after_s:
+            assert (plant.roll_rad, plant.level_m) == (0.0, 0.0)
+    # hydrostatics: the water is level, and carries its own moment to that side
+    level_m = plant.roll_rad * VESSEL.tank.width_m / 2
+    assert plant.level_m == pytest.approx(level_m, rel=1e-4)
+    _, _, stiffness = coupled_matrices(VESSEL.ship, VESSEL.tank)
+    moment_nm = stiffness[0] @ [plant.roll_rad, plant.level_m]
+    assert moment_nm == pytest.approx(2e7, rel=1e-4)
+    assert plant.roll_rad > 2e7 / VESSEL.ship.stiffness_nm_rad
+    assert plant.wave_moment_nm == 0.0
 
 
 def test_wave_moment_is_the_sum_of_harmonics_after_half_an_hour() -> None:

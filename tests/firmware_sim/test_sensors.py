@@ -1,5 +1,6 @@
 import math
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,6 +102,21 @@ def test_motion_is_as_old_as_the_delay_says_and_the_tank_is_not(delay_ms: int) -
     np.testing.assert_allclose(levels, bench.true(2)[::2], rtol=0, atol=LEVEL_STEP_M)
 
 
+def test_roll_is_off_by_the_bias_and_nothing_else_is() -> None:
+    straight, askew = SensorBench(EXACT), SensorBench(replace(EXACT, roll_bias_rad=0.035))
+    for bench in (straight, askew):
+        bench.run(500)
+    off = askew.column(SensorMotion, "roll_rad") - straight.column(SensorMotion, "roll_rad")
+    np.testing.assert_allclose(off, 0.035, rtol=0, atol=ROLL_STEP_RAD)
+    for message, field in (
+        (SensorMotion, "roll_rate_rad_s"),
+        (SensorTank, "starboard_level_m"),
+        (SensorPump, "pressure_pa"),
+    ):
+        same = straight.column(message, field)
+        np.testing.assert_array_equal(askew.column(message, field), same)
+
+
 def test_noise_is_white_and_as_large_as_configured() -> None:
     errors = SensorErrors(2e-3, 5e-3, 0.0, 0.02, 900.0)
     bench = SensorBench(errors)
@@ -167,6 +183,7 @@ def test_high_level_switches_close_on_the_true_level_of_their_own_side() -> None
         ({"roll_noise_rad": -1e-4}, "roll_noise_rad must be zero or more"),
         ({"motion_delay_ms": -20.0}, "motion_delay_ms must be 0 to 1000"),
         ({"motion_delay_ms": 25.0}, "motion_delay_ms must be a multiple of 10, got 25"),
+        ({"roll_bias_rad": 1.0}, "roll_bias_rad must be -0.2 to 0.2"),
         ({"level_noise_m": math.nan}, "level_noise_m must be zero or more"),
     ],
 )

@@ -19,6 +19,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
+    arx,
     era,
     era_with_observer,
     find_disturbance_frequencies,
@@ -113,6 +114,17 @@ def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() 
     np.testing.assert_allclose(
         result.markov[:300, :, 0], result.arx.simulate(pulse), atol=1e-12 * result.markov.max()
     )
+
+
+def test_arx_is_the_model_that_okid_begins_with() -> None:
+    rng = np.random.default_rng(3)
+    u, y = rng.standard_normal((800, 2)), rng.standard_normal((800, 2)).cumsum(axis=0)
+    known = {"disturbance_frequencies_rad_s": (0.6,), "disturbance_polynomial_degree": 0}
+    found, whole = arx(u, y, 12, 0.2, **known), okid(u, y, 12, 0.2, **known)
+    assert np.array_equal(found.alpha, whole.arx.alpha)
+    assert np.array_equal(found.beta, whole.arx.beta)
+    with pytest.raises(IdentificationError, match="rows"):
+        arx(u[:30], y[:30], 12)
 
 
 def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:

@@ -91,6 +91,18 @@ def test_held_out_record_of_the_ship_is_predicted() -> None:
     assert result.simulation_fit.min() > 0.985
 
 
+def test_offset_beside_which_a_model_was_identified_is_no_error_of_it() -> None:
+    model, u, y = _arx_record(3)
+    upright = validate(model, u, y, disturbance_polynomial_degree=0)
+    for heel in (5.0, -500.0):
+        heeled = validate(model, u, y + heel, disturbance_polynomial_degree=0)
+        for name in ("one_step_fit", "simulation_fit", "residual_correlation"):
+            expected = getattr(upright, name)
+            np.testing.assert_allclose(getattr(heeled, name), expected, rtol=0, atol=1e-7)
+        blind = validate(model, u, y + heel)
+        assert blind.one_step_fit.max() < upright.one_step_fit.min()
+
+
 def test_record_that_does_not_fit_is_refused() -> None:
     model, u, y = _arx_record(1)
     with pytest.raises(ValueError, match="2 outputs and 1 inputs, the record 1 and 1"):

@@ -154,10 +154,11 @@ def retuned(tmp_path_factory: pytest.TempPathFactory) -> Story:
 
 @pytest.fixture(scope="module")
 def refused(tmp_path_factory: pytest.TempPathFactory) -> Story:
-    """A sixth of what the order needs is no record."""
+    """She rolls more than identification is allowed in."""
 
     def attempt(folder: Path) -> Story:
-        return tell_story(folder, SHORT | {"identification_s": 15.0}, REFUSED)
+        changes = SHORT | {"identification_s": IDENTIFICATION_S, "roll_limit_rad": 0.01}
+        return tell_story(folder, changes, REFUSED)
 
     return persistent(attempt, tmp_path_factory.mktemp("refused"))
 
@@ -234,8 +235,8 @@ def test_swap_makes_no_step_and_disturbs_nothing(retuned: Story) -> None:
 
 
 def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(refused: Story) -> None:
-    assert refused.states == [IDLE, IDENTIFY, DESIGN, REFUSED], refused.reasons
-    assert "too short" in refused.reasons["REFUSED"]
+    assert refused.states == [IDLE, IDENTIFY, REFUSED], refused.reasons
+    assert "above the limit" in refused.reasons["REFUSED"]
     assert_nothing_was_disturbed(refused)
     since_s = min(f.time_s for f in refused.of("CTRL_STATUS") if f.signals["retuning"] == REFUSED)
     after = {f.signals["pressure_pa"] for f in in_charge(refused) if f.time_s > since_s + 0.5}

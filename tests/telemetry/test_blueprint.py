@@ -39,6 +39,8 @@ def test_every_column_of_every_run_is_plotted_once_a_page(runs: list[str]) -> No
             assert sorted(names) == SHOWN
         lanes = [view for view in views(page) if isinstance(view, rrb.StateTimelineView)]
         assert len(lanes) == 1
+        (log,) = (view for view in views(page) if isinstance(view, rrb.TextLogView))
+        assert log.contents == [f"/{number}/{run}/log" for number, run in enumerate(runs, start=1)]
 
 
 def test_the_live_page_follows_and_a_recording_stands_still() -> None:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.image
@@ -52,6 +53,29 @@ def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
     assert pixels(long, YELLOW_BAND).any()
     assert not pixels(short, YELLOW_BAND).any()
     assert short.shape[1] < long.shape[1]
+
+
+def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path: Path) -> None:
+    curves = [curve("passive", 1800.0, 0.1, 300.0), curve("active", 1800.0, 0.05, 700.0)]
+    plain = read(draw_bench(curves, tmp_path / "a.png", "A storm"))
+    centres = []
+    for trial_s in (600.0, 900.0):
+        state = np.zeros(len(curves[1].time_s))
+        for since_s, entered in ((-300.0, 1), (0.0, 3), (300.0, 4), (600.0, 0)):
+            state[curves[1].time_s >= trial_s + since_s] = entered
+        active = replace(curves[1], retuning=state)
+        image = read(draw_bench([curves[0], active], tmp_path / "a.png", "A storm"))
+        panel = image.shape[1] // 2
+        assert image.shape[0] > plain.shape[0]
+        band = np.flatnonzero(pixels(image, YELLOW_BAND)[:, :panel].any(axis=0))
+        a_second = (band[-1] - band[0]) / 180.0  # what the zoom is wide
+        centres.append(band.mean())
+        # the lane lies below the plots: of each strength a stretch as long as the state lasted
+        lane = image[int(0.85 * image.shape[0]) : int(0.93 * image.shape[0]), :panel]
+        for strength in (0.25, 0.55, 1.0):
+            columns = np.flatnonzero(pixels(lane, 1 - strength * (1 - BLUE)).sum(axis=0) > 5)
+            assert columns[-1] - columns[0] == pytest.approx(300.0 * a_second, rel=0.05)
+    assert centres[1] - centres[0] == pytest.approx(300.0 * a_second, rel=0.05)
 
 
 def test_more_runs_than_colours_are_refused(tmp_path: Path) -> None:

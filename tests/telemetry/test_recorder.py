@@ -7,14 +7,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from utank_hil.canbus import Mode, RetuningState
+from utank_hil.runtime.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import (
+    EventWriter,
     RecorderError,
     RecorderProcess,
     RecorderReport,
@@ -48,6 +52,26 @@ def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:
 def recorded(file: Path) -> np.ndarray:
     run = read_recording(file)["live"]
     return np.stack([run[column] for column in SIGNALS], axis=1)
+
+
+@dataclass(frozen=True)
+class Line:
+    time_ns: int
+    level: str
+    text: str
+
+
+def text_log(file: Path) -> list[Line]:
+    """Lines of the text log, in the order of their times; those without one at the end."""
+    lines = []
+    for chunk in RrdReader(file).stream().filter(components=["TextLog:text", "TextLog:level"]):
+        batch = chunk.to_record_batch()
+        timed = "time" in batch.schema.names
+        times = batch.column("time").to_numpy().astype(np.int64) if timed else [1 << 62]
+        levels, texts = (batch.column(f"TextLog:{part}").to_pylist() for part in ("level", "text"))
+        for time_ns, (level,), (text,) in zip(times, levels, texts, strict=True):
+            lines.append(Line(int(time_ns), level, text))
+    return sorted(lines, key=lambda line: line.time_ns)
 
 
 def any_recorded(file: Path) -> bool:
@@ -117,12 +141,58 @@ def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path:
     report = recorder.stop()
     assert report == RecorderReport(rows=64, lost=236)
     np.testing.assert_allclose(recorded(file), rows[236:], rtol=4e-16)
-    texts = [
-        text
-        for chunk in RrdReader(file).stream().filter(components="TextLog:text")
-        for text in chunk.to_record_batch().column("TextLog:text").to_pylist()
+    states = [Mode(number).name for number in sorted(set(rows[236:, SIGNALS.index("mode")]))]
+    assert [line.text for line in text_log(file)] == [
+        *states,
+        "236 rows lost: the recorder was too slow",
     ]
-    assert texts == [["236 rows lost: the recorder was too slow"]]
+
+
+def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    began = RetuningEvent(5_000_000_000, RetuningState.IDENTIFY, ("ordered by the operator",))
+    refused = RetuningEvent(7_500_000_000, RetuningState.REFUSED, ("too short", "or too long"))
+    with EventWriter() as events, RingWriter(SIGNALS) as ring:
+        events.write(began, 4_000_000_000)  # before the recorder is there
+        recorder = RecorderProcess(ring.name, file, events=events.name)
+        feed(ring, table(100))
+        events.write(refused, 4_000_000_000)
+    assert recorder.stop() == RecorderReport(rows=100, lost=0)
+    assert [line for line in text_log(file) if "retuning" in line.text] == [
+        Line(1_000_000_000, "INFO", "retuning IDENTIFY: ordered by the operator"),
+        Line(3_500_000_000, "WARN", "retuning REFUSED: too short; or too long"),
+    ]
+
+
+def test_reasons_survive_a_controller_that_is_killed(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    code = f"""
+import os, signal, sys
+import numpy as np
+from utank_hil.canbus import RetuningState
+from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.telemetry import EventWriter, RingWriter
+ring, events = RingWriter({SIGNALS!r}), EventWriter()
+print(ring.name, events.name, flush=True)
+sys.stdin.readline()
+ring.write(np.zeros({len(SIGNALS)}))
+events.write(RetuningEvent(0, RetuningState.REFUSED, ("why it was",)), 0)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    writer = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert writer.stdout is not None
+    ring, events = writer.stdout.readline().split()
+    recorder = RecorderProcess(ring, file, events=events)
+    writer.communicate("\n")
+    wait_for(lambda: recorder._process.poll() == 0)
+    recorder.stop()
+    assert "retuning REFUSED: why it was" in [line.text for line in text_log(file)]
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])

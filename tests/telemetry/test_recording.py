@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from utank_hil.canbus.enumerations import Fault
+from utank_hil.canbus.enumerations import Fault, RetuningState
+from utank_hil.runtime.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import read_recording, write_recording
 
@@ -60,6 +61,29 @@ def test_states_are_logged_when_they_change(tmp_path: Path) -> None:
     ]
     times_ns = batch.column("time").to_numpy().astype(np.int64)
     assert times_ns.tolist() == [0, 1_000_000_000, 3_000_000_000, 4_000_000_000]
+    logs = (
+        RrdReader(tmp_path / "a.rrd").stream().filter(components=["TextLog:text", "TextLog:level"])
+    )
+    (log,) = (chunk.to_record_batch() for chunk in logs)
+    assert log.column("TextLog:text").to_pylist() == batch.column("StateChange:state").to_pylist()
+    assert log.column("TextLog:level").to_pylist() == [["INFO"], ["INFO"], ["ERROR"], ["WARN"]]
+    assert log.column("time").to_numpy().astype(np.int64).tolist() == times_ns.tolist()
+
+
+def test_events_of_a_run_are_in_its_own_log(tmp_path: Path) -> None:
+    rows = np.zeros((5, 2))
+    rows[:, 0] = np.arange(5.0)
+    event = RetuningEvent(2_000_000_000, RetuningState.REFUSED, ("too short",))
+    runs = {"passive": rows, "dpc": rows}
+    write_recording(tmp_path / "a.rrd", ["time_s", "roll_rad"], runs, {"dpc": [event]})
+    (chunk,) = (
+        RrdReader(tmp_path / "a.rrd").stream().filter(components=["TextLog:text", "TextLog:level"])
+    )
+    batch = chunk.to_record_batch()
+    assert chunk.entity_path == "/2/dpc/log"
+    assert batch.column("TextLog:text").to_pylist() == [["retuning REFUSED: too short"]]
+    assert batch.column("time").to_numpy().astype(np.int64).tolist() == [2_000_000_000]
+    assert list(read_recording(tmp_path / "a.rrd")) == ["passive", "dpc"]
 
 
 def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: Path) -> None:

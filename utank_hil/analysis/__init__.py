@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from utank_hil.analysis.record_pictures import draw_phase, draw_time
     from utank_hil.analysis.response import ResponseAmplitude, simulated_response
     from utank_hil.analysis.sea_stack import stacked_seas
-    from utank_hil.analysis.stimulation import Stimulation, stimulate_on_still_water, tuned_tank
+    from utank_hil.analysis.stimulation import StimulatedRoll, stimulate_on_still_water, tuned_tank
     from utank_hil.analysis.survival import Survival, controlled_run, largest_survivable_wave
 
 __all__ = [
@@ -38,7 +38,7 @@ __all__ = [
     "Probability",
     "ResponseAmplitude",
     "RollDecay",
-    "Stimulation",
+    "StimulatedRoll",
     "Survival",
     "Threshold",
     "capsize_map",
@@ -72,7 +72,7 @@ _LAZY = {
     "Probability": "capsize",
     "ResponseAmplitude": "response",
     "RollDecay": "decay",
-    "Stimulation": "stimulation",
+    "StimulatedRoll": "stimulation",
     "Survival": "survival",
     "Threshold": "capsize",
     "capsize_map": "capsize_maps",

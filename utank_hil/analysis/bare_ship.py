@@ -20,13 +20,14 @@ def roll_without_tank(
 ) -> FloatArray:
     """Linear roll from rest at time 0 under a sum of harmonics, on a uniform grid.
 
-    Each component's steady answer, plus the free decay that makes angle and rate what they are at
-    the start: exact, whatever the step.
+    Each component's steady answer and the steady heel, plus the free decay that makes angle and
+    rate what they are at the start: exact, whatever the step.
 
     Parameters
     ----------
     ship : RollShip
-        Inertia, linear damping and stiffness count; lightly damped (damping ratio below one).
+        Inertia, linear damping, stiffness and what heels her steadily count; lightly damped
+        (damping ratio below one).
     wave_moment : Harmonics
         In N m.
     step_s : float
@@ -78,20 +79,21 @@ class _Motion:
         self._steady = Harmonics(np.abs(answer), omega, np.angle(answer))
         self._steady_rate = Harmonics(np.abs(answer) * omega, omega, np.angle(answer) + math.pi / 2)
         self._start_s = start_s
-        self._angle = angle - float(self._steady.at(start_s))
+        self._heel = ship.heeling_moment_nm / ship.stiffness_nm_rad
+        self._angle = angle - self._heel - float(self._steady.at(start_s))
         self._rate = rate - float(self._steady_rate.at(start_s))
 
     def series(self, step_s: float, first: int, count: int) -> FloatArray:
         """Roll at ``step_s * (first + arange(count))``."""
         since_s = step_s * np.arange(first, first + count, dtype=float) - self._start_s
         free, _ = self._free(since_s)
-        return np.asarray(self._steady.series(step_s, count, first * step_s) + free)
+        return np.asarray(self._heel + self._steady.series(step_s, count, first * step_s) + free)
 
     def at(self, time_s: float) -> tuple[float, float]:
         """Angle and rate at one time."""
         free, free_rate = self._free(np.array(time_s - self._start_s))
         return (
-            float(self._steady.at(time_s) + free),
+            float(self._heel + self._steady.at(time_s) + free),
             float(self._steady_rate.at(time_s) + free_rate),
         )
 

@@ -18,17 +18,10 @@ import numpy as np
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.transfer import state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace
-
-
-def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
-    """Transfer matrix of a model at complex points s (or z), shape (N, outputs, inputs)."""
-    a, b, c, d = system.A, system.B, system.C, system.D
-    resolvent = np.asarray(points)[:, None, None] * np.eye(a.shape[0]) - a
-    response: ComplexArray = c @ np.linalg.solve(resolvent, b.astype(np.complex128)) + d
-    return response
 
 
 def closed_loop_eigenvalues(

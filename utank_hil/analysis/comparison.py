@@ -10,6 +10,7 @@ from utank_hil.analysis.performance_index import performance_index
 from utank_hil.analysis.sea_response import (
     MotionInSea,
     motion_in_sea,
+    require_roll,
     rms,
     roll_response_without_tank,
 )
@@ -87,11 +88,17 @@ def compare(
         The sea's roll moment in N m.
     delay_s, lag_s : float
         As in `sampled_model`.
+
+    Raises
+    ------
+    CalmSeaError
+        If the sea does not roll the ship: there is no roll to compare.
     """
     system = coupled_model(ship, tank)
     response = roll_response_without_tank(ship, wave_moment.frequency_rad_s)
     bare = MotionInSea(rms(response, wave_moment), 0.0, 0.0)
     passive = motion_in_sea(None, system, ("roll_rad",), wave_moment)
+    require_roll(passive)
 
     def row(
         name: str,

@@ -5,19 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
-from utank_hil.analysis.closed_loop import state_space_response
-from utank_hil.analysis.retune import HELD_OUT, Identification, RetuningTask
+from utank_hil.analysis.retune import Identification, RetuningTask
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control import pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.identification import (
     DisturbanceBasis,
     StabilizationPoint,
     hankel_singular_values,
     stabilization,
 )
+from utank_hil.record_rules import first_part
 from utank_hil.telemetry.style import COLORS, picture
 
 SHOWN_S = 120.0
@@ -48,7 +49,7 @@ def draw_identification(
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx
     step_s = arx.sample_time_s
-    split = round((1 - HELD_OUT) * len(record))
+    split = first_part(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
     basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)

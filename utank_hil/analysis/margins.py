@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from utank_hil.analysis.closed_loop import (
-    closed_loop_eigenvalues,
-    closed_loop_radius,
-    state_space_response,
-)
+from utank_hil.analysis.closed_loop import closed_loop_eigenvalues, closed_loop_radius
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.transfer import state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -44,6 +41,8 @@ class Margins:
     disk_margin : float
         Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex
         abs(d) < 1, is harmless (symmetric disk); 2 is the most there is.
+    peak_loop_gain : float
+        Greatest abs(L); far below one the law does nothing for the roll, however robust.
     """
 
     radius: float
@@ -54,6 +53,7 @@ class Margins:
     phase_margin_rad: float
     delay_margin_s: float
     disk_margin: float
+    peak_loop_gain: float
 
 
 def margins(
@@ -80,9 +80,10 @@ def margins(
     plant = sample(system, law.sample_time_s, delay_s, lag_s)
     radius = closed_loop_radius(law, plant)
     peak, peak_frequency_rad_s = peak_sensitivity(law, plant)
-    if radius >= 1:
-        return Margins(radius, peak, peak_frequency_rad_s, 1, 1, 0, 0, 0)
     loop = loop_response(law, plant, _frequencies(law, plant))
+    peak_gain = float(np.abs(loop).max())
+    if radius >= 1:
+        return Margins(radius, peak, peak_frequency_rad_s, 1, 1, 0, 0, 0, peak_gain)
     low, high = _gain_margins(loop)
     return Margins(
         radius=radius,
@@ -93,6 +94,7 @@ def margins(
         phase_margin_rad=_phase_margin(loop),
         delay_margin_s=_delay_margin(law, system, delay_s, lag_s),
         disk_margin=float(1 / np.abs(1 / (1 - loop) - 0.5).max()),
+        peak_loop_gain=peak_gain,
     )
 
 
@@ -150,9 +152,10 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
 
 def _phase_margin(loop: ComplexArray) -> float:
     """Least angle of L from the positive real axis where its magnitude crosses one."""
-    size = np.log(np.abs(loop))
-    turn = np.flatnonzero(size[:-1] * size[1:] < 0)
-    share = size[turn] / (size[turn] - size[turn + 1])
+    size = np.abs(loop)
+    turn = np.flatnonzero((size[:-1] < 1) != (size[1:] < 1))  # a loop may be zero, its log is not
+    before, after = np.log(size[turn]), np.log(size[turn + 1])
+    share = before / (before - after)
     angle = np.angle(loop[turn] + share * (loop[turn + 1] - loop[turn]))
     return float(np.abs(angle).min(initial=np.inf))
 

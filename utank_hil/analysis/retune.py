@@ -37,18 +37,15 @@ from utank_hil.identification import (
 from utank_hil.identification.acceptance import ModelLimits, model_objections
 from utank_hil.identification.lag_regression import unbroken
 from utank_hil.identification.ship_fit import ShipFit, fit_ship
+from utank_hil.record_rules import LAGS, LEAST_PREDICTIONS, first_part, record_problems
 from utank_hil.runtime.retuning import Answer, Candidate, ModelSummary, Refusal, Work
 
-HELD_OUT = 0.2
-"""Part of the record, its end, that the model is judged on."""
 MOST_MISSING = 0.2
 """Part of the samples that may be missing."""
 LEAST_MOTION = (10.0, 1e-6)
 """Spread of the command in Pa, and of each output in its unit, below which nothing happened."""
-LEAST_PREDICTIONS = 100
-"""On held-out data, for a verdict on the model."""
-LAGS = 25
-"""Samples over which prediction errors are to be uncorrelated."""
+OFFSET = 0
+"""Degree of the polynomial beside the model: a steady heel, or a sensor's bias, is no motion."""
 LARGEST = 1e9
 """No command or output of a ship is as large in SI units."""
 LEAST_GAIN = 0.05
@@ -157,11 +154,19 @@ def retune(record: FloatArray, task: RetuningTask) -> Answer:
     record = np.where(np.isfinite(record), record, np.nan)
     try:
         found = identify(record, task)
-        objections = model_objections(found.validation, found.fit, task.limits)
-        if objections:
-            return Refusal(objections)
-        return _designed(record, found, task)
     except (IdentificationError, np.linalg.LinAlgError) as error:
+        return Refusal((str(error),))
+    return judge(record, found, task)
+
+
+def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
+    """Design for what `identify` found in a record, and judge: the rest of `retune`."""
+    objections = model_objections(found.validation, found.fit, task.limits)
+    if objections:
+        return Refusal(objections)
+    try:
+        return _designed(record, found, task)
+    except np.linalg.LinAlgError as error:
         return Refusal((str(error),))
 
 
@@ -182,23 +187,22 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
             f"a record has the columns command, {', '.join(predictor.measured)}; this one has "
             f"shape {record.shape}"
         )
-    memory_s, shortest_s = task.order * predictor.sample_time_s, task.limits.roll_period_range_s[0]
-    if memory_s < shortest_s:  # such a model takes waves for the ship, and is sure of it
-        raise IdentificationError(
-            f"order {task.order} remembers {memory_s:g} s, less than the shortest roll period of "
-            f"{shortest_s:g} s: raise the order"
-        )
-    split = round((1 - HELD_OUT) * len(record))
-    lost = max(task.order, LAGS)  # predictions, at the start and after every gap
-    needed_s = (LEAST_PREDICTIONS + lost) / HELD_OUT * predictor.sample_time_s
-    if len(record) - split - lost < LEAST_PREDICTIONS:
-        raise IdentificationError(
-            f"the record is too short: order {task.order} needs {needed_s:.0f} s, it has "
-            f"{len(record) * predictor.sample_time_s:.0f}"
-        )
+    problems = record_problems(
+        task.order,
+        len(record),
+        len(predictor.measured),
+        predictor.sample_time_s,
+        task.limits.roll_period_range_s[0],
+    )
+    if problems:
+        names = {"order": "order", "identification_s": "the record"}
+        reasons = (f"{names[name]} {reason}" for name, reason in problems)
+        raise IdentificationError("; ".join(reasons))
+    split = first_part(len(record))
     _refuse_empty(record[:split])
     _refuse_empty(record[split:])
     stretches = [stop - start for start, stop in unbroken(record[split:])]
+    lost = max(task.order, LAGS)  # predictions, at the start and after every gap
     predictions = sum(max(0, length - lost) for length in stretches)
     if predictions < LEAST_PREDICTIONS:
         raise IdentificationError(
@@ -213,9 +217,9 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         task.order,
         predictor.sample_time_s,
         disturbance_frequencies_rad_s=waves,
-        disturbance_polynomial_degree=0,
+        disturbance_polynomial_degree=OFFSET,
     )
-    validation = validate(result.arx, record[split:, :1], record[split:, 1:], waves, LAGS)
+    validation = validate(result.arx, record[split:, :1], record[split:, 1:], waves, LAGS, OFFSET)
     fit = fit_ship(result, u, task.ship, task.tank, predictor.measured, task.delay_s, task.lag_s)
     return Identification(result, waves, validation, fit)
 

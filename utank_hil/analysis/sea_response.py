@@ -5,7 +5,7 @@ and level limits take away is not in it.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -17,6 +17,13 @@ from utank_hil.sea import Harmonics
 
 if TYPE_CHECKING:
     from control import StateSpace
+
+LEAST_ROLL_RAD: Final = 1e-6
+"""Less roll than this is none: a share of it says nothing."""
+
+
+class CalmSeaError(ValueError):
+    """A sea that does not roll the ship: there is nothing to take away from her roll."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +76,15 @@ def motion_in_sea(
         )
     roll, level = (motions[:, system.output_labels.index(name)] for name in ("roll_rad", "level_m"))
     return MotionInSea(*(rms(answer, wave_moment) for answer in (roll, level, pressure)))
+
+
+def require_roll(passive: MotionInSea) -> None:
+    """Raise a `CalmSeaError` where the ship with her passive tank does not roll."""
+    if not passive.roll_rms_rad >= LEAST_ROLL_RAD:
+        raise CalmSeaError(
+            "the sea does not roll the ship, so no law can be compared: it needs waves, and not "
+            "from ahead or astern"
+        )
 
 
 def rms(response: ComplexArray, waves: Harmonics) -> float:

@@ -12,7 +12,7 @@ from utank_hil.dynamics.simulate import whole_steps
 STEP_S = 0.02
 
 
-class Stimulation(NamedTuple):
+class StimulatedRoll(NamedTuple):
     """What happened on still water.
 
     Attributes
@@ -65,7 +65,7 @@ def stimulate_on_still_water(
     *,
     off_s: float = 141.0,
     duration_s: float = 300.0,
-) -> Stimulation:
+) -> StimulatedRoll:
     """Pump sinusoidally from rest, stop, and watch the roll fall.
 
     Parameters
@@ -80,7 +80,7 @@ def stimulate_on_still_water(
 
     Returns
     -------
-    Stimulation
+    StimulatedRoll
 
     Raises
     ------
@@ -99,6 +99,6 @@ def stimulate_on_still_water(
     turning = np.exp(-1j * frequency_rad_s * run.time_s[last])
     roll, level = (np.sum(run.state[last, k] * turning) for k in (0, 2))
     loud = run.time_s[size > stimulated / 10]
-    return Stimulation(
+    return StimulatedRoll(
         run, stimulated, float(np.angle(level / roll)), float((loud[-1] - off_s) / cycle_s)
     )

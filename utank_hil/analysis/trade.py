@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.robustness import Robustness, robustness
-from utank_hil.analysis.sea_response import MotionInSea, motion_in_sea
+from utank_hil.analysis.sea_response import MotionInSea, motion_in_sea, require_roll
 from utank_hil.control.constrained_design import ConstrainedDesign
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.limits import PumpLimits
@@ -123,6 +123,11 @@ def trade(
         Positive; `WEIGHT_FACTORS` or `HORIZON_FACTORS` when left out.
     progress : callable, optional
         Told the finished fraction.
+
+    Raises
+    ------
+    CalmSeaError
+        If the sea does not roll the ship: there is no roll to trade.
     """
     horizon = varied(design) == "control horizon"
     if factors is None:
@@ -134,6 +139,7 @@ def trade(
         design.measured if isinstance(design, ConstrainedDesign) else design.predictor.measured
     )
     passive = motion_in_sea(None, system, measured, wave_moment)
+    require_roll(passive)
     points = []
     for number, factor in enumerate(factors, 1):
         law = _law(scaled(design, factor), ship, tank, delay_s, lag_s, limits)

@@ -62,12 +62,14 @@ def bench(
     """
     # the ship's side stands above this package: loaded only where a scenario is needed
     from firmware_sim.bench import BenchOptions, run_bench
+    from firmware_sim.on_board import on_board_table
     from firmware_sim.report import (
         REPORT_FILES,
         as_json,
         endings,
         motion_table,
         pump_table,
+        retuning_table,
         write_report,
     )
     from firmware_sim.scenario import Scenario
@@ -108,6 +110,10 @@ def bench(
         console = Console()
         print_table(console, motion_table(result))
         print_table(console, pump_table(result))
+        print_table(console, on_board_table(result))
+        retuning = retuning_table(result)
+        if retuning is not None:
+            print_table(console, retuning)
         for ending in endings(result):
             console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}

@@ -60,9 +60,10 @@ def check(
 
 
 def judge(config: ControllerConfig) -> Robustness | None:
-    """Robustness of a configuration's law; None if it is nonlinear or has no loop.
+    """Robustness of a configuration's law; None if it has no loop.
 
-    Ends the command if the margins can't be computed: then the law can't be trusted either.
+    Of a nonlinear law it is that of its slope at rest (`BuiltLaw.linear`). Ends the command if the
+    margins can't be computed: then the law can't be trusted either.
     """
     vessel = config.vessel
     built = build_law(config.law, vessel, config.delay_s, config.limits)

@@ -14,10 +14,13 @@ from utank_hil.analysis.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.commands.tables import print_table
 from utank_hil.config import ControllerConfig, Vessel
-from utank_hil.config_laws import build_law
+from utank_hil.config_laws import ADAPTIVE, NONLINEAR, build_law
 from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
 
-NO_LOOP = "The law is nonlinear or passive: it has no margins of a linear loop."
+NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
+
+LEAST_LOOP_GAIN = 0.05
+"""Below it a law that has all margins is told to do nothing; the shipped ones have 1.3 and more."""
 
 Judged = dict[str, tuple[ControllerConfig, Robustness | None]]
 
@@ -29,6 +32,7 @@ def controller_json(config: ControllerConfig, report: Robustness | None) -> dict
         "vessel": config.vessel.name,
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
+        "at_rest": _at_rest(config),
         "limits": _finite(asdict(config.limits)),
         "robustness": None if report is None else _finite(asdict(report)),
         "delay_margin_searched_s": None if report is None else _searched_s(config),
@@ -115,12 +119,15 @@ def print_controller(config: ControllerConfig, report: Robustness | None) -> Non
     table.add_row("phase margin", _phase(margin), "")
     table.add_row("delay margin", _delay(config, margin), "over 20 ms")
     table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
-    table.add_row(
-        "largest eigenvalue, roll period 0.7 to 1.3, gain 0.8 to 1.2",
-        f"{report.worst_radius:.4f}",
-        "less than 1",
+    table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
+    table.add_row("largest eigenvalue of the grid", f"{report.worst_radius:.4f}", "less than 1")
+    table.caption = (
+        "grid: roll period 0.7 to 1.3 by stiffness or inertia,\n"
+        "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
     )
     print_table(console, table)
+    for remark in _remarks(config, report):
+        console.print(remark, soft_wrap=True)
     for failure in report.failures():
         console.print(f"[red]missed:[/red] {escape(failure)}")
     if report.failures():
@@ -162,6 +169,9 @@ def print_scenario(name: str, vessel: Vessel, judged: Judged) -> None:
             else verdict,
         )  # fmt: skip
     print_table(console, table)
+    for each, (config, report) in judged.items():
+        for remark in () if report is None else _remarks(config, report):
+            console.print(f"{escape(each)}: {remark}", soft_wrap=True)
     for each, (_, report) in judged.items():
         for failure in () if report is None else report.failures():
             console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}")
@@ -229,6 +239,23 @@ def _searched_s(config: ControllerConfig) -> float:
     """Extra delay up to which the loop was found stable, when no margin was found."""
     linear = build_law(config.law, config.vessel, config.delay_s, config.limits).linear
     return 0.0 if linear is None else DELAY_SAMPLES * linear.sample_time_s
+
+
+def _remarks(config: ControllerConfig, report: Robustness) -> list[str]:
+    """What is to be said of margins beside whether they are missed."""
+    said = [note for note in (_at_rest(config),) if note is not None]
+    gain = report.nominal.peak_loop_gain
+    if gain < LEAST_LOOP_GAIN:
+        said.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
+    return said
+
+
+def _at_rest(config: ControllerConfig) -> str | None:
+    """What the margins of a nonlinear law are those of; None for a linear one."""
+    if not isinstance(config.law, NONLINEAR):
+        return None
+    learning = " with the parameters it starts from" if isinstance(config.law, ADAPTIVE) else ""
+    return f"The law is nonlinear: these are the margins of its slope at rest{learning}."
 
 
 def _accepted(config: ControllerConfig, report: Robustness | None) -> bool:

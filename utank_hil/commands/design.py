@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
+from pydantic import BaseModel
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
@@ -36,8 +37,12 @@ design = new_app("Design a law or a tank: what it could be, and what it would co
 def controller(
     config: Annotated[Path, typer.Argument(help="Controller configuration.")],
     scenario: Annotated[
-        Path, typer.Option(help="Scenario whose sea counts.", show_default="the measured storm")
-    ] = STORM,
+        Path | None,
+        typer.Option(
+            help="Scenario whose sea counts.",
+            show_default="the shipped one of the controller's vessel",
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for picture and figures.")] = OUT,
     json_: Json = False,
 ) -> None:
@@ -49,6 +54,7 @@ def controller(
     [bold]Example:[/bold] utank-hil design controller configs/controllers/gpc.yaml
     """
     from firmware_sim.scenario import Scenario  # the ship's side stands above this package
+    from utank_hil.analysis.sea_response import CalmSeaError
     from utank_hil.analysis.trade import Design, trade
     from utank_hil.analysis.trade_picture import draw_trade
 
@@ -56,24 +62,28 @@ def controller(
     law = loaded.law.design if isinstance(loaded.law, LQGLaw) else loaded.law
     if not isinstance(law, Design):
         fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
-    sea = load(scenario, Scenario)
-    prepare_out(out, (PICTURE, FIGURES))
     vessel = loaded.vessel
+    path = _scenario_of(vessel) if scenario is None else scenario
+    sea = load(path, Scenario)
+    prepare_out(out, (PICTURE, FIGURES))
     bar = Progress(
         TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal
     )
-    with bar:
-        task = bar.add_task("", total=1.0)
-        result = trade(
-            law,
-            vessel.ship,
-            vessel.tank,
-            _wave_moment(sea, vessel.ship),
-            loaded.delay_s,
-            vessel.pump.lag_s,
-            limits=loaded.limits,
-            progress=lambda done: bar.update(task, completed=done),
-        )
+    try:
+        with bar:
+            task = bar.add_task("", total=1.0)
+            result = trade(
+                law,
+                vessel.ship,
+                vessel.tank,
+                _wave_moment(sea, vessel.ship),
+                loaded.delay_s,
+                vessel.pump.lag_s,
+                limits=loaded.limits,
+                progress=lambda done: bar.update(task, completed=done),
+            )
+    except CalmSeaError as error:
+        fail(f"{path}: sea: {error}; name another scenario with --scenario")
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
     title = f"{loaded.name}: {vessel.name} in {sea.name}"
     limits = loaded.limits
@@ -123,6 +133,22 @@ def tank(
         sys.stdout.write(json.dumps(figures) + "\n")
         return
     Console(highlight=False).print(_tank_table(loaded.name, present, optimum))
+
+
+def _scenario_of(vessel: Vessel) -> Path:
+    """The shipped scenario of a vessel: the storm for its ship, else the first that is for her."""
+    shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
+    own = (p for p in shipped if load(p, _VesselOfScenario).vessel.version == vessel.version)
+    path = next(own, None)
+    if path is None:
+        fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
+    return path
+
+
+class _VesselOfScenario(BaseModel):
+    """Whom a scenario is for; the rest of it may cost the design of its controllers."""
+
+    vessel: Vessel
 
 
 def _wave_moment(scenario: "Scenario", ship: RollShip) -> Harmonics:

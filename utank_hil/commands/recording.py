@@ -1,16 +1,16 @@
 """The recording of a run: if it fails, the controller runs all the same, and the user is told."""
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from itertools import count
 from pathlib import Path
 from typing import Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
+from utank_hil.commands.stamps import unused_stamp
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter
 
+NAME: Final = "run-{}.rrd"
 RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
 
 
@@ -44,6 +44,8 @@ class RunRecording:
         recording of a run that crashed is what tells why.
     live : bool
         Serve viewers too.
+    events : str, optional
+        Name of the run's ring of events, to be recorded beside the rows.
 
     Attributes
     ----------
@@ -51,7 +53,7 @@ class RunRecording:
         Complete after `stop`.
     """
 
-    def __init__(self, folder: Path, live: bool = False) -> None:
+    def __init__(self, folder: Path, live: bool = False, events: str | None = None) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
@@ -59,10 +61,10 @@ class RunRecording:
         if reason is not None:
             self.summary.error = reason
             return
-        file = _new_file(folder)
+        file = folder / NAME.format(unused_stamp(folder, NAME))
         try:
             self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
-            self._recorder = RecorderProcess(self._ring.name, file, live=live)
+            self._recorder = RecorderProcess(self._ring.name, file, live=live, events=events)
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
             self.stop()
@@ -92,14 +94,3 @@ class RunRecording:
                 self.summary.error = str(error)
             else:
                 self.summary.rows, self.summary.lost = report.rows, report.lost
-
-
-def _new_file(folder: Path) -> Path:
-    """Path of a file named by the time, and numbered where that is taken."""
-    stem = f"run-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
-    path = folder / f"{stem}.rrd"
-    for number in count(2):
-        if not path.exists():
-            break
-        path = folder / f"{stem}-{number}.rrd"
-    return path

@@ -13,8 +13,10 @@ from rich.markup import escape
 
 from utank_hil.analysis.retune import retuner_work
 from utank_hil.canbus import PortError, SocketCanPort
+from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
@@ -27,7 +29,7 @@ from utank_hil.runtime import (
 )
 from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.retuning import RetunerProcess
-from utank_hil.telemetry import open_viewer
+from utank_hil.telemetry import event_text, open_viewer
 
 
 def run(
@@ -35,7 +37,11 @@ def run(
     bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
     duration: Duration = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the recording; without it none is made.")
+        Path | None,
+        typer.Option(
+            help="Folder for the recording, and for configurations of ships that retuning finds; "
+            "without it there are none."
+        ),
     ] = None,
     json_: Json = False,
     view: View = False,
@@ -43,7 +49,8 @@ def run(
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
     It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
-    (UTC) of their start; a recording that fails is told, and the controller runs without.
+    (UTC) of their start; a recording that fails is told, and the controller runs without. A
+    controller that retunes itself tells each step with its reasons when it happens.
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -57,9 +64,17 @@ def run(
             fail(error)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
+        folder = OUT if out is None and view else out
+        work = retuner_work(loaded)
+        announcer = None
+        if work is not None:
+            announcer = _announcer(config, loaded, folder)
+            stack.callback(announcer.stop)
         recording = None
-        if out is not None or view:
-            recording = RunRecording(OUT if out is None else out, live=view)
+        if folder is not None:
+            recording = RunRecording(
+                folder, live=view, events=None if announcer is None else announcer.ring
+            )
             stack.callback(recording.stop)
             if recording.summary.error is not None:
                 notes.print(
@@ -67,13 +82,13 @@ def run(
                 )
             elif recording.url is not None:
                 _show(recording.url, stack)
-        work = retuner_work(loaded)
         retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
         node = build_controller_node(
             loaded,
             retuner=retuner,
             statistics=statistics,
             sink=None if recording is None else recording.write,
+            event_sink=None if announcer is None else announcer.write,
         )
         with suppress(PortError):  # the loop meets it too, and its node reacts
             port.receive()  # what came while the law was designed is old, and must not look fresh
@@ -84,15 +99,19 @@ def run(
             RealTimeLoop([node], port, statistics=statistics).run(
                 stop, None if duration is None else round(duration * 1e9)
             )
+    if announcer is not None and announcer.error is not None:
+        notes.print(f"[red]retuning was not told:[/red] {escape(announcer.error)}", soft_wrap=True)
     if json_:
         summary = {
             "mode": node.mode.name,
             "fault": node.fault.name,
+            "fallbacks": node.fallbacks,
             "retuning": [
                 {
                     "time_s": (event.time_ns - node.start_ns) * 1e-9,
                     "state": event.state.name,
                     "reasons": list(event.reasons),
+                    "found": None if event.found is None else asdict(event.found),
                 }
                 for event in node.retuning_events
             ],
@@ -105,12 +124,22 @@ def run(
     print_table(console, timing_table({loaded.name: statistics}))
     for event in node.retuning_events:
         console.print(
-            f"{(event.time_ns - node.start_ns) * 1e-9:8.0f} s retuning {event.state.name}",
-            *event.reasons,
+            f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {escape(event_text(event))}",
+            soft_wrap=True,
         )
     console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
+    if node.fallbacks:
+        console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:
         _tell(console, recording.summary)
+
+
+def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
+    """Who tells what retuning does, and keeps in `folder` what it found."""
+    ships = None
+    if folder is not None:
+        ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))
+    return Announcer(ships)
 
 
 def _show(url: str, stack: ExitStack) -> None:

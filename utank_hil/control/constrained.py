@@ -17,6 +17,7 @@ lasts, the tank is passive.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.plan_programme import PlanProgramme
 from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.parameters import Positive, Range, range_problems, refuse
 
 _FOLLOWED = 0.02  # of the greatest pressure: a mean command this near to the plan's counts as it
 
@@ -56,6 +58,11 @@ class ConstrainedLaw:
         From the state to the command that belongs to that part.
     iteration_limit : int
         Budget of a programme.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, or the power is limited without a level to tell it from.
     """
 
     model: LinearModel
@@ -63,11 +70,25 @@ class ConstrainedLaw:
     horizon: Horizon
     limits: PumpLimits
     level_output: int | None
-    level_penalty: float
-    reservoir_area_m2: float
+    level_penalty: Positive
+    reservoir_area_m2: Positive
     steady_state: FloatArray
     steady_command: FloatArray
-    iteration_limit: int = 60
+    iteration_limit: Annotated[int, Range(least=1)] = 60
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        outputs = len(self.model.C)
+        if self.level_output is not None and not 0 <= self.level_output < outputs:
+            reason = f"must be one of the {outputs} outputs, 0 to {outputs - 1}"
+            problems.append(("level_output", f"{reason}, got {self.level_output}"))
+        if self.level_output is None and self.limits.power_w < math.inf:
+            reason = (
+                f"{self.limits.power_w:g} can't be kept without the water's speed: name the "
+                "level_output, or set power_w to infinity"
+            )
+            problems.append(("limits.power_w", reason))
+        refuse("constrained law", problems)
 
     @property
     def sample_time_s(self) -> float:
@@ -114,7 +135,8 @@ class ConstrainedController:
         self._a, self._b, self._c, self._d = model.A, model.B[:, 0], model.C, model.D[:, 0]
         self._observer_gain = law.observer_gain
         self._plan_gain = horizon.unlimited_state @ (np.eye(len(model.A)) - law.steady_state)
-        self._target_gain = horizon.unlimited_target
+        self._target_gains = horizon.unlimited_target
+        self._constant_target_gain: FloatArray = horizon.unlimited_target.sum(axis=0)
         self._hessian = horizon.hessian
         self._steady_command = law.steady_command
         self._interpolation = horizon.interpolation
@@ -153,11 +175,13 @@ class ConstrainedController:
         self._last_pa = 0.0  # the command that left last
         self.limited = False
         self.fallbacks = 0
+        self._programme.forget()
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement, shape (m,), and return the command, shape (1,).
 
-        `reference`, shape (m,), is a constant target of the outputs.
+        `reference`, shape (m,) or (N, m), is the target of the outputs: one for the whole horizon,
+        or one for each sample of it.
         """
         state, mean = self._state, self._mean_pa
         surprise = y - self._c.dot(state) - self._d * mean
@@ -165,7 +189,10 @@ class ConstrainedController:
         self._state = state
         best = self._plan_gain.dot(state)
         if reference is not None:
-            best += self._target_gain @ reference
+            if reference.ndim == 1:
+                best += self._constant_target_gain @ reference
+            else:
+                best += np.einsum("qjm,qm->j", self._target_gains, reference)
         self._plan_pa = self._plan(best, float(self._steady_command.dot(state)))
         # the solver keeps its bounds to a tolerance
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa

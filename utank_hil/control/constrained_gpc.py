@@ -1,5 +1,7 @@
 """Generalized predictive control of an ARX model within limits."""
 
+import math
+
 import numpy as np
 
 from utank_hil.control.arx import ARX
@@ -19,6 +21,7 @@ def design_constrained_gpc(
     *,
     level_output: int | None = None,
     level_penalty: float = 1e14,
+    reservoir_area_m2: float | None = None,
     iteration_limit: int = 100,
 ) -> ConstrainedLaw:
     """Generalized predictive control (`design_gpc`) within limits.
@@ -28,20 +31,23 @@ def design_constrained_gpc(
     arx : ARX
         One input.
     limits : PumpLimits
-        Of which pressure, rate and level count.
+        Of which pressure, rate, level and power count.
     control_horizon, prediction_horizon, output_weight, input_weight, first_output
         As in `design_gpc`; one weight for each output.
     level_output : int, optional
         Which output is the level in m; its limit is left out if not given.
     level_penalty : float
-        Cost of a metre above the limit.
+        Cost of a metre above the limit, positive.
+    reservoir_area_m2 : float, optional
+        At, for a limit on the power: At times pressure and rate of the level.
     iteration_limit : int
-        Budget of a quadratic programme.
+        Budget of a quadratic programme, 1 or more.
 
     Raises
     ------
     ValueError
-        If a horizon or weight is out of its range or shape, or the ARX model has more inputs.
+        If a horizon, weight or budget is out of its range or shape, the power is limited without
+        level and area to tell it from, or the ARX model has more inputs.
     """
     if not 1 <= control_horizon <= prediction_horizon:
         raise ValueError(
@@ -50,6 +56,16 @@ def design_constrained_gpc(
         )
     if len(output_weight) != arx.outputs:
         raise ValueError(f"output_weight must have {arx.outputs} numbers, got {output_weight}")
+    if not 0 <= first_output < prediction_horizon:
+        raise ValueError(
+            f"first_output must be 0 to {prediction_horizon - 1}, the last sample of the "
+            f"prediction horizon, got {first_output}"
+        )
+    if reservoir_area_m2 is None and limits.power_w < math.inf:
+        raise ValueError(
+            f"a power limit, {limits.power_w:g} W, needs the reservoir_area_m2: give it, or set "
+            "power_w to infinity"
+        )
     model = arx.matrices()
     # the deadbeat gain that makes this model's predictor the ARX predictor
     observer_gain = arx.alpha.reshape(len(model.A), arx.outputs)
@@ -66,10 +82,11 @@ def design_constrained_gpc(
         model=model,
         observer_gain=observer_gain,
         horizon=horizon,
-        limits=PumpLimits(limits.pressure_pa, limits.rate_pa_s, limits.level_m),
+        limits=limits,
         level_output=level_output,
         level_penalty=level_penalty,
-        reservoir_area_m2=1.0,
+        # without a power limit it counts for nothing
+        reservoir_area_m2=1.0 if reservoir_area_m2 is None else reservoir_area_m2,
         steady_state=np.zeros((n, n)),
         steady_command=np.zeros(n),
         iteration_limit=iteration_limit,

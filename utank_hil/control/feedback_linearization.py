@@ -56,7 +56,8 @@ class FeedbackLinearization:
     frequency_rad_s, damping_ratio : float
         w and zeta of the linear response that the output s is given.
     soft_level_m, hard_level_m : float
-        Swing of the level up to which the law acts in full, and from which on it does not act.
+        Swing of the level up to which the law acts in full, and from which on it does not act; both
+        within the reservoirs, or both beyond them for the law as printed, never blended out.
     shift_rad_m : float
         kL, zero or more.
     shift_length_m : float
@@ -68,8 +69,8 @@ class FeedbackLinearization:
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or the pump loses its grip on the shifted output within
-        the hard limit of the level.
+        If a parameter is out of its range, the reservoirs end between the soft and the hard limit
+        of the level, or the pump loses its grip on the shifted output within the hard limit.
     """
 
     ship: RollShip
@@ -94,6 +95,13 @@ class FeedbackLinearization:
                     f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}",
                 )
             )
+        end_m = self.tank.level_limit_m
+        if self.soft_level_m < end_m < self.hard_level_m:
+            reason = (
+                f"{self.hard_level_m}: the reservoirs end at {end_m:g} m, where the law would "
+                "still act: lower it to that"
+            )
+            problems.append(("hard_level_m", reason))
         refuse("feedback linearization", problems)
         object.__setattr__(self, "model", RollModel(self.ship, self.tank))
         brake = level_brake(self.model, self.level_damping_ratio)

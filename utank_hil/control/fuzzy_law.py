@@ -99,10 +99,20 @@ class FuzzyInputs(NamedTuple):
 class FuzzyController:
     """Steps a fuzzy law; what is learnt, and the acceleration, are its subclasses'.
 
+    What was learnt before a fault, or before an operator disarmed, may be what led to it: an armed
+    law starts anew (`StartsAnew`).
+
     Parameters
     ----------
     law : FuzzyLaw
+
+    Attributes
+    ----------
+    passed_limit : str
+        Empty: the law has no limit that ends it.
     """
+
+    passed_limit = ""
 
     def __init__(self, law: FuzzyLaw) -> None:
         self.sample_time_s = law.sample_time_s
@@ -121,10 +131,13 @@ class FuzzyController:
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure, shape (1,), for the fuzzy inputs `y`; the target of roll is one number."""
-        error = float(y[0] if reference is None else y[0] - reference[0])
-        rate = float(y[1])
         x = np.minimum(np.maximum(y, -self._reach), self._reach)
         beyond = bool((x != y).any())
+        # the error from the inputs as they are held: a measurement beyond all scale is no reason to
+        # learn what a float does not hold
+        error, rate = float(x[0]), float(x[1])
+        if reference is not None:
+            error -= float(reference[0])
         s = self._p12 * error + self._p22 * rate
         acceleration = self._answer(FuzzyInputs(x, beyond, (error, rate), s, self._learning))
         self._command_pa = acceleration / self._gain_rad_s2_pa

@@ -6,6 +6,7 @@ import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.parameters import SampleTime, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,10 +20,22 @@ class GainLaw:
     gain : ndarray, shape (r, m)
         K.
     sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a gain is not finite, or the sample time out of its range.
     """
 
     gain: FloatArray
-    sample_time_s: float
+    sample_time_s: SampleTime
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.gain.ndim != 2 or not np.isfinite(self.gain).all():
+            reason = f"must be a matrix of finite numbers, got {self.gain.tolist()}"
+            problems.append(("gain", reason))
+        refuse("gain law", problems)
 
     def controller(self) -> "GainController":
         """A new steppable controller."""

@@ -5,7 +5,7 @@ runs straight, after the last one it is zero. For x(k+1) = A x(k) + B u(k), y(k)
 all predictions are linear in the state x(k) and the plan z, and the cost is a sum of squares::
 
     y(k+q) = outputs_state[q] x + outputs_plan[q] z
-    sum_{q >= first_output} |y_T - y(k+q)|^2_W + Q sum_q u(k+q)^2 + |L x(k+N)|^2
+    sum_{q >= first_output} |y_T(k+q) - y(k+q)|^2_W + Q sum_q u(k+q)^2 + |L x(k+N)|^2
         = |M z + E x - E_T y_T|^2
 
 With a knot at each of the first hc samples, L = 0 and N = hp this is the cost of generalized
@@ -38,8 +38,9 @@ class Horizon:
     hessian : ndarray, shape (j, j)
         M'M.
     unlimited_state : ndarray, shape (j, n)
-        The best plan is unlimited_state x + unlimited_target y_T as long as no limit is in its way.
-    unlimited_target : ndarray, shape (j, m)
+        The best plan is unlimited_state x + sum_q unlimited_target[q] y_T(k+q) as long as no limit
+        is in its way.
+    unlimited_target : ndarray, shape (N, j, m)
     """
 
     knots: npt.NDArray[np.int64]
@@ -91,8 +92,12 @@ def condense(
             f"knots must increase from 0 and stay below the horizon of {samples} samples, "
             f"got {knots}"
         )
-    if not (np.min(output_weight) >= 0 and input_weight > 0):
-        raise ValueError("output weights must not be negative, the input weight must be positive")
+    weights = np.append(output_weight, input_weight)
+    if not (np.isfinite(weights).all() and np.min(output_weight) >= 0 and input_weight > 0):
+        raise ValueError(
+            "output_weight must be zero or more, input_weight positive, and both finite, got "
+            f"{output_weight} and {input_weight}"
+        )
     if model.B.shape[1] != 1:
         raise ValueError(f"a plan is that of one pump, the model has {model.B.shape[1]} inputs")
     states, outputs = len(model.A), len(model.C)
@@ -126,10 +131,9 @@ def condense(
     state_rows = np.vstack(
         [root[:, None] * by_state.reshape(-1, states), np.zeros((samples, states)), rest @ power]
     )
-    target_rows = np.zeros((len(plan_rows), outputs))
-    target_rows[: len(root)] = root[:, None] * np.tile(np.eye(outputs), (samples, 1))
     # solved as the least-squares problem that it is: squaring it loses half the digits
     orthogonal, triangle = np.linalg.qr(plan_rows)
+    by_target = np.linalg.solve(triangle, orthogonal[: len(root)].T * root)
     return Horizon(
         knots=np.array(knots),
         interpolation=interpolation,
@@ -138,7 +142,7 @@ def condense(
         outputs_held=pulse.cumsum(axis=0),
         hessian=plan_rows.T @ plan_rows,
         unlimited_state=-np.linalg.solve(triangle, orthogonal.T @ state_rows),
-        unlimited_target=np.linalg.solve(triangle, orthogonal.T @ target_rows),
+        unlimited_target=by_target.reshape(len(knots), samples, outputs).swapaxes(0, 1),
     )
 
 

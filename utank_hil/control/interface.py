@@ -1,6 +1,6 @@
 """What every controller is, an object stepped once a sample time, and what every linear law is."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.sampling import LinearModel
@@ -30,6 +30,40 @@ class Controller(Protocol):
 
     def applied(self, u: FloatArray) -> None:
         """Tell the controller the command, shape (r,), that left after limits or another law."""
+
+    def reset(self) -> None:
+        """Forget the past: as newly built."""
+
+
+@runtime_checkable
+class Plans(Protocol):
+    """A controller that searches for a plan each sample, within a budget.
+
+    Attributes
+    ----------
+    fallbacks : int
+        How often since its reset the budget did not suffice and the last plan went on.
+    """
+
+    fallbacks: int
+
+
+@runtime_checkable
+class StartsAnew(Protocol):
+    """A controller that is reset when an operator arms it, or resets a fault.
+
+    Its memory is of its own doing: how far its ramp got, that it has ended, what it learnt while in
+    charge. Other controllers remember the ship. They are stepped all the while, know her at once
+    and would lose that by a reset.
+
+    Attributes
+    ----------
+    passed_limit : str
+        Which measurement, a name of `STATES`, passed a limit of the law's own: it answers zero
+        pressure until it is reset. Empty if none did.
+    """
+
+    passed_limit: str
 
     def reset(self) -> None:
         """Forget the past: as newly built."""

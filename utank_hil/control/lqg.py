@@ -22,6 +22,7 @@ from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.gain import GainLaw
 from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.dynamics.transfer import state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -181,16 +182,18 @@ class LQGLaw:
 
     def response(self, z: ComplexArray) -> ComplexArray:
         """Transfer matrix from y to u at the points `z`, shape (N,); shape (N, r, m)."""
-        a, b, c, _, _ = self.matrices()
-        resolvent = np.asarray(z)[:, None, None] * np.eye(len(a)) - a
-        response: ComplexArray = c @ np.linalg.solve(resolvent, b.astype(np.complex128))
-        return response
+        return state_space_response(self.matrices(), z)
 
     def reference_gain(self) -> FloatArray:
         """Shape (r, m): turns a constant target of the outputs into a feedforward.
 
         The steady input that brings the outputs nearest to the target (least squares), and the gain
         times the state it leads to.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the model holds a state by itself (a pole at 1): it has no steady state of an input.
         """
         a, b, c, d, _ = self.model
         steady = np.linalg.solve(np.eye(len(a)) - a, b)
@@ -227,8 +230,12 @@ class LQGController:
         next_state = a @ state + b @ command + law.observer_gain @ self._surprise
         next_mean = mean + washout_share * (measured - mean)
         self._advance = np.vstack([next_state, next_mean, -law.gain @ next_state])
-        self._reference_gain: FloatArray | None = None
-        self._law = law
+        # now, because a step has no time for it; a law without it serves all who give no target
+        self._reference_gain: FloatArray | None
+        try:
+            self._reference_gain = law.reference_gain()
+        except np.linalg.LinAlgError:
+            self._reference_gain = None
         self.reset()
 
     def reset(self) -> None:
@@ -250,6 +257,11 @@ class LQGController:
 
         `reference`, shape (m,), is a constant target of the outputs, with a washout relative to
         their mean.
+
+        Raises
+        ------
+        ValueError
+            If there is a reference, but no steady state that belongs to it (`reference_gain`).
         """
         memory, own = self._memory, self._own
         memory[own:] = y
@@ -257,7 +269,10 @@ class LQGController:
         command = following[self._command]
         if reference is not None:
             if self._reference_gain is None:
-                self._reference_gain = self._law.reference_gain()
+                raise ValueError(
+                    "reference: the law's model has a pole at 1 and so no steady state to hold a "
+                    "target with; step it without, or give the model's pole some decay"
+                )
             command += self._reference_gain @ reference
         # the vector just used is kept for the innovation
         self._memory, self._stepped = self._stepped, memory

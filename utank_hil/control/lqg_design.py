@@ -13,8 +13,7 @@ import numpy as np
 
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
-from utank_hil.control.ship_design import Predictor, wave_plant
-from utank_hil.control.washout import WashoutLaw
+from utank_hil.control.ship_design import Predictor, washed, wave_plant, weight_problems
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -34,7 +33,8 @@ class LQGDesign:
     input_weight : float
         On the square of the pressure in Pa.
     washout_rad_s : float
-        Corner of the washout that keeps the steady list from the law (`WashoutLaw`); 0 for none.
+        Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
+        the ship's roll frequency at most; 0 for none.
 
     Raises
     ------
@@ -53,6 +53,8 @@ class LQGDesign:
             problems.append(
                 ("state_weight", f"must have {len(STATES)} numbers, got {self.state_weight}")
             )
+        else:
+            problems += weight_problems("state_weight", self.state_weight)
         refuse("LQG design", problems)
 
     def law(
@@ -65,8 +67,7 @@ class LQGDesign:
         ValueError
             If a parameter is out of its range.
         """
-        law = self._lqg_law(ship, tank, delay_s, lag_s)
-        return WashoutLaw(law, self.washout_rad_s) if self.washout_rad_s else law
+        return washed(self._lqg_law(ship, tank, delay_s, lag_s), self.washout_rad_s, ship)
 
     def _lqg_law(self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float) -> LQGLaw:
         plant, process = wave_plant(self.predictor, ship, tank, delay_s, lag_s)

@@ -12,6 +12,7 @@ changes the water's stiffness leaves c at what the tank was built with.
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import Finite, NotNegative, Range, range_problems, refuse
 
 _WAVES = np.geomspace(0.05, 5.0, 4000)
 
@@ -44,20 +46,13 @@ class ShipTankRatios:
         If a ratio is out of its range.
     """
 
-    mass_ratio: float
-    coupling_ratio: float
-    roll_damping_ratio: float = 0.0
-    static_coupling: float | None = None
+    mass_ratio: Annotated[float, Range(above=0, below=1)]
+    coupling_ratio: Finite
+    roll_damping_ratio: NotNegative = 0.0
+    static_coupling: Finite | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.mass_ratio < 1:
-            raise ValueError(f"mass_ratio must lie between 0 and 1, got {self.mass_ratio}")
-        if not math.isfinite(self.coupling_ratio):
-            raise ValueError(f"coupling_ratio must be finite, got {self.coupling_ratio}")
-        if not self.roll_damping_ratio >= 0:
-            raise ValueError(
-                f"roll_damping_ratio must be zero or more, got {self.roll_damping_ratio}"
-            )
+        refuse("ship and tank", range_problems(self))
 
 
 @dataclass(frozen=True, slots=True)

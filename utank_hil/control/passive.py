@@ -1,10 +1,15 @@
 """The controller that does nothing: the tank as a passive damper."""
 
+from dataclasses import dataclass
+from typing import Annotated
+
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.parameters import Range, SampleTime, range_problems, refuse
 
 
+@dataclass(slots=True, eq=False)
 class PassiveController:
     """Zero pressure, whatever is measured.
 
@@ -13,15 +18,22 @@ class PassiveController:
     inputs : int
         Number of pumps r.
     sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If one of them is out of its range.
     """
 
-    def __init__(self, inputs: int = 1, sample_time_s: float = 0.2) -> None:
-        self.sample_time_s = sample_time_s
-        self._inputs = inputs
+    inputs: Annotated[int, Range(least=1)] = 1
+    sample_time_s: SampleTime = 0.2
+
+    def __post_init__(self) -> None:
+        refuse("passive", range_problems(self))
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
         """Return zero pressure, shape (r,)."""
-        return np.zeros(self._inputs)
+        return np.zeros(self.inputs)
 
     def applied(self, u: FloatArray) -> None:
         """Nothing to remember."""

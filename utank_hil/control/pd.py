@@ -32,6 +32,11 @@ def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLa
     Returns
     -------
     GainLaw
+
+    Raises
+    ------
+    ValueError
+        If the sample time is out of its range.
     """
     ratios, ship_frequency = ship_ratios(ship, tank)
     best = passive_optimum(ratios)

@@ -79,6 +79,10 @@ class PlanProgramme:
         self._low_side = slice(2 * knots + 1 + levels, None)
         self._high_side = slice(2 * knots + 1, 2 * knots + 1 + levels)
 
+    def forget(self) -> None:
+        """Start the next solution from nothing: as newly built."""
+        self._solver.forget()
+
     def respects(
         self, plan: FloatArray, low: FloatArray, high: FloatArray, last: float, levels: FloatArray
     ) -> bool:

@@ -52,6 +52,10 @@ class ActiveSetSolver:
             raise ValueError(f"the quadratic programme cannot be set up (DAQP flag {flag})")
         self._model.settings = {"iter_limit": iteration_limit}
 
+    def forget(self) -> None:
+        """Start the next solution without the last one's active set."""
+        self._warm = False
+
     def solve(
         self, gradient: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> FloatArray | None:

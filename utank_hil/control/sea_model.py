@@ -29,8 +29,9 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import NotNegative, Positive, Problem, Range, range_problems, refuse
 from utank_hil.sea import Spectrum
 
-_POINTS = 8192  # frequencies of the factorization: 0.004 rad/s apart at 0.2 s
-_MEMORY = 800  # samples of the impulse response that count
+# seconds, not samples: a sea is as narrow at any sample time
+_RECORD_S = 1638.4  # the factorization's frequencies are 0.004 rad/s apart
+_MEMORY_S = 160.0  # part of the impulse response that counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +47,11 @@ class SeaModel:
     effective_slope : float
         Ratio of effective to true wave slope.
     order : int
-        States of the model, fewer than the samples of the impulse response that count.
+        States of the model, 32 at most, and fewer than the samples in 160 s.
     floor : float
         Added to the slope's density, as a share of its maximum: the less of it, the further the
-        forecast reaches, and the more it is lost where spectrum or ship are not as expected.
+        forecast reaches, and the more it is lost where spectrum or ship are not as expected. At
+        most 100, a white sea.
     smoothing_rad_s : float
         Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
         wider than any sea's peak.
@@ -63,8 +65,8 @@ class SeaModel:
     frequency_hz: tuple[Positive, ...]
     density_m2_hz: tuple[NotNegative, ...]
     effective_slope: Positive = 0.5
-    order: Annotated[int, Range(least=1, below=_MEMORY)] = 8
-    floor: Annotated[float, Range(above=0, most=1)] = 1.3e-3
+    order: Annotated[int, Range(least=1, most=32)] = 8
+    floor: Annotated[float, Range(above=0, most=100)] = 1.3e-3
     smoothing_rad_s: Annotated[float, Range(above=0, most=1)] = 0.007
 
     def __post_init__(self) -> None:
@@ -106,33 +108,55 @@ class SeaModel:
         """Discrete filter from white noise of unit variance e(k) to the effective slope s(k).
 
         x(k) = A x(k-1) + B e(k), s(k) = C x(k): the newest noise is part of the state.
+
+        Raises
+        ------
+        ValueError
+            If there are too few samples in 160 s for the order.
         """
-        return _balanced(self._impulse_response(sample_time_s), self.order, sample_time_s)
+        samples = round(_MEMORY_S / sample_time_s)
+        if not self.order < samples:
+            reason = (
+                f"{self.order} must be below {samples}, the samples in {_MEMORY_S:g} s at "
+                f"sample_time_s {sample_time_s:g}: lower one of the two"
+            )
+            refuse("sea", [("order", reason)])
+        kept = self._impulse_response(sample_time_s)[:samples]
+        return _balanced(kept, self.order, sample_time_s)
 
     def _impulse_response(self, sample_time_s: float) -> FloatArray:
-        """Minimum-phase impulse response, shape (_POINTS,)."""
+        """Minimum-phase impulse response over the record, an even number of samples."""
         from scipy.ndimage import gaussian_filter1d
 
-        omega = 2 * np.pi * np.abs(np.fft.fftfreq(_POINTS, sample_time_s))
+        half = round(_RECORD_S / sample_time_s / 2)
+        omega = 2 * np.pi * np.abs(np.fft.fftfreq(2 * half, sample_time_s))
         density = gaussian_filter1d(
             self.slope_density(omega), self.smoothing_rad_s / omega[1], mode="wrap"
         )
         density = density + self.floor * density.max()
         cepstrum = np.fft.ifft(np.log(np.pi * density / sample_time_s)).real
-        causal = np.zeros(_POINTS)
+        causal = np.zeros(2 * half)
         causal[0] = cepstrum[0] / 2
-        causal[1 : _POINTS // 2] = cepstrum[1 : _POINTS // 2]
-        causal[_POINTS // 2] = cepstrum[_POINTS // 2] / 2
+        causal[1:half] = cepstrum[1:half]
+        causal[half] = cepstrum[half] / 2
         return np.asarray(np.fft.ifft(np.exp(np.fft.fft(causal))).real)
 
 
 def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearModel:
     """Balanced truncation of a finite impulse response h[0], h[1], ... = C B, C A B, ..."""
-    from scipy.linalg import hankel
-    from scipy.sparse.linalg import eigsh
+    from scipy.sparse.linalg import LinearOperator, eigsh
 
-    kept = impulse[:_MEMORY]
-    values, vectors = eigsh(hankel(kept), k=order, which="LM", v0=np.ones(_MEMORY))
+    # the Hankel matrix of h times v is a convolution: at 10 ms it would hold 2 GB
+    count = len(impulse)
+    spectrum = np.fft.rfft(impulse, 2 * count)
+
+    def hankel_times(v: FloatArray) -> FloatArray:
+        turned = np.fft.rfft(v.ravel()[::-1], 2 * count)
+        product: FloatArray = np.fft.irfft(spectrum * turned, 2 * count)[count - 1 : 2 * count - 1]
+        return product
+
+    hankel = LinearOperator((count, count), matvec=hankel_times, dtype=np.float64)
+    values, vectors = eigsh(hankel, k=order, which="LM", v0=np.ones(count))
     root = np.sqrt(np.abs(values))
     observability = vectors * root
     shifted = np.vstack([observability[1:], np.zeros((1, order))])

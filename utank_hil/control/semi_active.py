@@ -17,12 +17,13 @@ opening. No valve shuts in no time: between two samples it stays where it is.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.interface import Controller
+from utank_hil.parameters import NotNegative, SampleTime, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,7 @@ class ValveRange:
             )
 
 
+@dataclass(slots=True, eq=False)
 class OnOffValve:
     """Energy law with a valve that is open or shut.
 
@@ -64,25 +66,23 @@ class OnOffValve:
     Raises
     ------
     ValueError
-        If the threshold is negative.
+        If the threshold is negative or not finite, or the sample time out of its range.
     """
 
-    def __init__(
-        self, valve: ValveRange, threshold_rad_m_s2: float = 0.0, sample_time_s: float = 0.1
-    ) -> None:
-        if not threshold_rad_m_s2 >= 0:
-            raise ValueError(f"threshold must be zero or more, got {threshold_rad_m_s2}")
-        self.sample_time_s = sample_time_s
-        self._valve = valve
-        self._threshold = threshold_rad_m_s2
-        self._shut = False
+    valve: ValveRange
+    threshold_rad_m_s2: NotNegative = 0.0
+    sample_time_s: SampleTime = 0.1
+    _shut: bool = field(default=False, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        refuse("on-off valve", range_problems(self))
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:  # noqa: ARG002
         """Loss, shape (1,), for `y` = (roll, roll rate, level, level rate)."""
         power = float(y[1]) * float(y[3])
-        if abs(power) > self._threshold:
+        if abs(power) > self.threshold_rad_m_s2:
             self._shut = power > 0
-        return np.array([self._valve.shut_loss if self._shut else self._valve.open_loss])
+        return np.array([self.valve.shut_loss if self._shut else self.valve.open_loss])
 
     def applied(self, u: FloatArray) -> None:
         """Nothing to remember."""

@@ -21,7 +21,7 @@ from utank_hil.control.finite_memory import finite_memory_arx
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.law import PredictiveLaw
 from utank_hil.control.predictive import design_dpc, design_gpc
-from utank_hil.control.washout import WashoutLaw
+from utank_hil.control.washout import WashableLaw, WashoutLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
@@ -42,6 +42,10 @@ MOST_ORDER: Final = 500
 MOST_SAMPLES: Final = 1000
 """Of a horizon: more than the sea can be foreseen by far."""
 
+WASHOUT_SHARE: Final = 0.25
+"""Of the ship's roll frequency, a washout's corner at most: there it takes 3 % of the roll and
+turns its phase by 14 degrees; above, it takes the roll itself from the law."""
+
 
 def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
     """What is wrong with names of outputs, of which the `needed` ones must be there."""
@@ -49,6 +53,33 @@ def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
         return []
     besides = f", {' and '.join(needed)} with them" if needed else ""
     return [("measured", f"must name outputs among {', '.join(STATES)}{besides}, got {measured}")]
+
+
+def weight_problems(name: str, weight: tuple[float, ...]) -> list[Problem]:
+    """The problem of weights that are all zero: the best law for them is to do nothing."""
+    if any(each > 0 for each in weight):
+        return []
+    return [(name, f"must have a positive number: with {weight} the law does nothing")]
+
+
+def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
+    """A law with its washout, or itself for a corner of zero.
+
+    Raises
+    ------
+    ValueError
+        If the corner is so near to the ship's roll that the washout takes that out, too.
+    """
+    if washout_rad_s == 0:
+        return law
+    most = WASHOUT_SHARE * ship.natural_frequency_rad_s
+    if washout_rad_s > most:
+        reason = (
+            f"must be {most:.3g} at most, a quarter of the ship's roll frequency, or the law does "
+            f"not see her roll; got {washout_rad_s:g}"
+        )
+        refuse("design", [("washout_rad_s", reason)])
+    return WashoutLaw(law, washout_rad_s)
 
 
 def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) -> Problem:
@@ -73,7 +104,7 @@ class Predictor:
     order : int
         Number p of past samples.
     wave_peak_rad_s : float
-        Frequency wp of the wave moment's peak.
+        Frequency wp of the wave moment's peak, below half that of the samples.
     wave_damping_ratio : float
         zeta; small for long groups.
     wave_slope_rad : float
@@ -101,6 +132,13 @@ class Predictor:
         problems = [*measured_problems(self.measured), *range_problems(self)]
         if len(self.measurement_std) != len(self.measured):
             problems.append(per_output("measurement_std", self.measurement_std, self.measured))
+        nyquist_rad_s = np.pi / self.sample_time_s if self.sample_time_s > 0 else np.inf
+        if self.wave_peak_rad_s >= nyquist_rad_s:
+            reason = (
+                f"must be below {nyquist_rad_s:.3g}, half the frequency of the samples, or the law "
+                f"never sees the waves; got {self.wave_peak_rad_s:g}"
+            )
+            problems.append(("wave_peak_rad_s", reason))
         refuse("predictor", problems)
 
 
@@ -119,7 +157,8 @@ class PredictiveDesign:
     first_output : int
         See `design_gpc`; for GPC alone.
     washout_rad_s : float
-        Corner of the washout that keeps the steady list from the law (`WashoutLaw`); 0 for none.
+        Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
+        the ship's roll frequency at most; 0 for none.
 
     Raises
     ------
@@ -146,6 +185,8 @@ class PredictiveDesign:
             )
         if self.output_weight is not None and len(self.output_weight) != len(measured):
             problems.append(per_output("output_weight", self.output_weight, measured))
+        elif self.output_weight is not None:
+            problems += weight_problems("output_weight", self.output_weight)
         refuse("predictive design", problems)
 
     def _horizon_problems(self) -> list[Problem]:
@@ -190,8 +231,7 @@ class PredictiveDesign:
         ValueError
             If a parameter is out of its range.
         """
-        law = self._predictive_law(ship, tank, delay_s, lag_s)
-        return WashoutLaw(law, self.washout_rad_s) if self.washout_rad_s else law
+        return washed(self._predictive_law(ship, tank, delay_s, lag_s), self.washout_rad_s, ship)
 
     def _predictive_law(
         self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float

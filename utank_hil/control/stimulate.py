@@ -7,24 +7,35 @@ the wanted period and slowly corrected by what the ship really does::
 
 where a(t) is the wanted amplitude, ramped in and out, and roll_w the roll's component at the
 frequency w, from a lock-in of two low-passes. T is long against the decay of the free roll, so that
-the correction does not answer the ship's own transient.
+the correction does not answer the ship's own transient. While pressure falls short of what was
+asked for, and for a period after, m may fall but not grow: no pressure would come of it.
 
-Beyond a roll or level limit the stimulation ends: the amplitude is ramped out and stays zero until
-`reset`.
+A wanted end ramps out: after `duration_s`, or by a reference of 0. Beyond a roll or level limit the
+pressure is zero at once, and the tank left to quiet the ship. Either end lasts until `reset`.
 """
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.linear import STATES, coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import Positive, Problem, SampleTime, range_problems, refuse
+from utank_hil.parameters import (
+    Positive,
+    Problem,
+    Range,
+    SampleTime,
+    range_problems,
+    refuse,
+)
 
 FACTOR = (0.25, 3.0)  # range of the correction m: beyond it the model is of another ship
+_ROLL, _LEVEL = STATES.index("roll_rad"), STATES.index("level_m")
+SHORT = 0.01  # of the pressure's amplitude: what falls short by less left as it was asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +56,16 @@ class Stimulation:
         Where the stimulation ends.
     correction_s : float
         T.
+    duration_s : float
+        Time from the beginning of the ramp in to that of the ramp out; infinity for no such end.
     sample_time_s : float
 
     Raises
     ------
     ValueError
-        If a parameter is not positive, the amplitude is at or above the roll limit, or the model
-        says that it takes more pressure or level than there is.
+        If a parameter is not positive, the amplitude is at or above the roll limit, the duration
+        ends within the ramp in, or the model says that it takes more pressure or level than there
+        is.
     """
 
     ship: RollShip
@@ -63,6 +77,7 @@ class Stimulation:
     roll_limit_rad: Positive
     level_limit_m: Positive
     correction_s: Positive = 120.0
+    duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
     sample_time_s: SampleTime = 0.02
 
     def __post_init__(self) -> None:
@@ -70,10 +85,14 @@ class Stimulation:
         refuse("stimulation", problems or [*self._limit_problems(), *self._reach_problems()])
 
     def _limit_problems(self) -> list[Problem]:
-        if self.amplitude_rad < self.roll_limit_rad:
-            return []
-        reason = f"{self.amplitude_rad} must be below roll_limit_rad {self.roll_limit_rad}"
-        return [("amplitude_rad", reason)]
+        problems = []
+        if not self.amplitude_rad < self.roll_limit_rad:
+            reason = f"{self.amplitude_rad} must be below roll_limit_rad {self.roll_limit_rad}"
+            problems.append(("amplitude_rad", reason))
+        if self.duration_s < self.ramp_s:
+            reason = f"{self.duration_s} must be ramp_s {self.ramp_s} or more"
+            problems.append(("duration_s", reason))
+        return problems
 
     def _reach_problems(self) -> list[Problem]:
         roll, level = self.gains
@@ -113,8 +132,8 @@ class StimulationController:
 
     Attributes
     ----------
-    ended : bool
-        A limit was passed; the ship is left to come to rest.
+    passed_limit : str
+        Which of `STATES` passed its limit and so ended it; empty if none did.
     amplitude_rad : float
         Measured amplitude of roll at the wanted period.
     """
@@ -124,19 +143,31 @@ class StimulationController:
         self._plan = plan
         self._turn = math.tau / plan.period_s * plan.sample_time_s
         self._share = plan.sample_time_s / plan.period_s  # low-pass of the lock-in: one period
+        self._share_of_correction = plan.sample_time_s / plan.correction_s
+        self._period_steps = math.ceil(plan.period_s / plan.sample_time_s)
         self._pressure_per_roll = 1 / plan.gains[0]
         self.reset()
 
     def reset(self) -> None:
         """As newly built: ready to ramp in."""
-        self.ended = False
+        self.passed_limit = ""
         self.amplitude_rad = 0.0
         self._wanted_rad = 0.0
         self._factor = 1.0
         self._steps = 0
+        self._steps_in_charge = 0
+        self._steps_to_growth = 0  # of the correction
         self._first = self._second = complex(0.0)
-        self._command_pa = 0.0
-        self._obeyed = True
+        self._size_pa = self._command_pa = 0.0
+
+    @property
+    def ended(self) -> bool:
+        """Whether a limit was passed, or the time is over and the amplitude ramped out."""
+        return bool(self.passed_limit) or (self._time_is_over and self._wanted_rad == 0)
+
+    @property
+    def _time_is_over(self) -> bool:
+        return self._steps_in_charge * self.sample_time_s >= self._plan.duration_s
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure, shape (1,), for `y` = (roll, roll rate, level, level rate).
@@ -145,29 +176,50 @@ class StimulationController:
         """
         plan = self._plan
         self._lock_in(float(y[0]))
-        beyond = abs(y[0]) > plan.roll_limit_rad or abs(y[2]) > plan.level_limit_m
-        self.ended = self.ended or bool(beyond)
+        if not self.passed_limit and self._steps_in_charge > 1:  # not while another law is
+            self.passed_limit = self._beyond(y)
         target = plan.amplitude_rad if reference is None else abs(float(reference[0]))
-        target = 0.0 if self.ended else min(target, plan.roll_limit_rad)
+        target = 0.0 if self._time_is_over else min(target, plan.roll_limit_rad)
         change = plan.amplitude_rad * plan.sample_time_s / plan.ramp_s
-        if self._obeyed:
-            self._wanted_rad += min(max(target - self._wanted_rad, -change), change)
-        else:  # another law is in charge: start from zero when it lets go
+        self._wanted_rad += min(max(target - self._wanted_rad, -change), change)
+        if self.passed_limit:  # at once: what still pushes would push beyond the limit
             self._wanted_rad = 0.0
-        if self._wanted_rad == target > 0:
-            self._factor += (
-                plan.sample_time_s / plan.correction_s * (1 - self.amplitude_rad / target)
-            )
-            self._factor = min(max(self._factor, FACTOR[0]), FACTOR[1])
-        size = min(self._factor * self._wanted_rad * self._pressure_per_roll, plan.pressure_pa)
+        self._correct(target)
+        size = self._factor * self._wanted_rad * self._pressure_per_roll
+        if size > plan.pressure_pa:
+            size = plan.pressure_pa
+            self._steps_to_growth = self._period_steps
+        self._size_pa = size
         self._command_pa = size * math.sin(self._turn * self._steps)
         self._steps += 1
-        self._obeyed = True
+        self._steps_in_charge += 1
         return np.array([self._command_pa])
 
     def applied(self, u: FloatArray) -> None:
-        """Start again from zero if nothing of the last command left."""
-        self._obeyed = not (u[0] == 0 and self._command_pa != 0)
+        """Start again from zero if nothing of the last command left, note if it fell short."""
+        left, asked = float(u[0]), self._command_pa
+        if left == 0 and asked != 0:  # another law is in charge
+            self._wanted_rad = 0.0
+            self._steps_in_charge = 0
+        elif abs(left - asked) > SHORT * self._size_pa:
+            self._steps_to_growth = self._period_steps
+
+    def _beyond(self, y: FloatArray) -> str:
+        """Which of `STATES` is beyond its limit."""
+        if abs(y[_ROLL]) > self._plan.roll_limit_rad:
+            return STATES[_ROLL]
+        if abs(y[_LEVEL]) > self._plan.level_limit_m:
+            return STATES[_LEVEL]
+        return ""
+
+    def _correct(self, target_rad: float) -> None:
+        """Let the correction m follow the measured amplitude."""
+        held = self._steps_to_growth > 0
+        self._steps_to_growth -= held
+        if self._wanted_rad == target_rad > 0:
+            change = self._share_of_correction * (1 - self.amplitude_rad / target_rad)
+            self._factor += min(change, 0.0) if held else change
+            self._factor = min(max(self._factor, FACTOR[0]), FACTOR[1])
 
     def _lock_in(self, roll_rad: float) -> None:
         angle = self._turn * self._steps

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
 
-# thousands of times the inertia (kg m^2) and stiffness (N m/rad) of the largest ship afloat
-_MOST = 1e15
+_MOST = 1e30  # far beyond any ship, and what designs compute from it stays finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +74,11 @@ class RollShip:
             if not (math.isfinite(value) and value > 0):
                 problems.append((name, f"must be positive to go with gz_m, got {value}"))
         return problems
+
+    @property
+    def heeling_moment_nm(self) -> float:
+        """Steady moment on the upright ship, which is what the linear models are for."""
+        return self.offset_moment_nm + self.wind_moment_nm
 
     @property
     def natural_frequency_rad_s(self) -> float:

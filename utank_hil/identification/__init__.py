@@ -27,10 +27,11 @@ from utank_hil.identification.modes import (
     mode_confidence,
     modes,
 )
-from utank_hil.identification.okid import OkidResult, okid
+from utank_hil.identification.okid import OkidResult, arx, okid
 from utank_hil.identification.persistence import excitation_order
 from utank_hil.identification.recursive import RecursiveArx
 from utank_hil.identification.refinement import Refinement, refine
+from utank_hil.identification.ship_fit import ShipFit, fit_ship
 from utank_hil.identification.stabilization import StabilizationPoint, stabilization
 from utank_hil.identification.validation import Validation, validate
 from utank_hil.identification.wave_lines import find_disturbance_frequencies
@@ -43,14 +44,17 @@ __all__ = [
     "OkidResult",
     "RecursiveArx",
     "Refinement",
+    "ShipFit",
     "StabilizationPoint",
     "Validation",
+    "arx",
     "chirp",
     "era",
     "era_dc",
     "era_with_observer",
     "excitation_order",
     "find_disturbance_frequencies",
+    "fit_ship",
     "hankel_singular_values",
     "markov_parameters",
     "modal_assurance",

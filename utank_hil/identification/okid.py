@@ -2,13 +2,14 @@
 
 The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
 A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
-by least squares, with a disturbance basis beside them, and the system's own Markov parameters
-follow from them by recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two
-roll periods.
+by least squares, with a disturbance basis beside them (`arx`), and the system's own Markov
+parameters follow from them by recursion. The order p must cover the observer's memory: p = 120 at
+0.2 s is two roll periods.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,6 +73,36 @@ class OkidResult:
     rows: int
 
 
+def arx(
+    u: FloatArray,
+    y: FloatArray,
+    order: int = 120,
+    sample_time_s: float = 0.2,
+    disturbance_frequencies_rad_s: Sequence[float] = (),
+    disturbance_polynomial_degree: int | None = None,
+    disturbance_decay_rates_1_s: Sequence[float] = (),
+) -> ARX:
+    """Fit an ARX model by least squares: the first step of `okid`, for who needs no more.
+
+    Parameters, errors and what is refused are those of `okid`, but for models that are violently
+    unstable: they predict one step as well as others.
+
+    Returns
+    -------
+    ARX
+        `OkidResult.arx` of the same record.
+    """
+    return _fitted(
+        u,
+        y,
+        order,
+        sample_time_s,
+        disturbance_frequencies_rad_s,
+        disturbance_polynomial_degree,
+        disturbance_decay_rates_1_s,
+    ).model
+
+
 def okid(
     u: FloatArray,
     y: FloatArray,
@@ -112,13 +143,65 @@ def okid(
         If the record does not determine a model: too short, too many gaps, an input that hardly
         excites, an output that does not move or is clipped.
     """
+    fitted = _fitted(
+        u,
+        y,
+        order,
+        sample_time_s,
+        disturbance_frequencies_rad_s,
+        disturbance_polynomial_degree,
+        disturbance_decay_rates_1_s,
+    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        markov, observer_gain = markov_parameters(
+            fitted.model, max(_MARKOV_COUNT, 2 * fitted.model.order + 1)
+        )
+    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
+        raise IdentificationError(
+            "the fitted model is violently unstable, so the record does not determine it; "
+            "record longer, excite more or raise the order"
+        )
+    solution = fitted.solution
+    return OkidResult(
+        fitted.model,
+        markov,
+        observer_gain,
+        fitted.basis,
+        fitted.disturbance,
+        fitted.residual_covariance,
+        solution.gram,
+        fitted.column_scale,
+        solution.penalty,
+        solution.rank,
+        solution.excitation_order,
+        fitted.rows,
+    )
+
+
+class _Fitted(NamedTuple):
+    """A least-squares solution in the record's units."""
+
+    model: ARX
+    basis: DisturbanceBasis
+    disturbance: FloatArray
+    residual_covariance: FloatArray
+    column_scale: FloatArray
+    solution: Fit
+    rows: int
+
+
+def _fitted(
+    u: FloatArray,
+    y: FloatArray,
+    order: int,
+    sample_time_s: float,
+    frequencies_rad_s: Sequence[float],
+    polynomial_degree: int | None,
+    decay_rates_1_s: Sequence[float],
+) -> _Fitted:
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise ValueError(f"sample_time_s must be positive, got {sample_time_s}")
-    basis = DisturbanceBasis(
-        tuple(disturbance_frequencies_rad_s),
-        disturbance_polynomial_degree,
-        tuple(disturbance_decay_rates_1_s),
-    )
+    basis = DisturbanceBasis(tuple(frequencies_rad_s), polynomial_degree, tuple(decay_rates_1_s))
     z, m = stacked_record(u, y)
     scale = channel_scale(z, m)
     functions = basis.evaluate(len(z), sample_time_s)
@@ -138,7 +221,7 @@ def _in_units(
     scale: FloatArray,
     sample_time_s: float,
     basis: DisturbanceBasis,
-) -> OkidResult:
+) -> _Fitted:
     """Undo the scaling and name the parts."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
@@ -149,26 +232,13 @@ def _in_units(
     split = len(coefficients) - regression.basis_size
     by_lag = np.vstack([np.zeros((m, m)), coefficients[:split]]).reshape(p + 1, -1, m)
     by_lag = by_lag.transpose(0, 2, 1)
-    arx = ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s)
-    with np.errstate(over="ignore", invalid="ignore"):
-        markov, observer_gain = markov_parameters(arx, max(_MARKOV_COUNT, 2 * p + 1))
-    if not (np.isfinite(markov).all() and np.isfinite(observer_gain).all()):
-        raise IdentificationError(
-            "the fitted model is violently unstable, so the record does not determine it; "
-            "record longer, excite more or raise the order"
-        )
-    return OkidResult(
-        arx,
-        markov,
-        observer_gain,
+    return _Fitted(
+        ARX(by_lag[1:, :, :m], by_lag[:, :, m:], sample_time_s),
         basis,
         coefficients[split:],
         solution.residual_covariance * np.outer(y_scale, y_scale),
-        solution.gram,
         column_scale,
-        solution.penalty,
-        solution.rank,
-        solution.excitation_order,
+        solution,
         regression.rows,
     )
 

@@ -5,13 +5,23 @@ high-order ARX model alone is tens of per cent off. But the form of the model is
 (`utank_hil.dynamics.linear`), and loading changes few of its numbers. With A(q) y = B(q) u + e from
 OKID and G(q, theta) the sampled ship and tank::
 
-    min over theta = log (I, k1, d1, tank damping ratio):
+    min over theta = (log (I, k1, d1, tank damping ratio, pressure), a delay for each output):
         sum over w of |L (B - A G(theta))|^2 Phi_u + sum (theta / sigma)^2,   L^T L = cov(e)^-1
 
 These are the prediction errors of G(theta) with 1 / A for the spectrum of the waves, so the fit
 looks where the pump can be told from the sea (Wahlberg 1989; Ljung, System Identification, 10.4).
 Where it cannot be told, the given ship's numbers stand. When the misfit is larger than the errors
 explain, they are taken to be as much larger.
+
+The last numbers are not the ship's. A gauge is heard sooner than the motion sensor, a drive's loop
+is not quite the lag it is taken for, and the pressure is not quite the command: 10 ms or half a
+per cent, which a record without irregular waves shows, and which would be laid to inertia and
+damping, ten of their deviations off. At these frequencies a longer lag is a longer delay.
+
+A is estimated from the waves of the same record and knows them better than it should, so the
+misfit looks surer than it is. With n coefficients from N equations the deviations are stated
+(1 + n / N) / (1 - n / N) times larger. The form is that of Akaike's final prediction error; that it
+is right for deviations, and not for their squares, was measured (docs/retuning.md).
 """
 
 import dataclasses
@@ -30,7 +40,10 @@ from utank_hil.identification.okid import OkidResult
 
 _BAND_RAD_S = 2.5  # above it neither ship nor tank move
 _LINES = 64  # in the band; an ARX model of order 120 resolves no more
-_SPREAD = np.array([0.1, 0.7, 0.5, 0.2])  # sigma: how far loading changes each number
+_SPREAD = (0.1, 0.7, 0.5, 0.2)  # sigma: how far loading changes each number
+_PRESSURE_SPREAD = 0.005  # of a pressure sensor's slope, and of a loop that holds it
+_DELAY_SPREAD_S = 0.02  # two ticks: sensors and drive are heard in one or the next
+_PRESSURE = len(_SPREAD)  # its place among the fitted numbers, the delays after it
 _STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # stiffness to begin with
 _PASSES = 5
 _SETTLED = 1e-3
@@ -48,11 +61,16 @@ class ShipFit:
         The given one with the damping ratio of the record.
     deviation : ndarray, shape (4,)
         Standard deviations of inertia, stiffness, ship damping and tank damping ratio, each as a
-        part of its value.
+        part of its value. In an irregular sea the interval of two of them holds the truth in about
+        nine records of ten.
     period_deviation : float
         Standard deviation of the ship's roll period, as a part of it.
     dispersion : float
         Root mean square of the misfit over what the prediction errors explain.
+    later_s : ndarray, shape (m,)
+        By how much each output is later than `delay_s` and `lag_s` have it.
+    pressure : float
+        Pressure over command.
     """
 
     ship: RollShip
@@ -60,6 +78,8 @@ class ShipFit:
     deviation: FloatArray
     period_deviation: float
     dispersion: float
+    later_s: FloatArray
+    pressure: float
 
 
 def fit_ship(
@@ -108,10 +128,11 @@ def fit_ship(
     powers = z[:, None] ** -np.arange(arx.order + 1)
     left = np.eye(arx.outputs) - np.einsum("wi,iab->wab", powers[:, 1:], arx.alpha)
     right = np.einsum("wi,iab->wab", powers, arx.beta)
+    spread = np.array([*_SPREAD, _PRESSURE_SPREAD, *[_DELAY_SPREAD_S] * arx.outputs])
     amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), arx.sample_time_s)
 
     def changed(theta: FloatArray) -> tuple[RollShip, Tank]:
-        factor = np.exp(theta).tolist()
+        factor = np.exp(theta[:_PRESSURE]).tolist()
         return (
             dataclasses.replace(
                 ship,
@@ -125,34 +146,40 @@ def fit_ship(
     def response(theta: FloatArray) -> ComplexArray:
         plant = sample(pump_model(*changed(theta), measured), arx.sample_time_s, delay_s, lag_s)
         resolvent = z[:, None, None] * np.eye(len(plant.A)) - plant.A
-        found: ComplexArray = plant.C @ np.linalg.solve(resolvent, plant.B + 0j)
-        return found + plant.D
+        exact = plant.C @ np.linalg.solve(resolvent, plant.B + 0j) + plant.D
+        later = np.exp(theta[_PRESSURE] - 1j * np.outer(lines, theta[_PRESSURE + 1 :]))
+        found: ComplexArray = later[:, :, None] * exact
+        return found
 
     def misfit(theta: FloatArray, weight: FloatArray) -> FloatArray:
         errors = weight @ (right - left @ response(theta)) * amplitude[:, None, None]
-        return np.concatenate([errors.real.ravel(), errors.imag.ravel(), theta / _SPREAD])
+        return np.concatenate([errors.real.ravel(), errors.imag.ravel(), theta / spread])
 
     try:
         weight = np.linalg.cholesky(np.linalg.inv(result.residual_covariance)).T
-        starts = [np.array([0.0, start, 0.0, 0.0]) for start in _STARTS]
+        starts = [np.where(np.arange(len(spread)) == 1, start, 0.0) for start in _STARTS]
         theta = min(starts, key=lambda start: float(np.sum(misfit(start, weight) ** 2)))
         dispersion = 1.0
         for _ in range(_PASSES):
-            solution = least_squares(misfit, theta, x_scale=_SPREAD, args=(weight / dispersion,))
+            solution = least_squares(misfit, theta, x_scale=spread, args=(weight / dispersion,))
             theta = solution.x
             excess = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
             dispersion = max(1.0, dispersion * excess)
             if abs(excess - 1) < _SETTLED or dispersion == 1:
                 break
-        covariance = np.linalg.inv(solution.jac.T @ solution.jac)
+        covariance = np.linalg.inv(solution.jac.T @ solution.jac)[:_PRESSURE, :_PRESSURE]
     except (np.linalg.LinAlgError, ValueError) as error:  # overflow on the way, or singular
         raise IdentificationError(f"no ship fits the identified model: {error}") from None
     of_period = np.array([0.5, -0.5, 0.0, 0.0])
+    part = len(result.column_scale) / result.rows
+    wider = (1 + part) / (1 - part)
     return ShipFit(
         *changed(theta),
-        np.sqrt(covariance.diagonal()),
-        float(np.sqrt(of_period @ covariance @ of_period)),
+        wider * np.sqrt(covariance.diagonal()),
+        wider * float(np.sqrt(of_period @ covariance @ of_period)),
         dispersion,
+        theta[_PRESSURE + 1 :],
+        float(np.exp(theta[_PRESSURE])),
     )
 
 

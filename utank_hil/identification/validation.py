@@ -60,6 +60,7 @@ def validate(
     y: FloatArray,
     disturbance_frequencies_rad_s: Sequence[float] = (),
     lags: int = 25,
+    disturbance_polynomial_degree: int | None = None,
 ) -> Validation:
     """Compare a model with a record, best one it was not identified from.
 
@@ -73,6 +74,9 @@ def validate(
         Known regular waves; amplitude and phase are fitted to this record.
     lags : int
         Over which errors and inputs are correlated, 1 or more.
+    disturbance_polynomial_degree : int or None
+        0 allows for an offset, 1 for a drift too, both fitted to this record: a heel, or the bias
+        of a sensor, that the model was identified beside (`okid`) is no error of the model.
 
     Returns
     -------
@@ -96,15 +100,15 @@ def validate(
             f"{z.shape[1] - m}"
         )
     scale = channel_scale(z, m)
-    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s))
+    basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
     functions = basis.evaluate(len(z), arx.sample_time_s)
     regression = LagRegression(z / scale, m, max(arx.order, int(lags)), functions)
     _refuse_stillness(regression, lags)
     coefficients = _coefficients(arx, scale, regression)
     errors = _errors(regression, coefficients)
     if basis.size:
-        waves = np.hstack([s.basis for s in regression.segments])
-        coefficients[-basis.size :] = np.linalg.lstsq(waves.T, np.hstack(errors).T, rcond=None)[0]
+        known = np.hstack([s.basis for s in regression.segments])
+        coefficients[-basis.size :] = np.linalg.lstsq(known.T, np.hstack(errors).T, rcond=None)[0]
         errors = _errors(regression, coefficients)
     targets = np.hstack([s.channels[:m, regression.order :] for s in regression.segments])
     spread = np.std(targets, axis=1)

@@ -20,6 +20,7 @@ from utank_hil.runtime.controller_node import (
     TICK_NS,
     ControllerNode,
     ControllerSettings,
+    EventSink,
     Measure,
 )
 from utank_hil.runtime.inbox import Inbox
@@ -59,6 +60,7 @@ def build_controller_node(
     retuner: Retuner | None = None,
     statistics: LoopStatistics | None = None,
     sink: Callable[[FloatArray], None] | None = None,
+    event_sink: EventSink | None = None,
 ) -> ControllerNode:
     """Design the law and build the controller node around it.
 
@@ -68,7 +70,7 @@ def build_controller_node(
     retuner : Retuner, optional
         Who identifies and designs, if the configuration has the controller retune itself; without
         one it does not.
-    statistics, sink
+    statistics, sink, event_sink
         As `ControllerNode` takes them.
     """
     tank = config.vessel.tank
@@ -99,6 +101,7 @@ def build_controller_node(
         retuning=retuning,
         statistics=statistics,
         sink=sink,
+        event_sink=event_sink,
     )
 
 

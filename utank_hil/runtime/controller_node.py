@@ -21,7 +21,7 @@ from utank_hil.canbus import (
     PumpCommand,
     RetuningState,
 )
-from utank_hil.control.interface import Controller
+from utank_hil.control.interface import Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
 from utank_hil.runtime.drive_sequence import DriveSequence
@@ -47,13 +47,16 @@ FRESH_NS: Final = 50_000_000
 """An older measurement is a gap in the record that the ship is identified from."""
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
+_ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
 _DRIVE_FAULT: Final = DriveState.FAULT
 _NO_DRIVE_FAULT: Final = DriveFault.NONE
 _CONTROL: Final = Demand.CONTROL
+_FAULT_OF_LIMIT: Final = {"roll_rad": Fault.HEEL_LIMIT, "level_m": Fault.LEVEL_LIMIT}
 
 Measure = Callable[[Inbox, LevelObserver], FloatArray]
+EventSink = Callable[[RetuningEvent, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,8 @@ class ControllerNode:
         The controller again, when it is one that retunes itself.
     sink : callable, optional
         Takes one telemetry row (columns `SIGNALS`) every tick; must copy it and not wait.
+    event_sink : callable, optional
+        Takes each `RetuningEvent`, with the time of the first tick, as it happens; must not wait.
 
     Attributes
     ----------
@@ -124,6 +129,7 @@ class ControllerNode:
         retuning: AdaptiveController | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
+        event_sink: EventSink | None = None,
     ) -> None:
         sample_ticks = controller.sample_time_s / (TICK_NS * NANOSECONDS)
         if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
@@ -132,6 +138,7 @@ class ControllerNode:
                 f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
             )
         self._controller = controller
+        self._starts_anew = controller if isinstance(controller, StartsAnew) else None
         self._retuning = retuning
         self._measure = measure
         self._limiter = limiter
@@ -139,6 +146,8 @@ class ControllerNode:
         self._settings = settings
         self._statistics = statistics
         self._sink = sink
+        self._event_sink = event_sink
+        self._events_told = 0
         self._inbox = Inbox(catalogue, settings.configuration_version)
         self._catalogue_version = catalogue.version
         self._level = level
@@ -178,8 +187,18 @@ class ControllerNode:
 
     @property
     def fault(self) -> Fault:
-        """Fault of the supervisor, see there."""
-        return self._supervisor.fault
+        """Fault of the supervisor, see there; if it has none, the limit on which the law ended."""
+        return self._supervisor.fault or self._law_fault
+
+    @property
+    def fallbacks(self) -> int | None:
+        """Of a law that searches for plans, see `Plans`; else None."""
+        return self._controller.fallbacks if isinstance(self._controller, Plans) else None
+
+    @property
+    def _law_fault(self) -> Fault:
+        law = self._starts_anew
+        return _FAULT_OF_LIMIT.get(law.passed_limit, Fault.NONE) if law else Fault.NONE
 
     @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:
@@ -276,6 +295,10 @@ class ControllerNode:
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
+        seen, anew = self._seen, self._starts_anew
+        # in charge nothing but disarming and arming again brings back a law that has ended
+        if anew and (seen.arm_edge or seen.reset_edge) and self._supervisor.mode is not _ACTIVE:
+            anew.reset()
         if not self._samples.due(now_ns):
             return
         # the law hears what really left since its last answer: anti-windup and bumpless take-over
@@ -283,7 +306,6 @@ class ControllerNode:
             self._applied[0] = self._limiter.mean_since_last_call()
             self._controller.applied(self._applied)
         if self._retuning is not None:
-            seen = self._seen
             self._retuning.update(
                 now_ns,
                 self._inbox.operator,
@@ -297,6 +319,10 @@ class ControllerNode:
         if self._law_failed:
             self._law_pa = 0.0
             self._controller.reset()
+        if self._retuning is not None and self._event_sink is not None:
+            for event in self._retuning.events[self._events_told :]:
+                self._event_sink(event, self.start_ns)
+                self._events_told += 1
 
     def _limit(self) -> None:
         """Turn the law's pressure, or zero, into a permitted one."""
@@ -324,9 +350,9 @@ class ControllerNode:
                 self._status.frame(
                     ControllerStatus(
                         mode=supervisor.mode,
-                        fault=supervisor.fault,
+                        fault=self.fault,
                         armed=supervisor.mode is Mode.ACTIVE,
-                        alarm=supervisor.mode is _FAULT,
+                        alarm=supervisor.mode is _FAULT or bool(self._law_fault),
                         degraded=supervisor.degraded,
                         saturated=self._limiter.limiting,
                         not_realtime=statistics is not None and not statistics.real_time,
@@ -364,7 +390,7 @@ class ControllerNode:
             inbox.pressure_pa,
             inbox.power_w,
             self._supervisor.mode,
-            self._supervisor.fault,
+            self.fault,
             self._bus_load,
             lateness_s,
             duration_s,

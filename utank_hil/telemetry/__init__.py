@@ -7,6 +7,7 @@ loaded when its name is first used; so is the recorder, which is also run as a m
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from utank_hil.telemetry.event_ring import EventReader, EventWriter, event_text
 from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
 from utank_hil.telemetry.viewer import Viewer, open_viewer
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BenchCurve",
+    "EventReader",
+    "EventWriter",
     "RecorderError",
     "RecorderProcess",
     "RecorderReport",
@@ -25,6 +28,7 @@ __all__ = [
     "RingWriter",
     "Viewer",
     "draw_bench",
+    "event_text",
     "open_viewer",
     "read_recording",
     "write_recording",

@@ -16,6 +16,7 @@ from utank_hil.telemetry.rerun_log import (
     TIME_COLUMN,
     TIMELINE,
     has_state,
+    log_path,
     run_paths,
     state_path,
 )
@@ -94,9 +95,16 @@ def _page(
     ]
     shares = [100]
     if has_state(columns):
-        lanes = [state_path(path) for path in run_paths(runs)]
-        rows.append(rrb.StateTimelineView(contents=lanes, name="Mode and fault", time_view=axis))
-        shares.append(10 + 5 * len(runs))
+        paths = run_paths(runs)
+        lanes = [state_path(path) for path in paths]
+        rows.append(
+            rrb.Horizontal(
+                rrb.StateTimelineView(contents=lanes, name="Mode and fault", time_view=axis),
+                rrb.TextLogView(contents=[log_path(path) for path in paths], name="Events"),
+                column_shares=[2, 1],
+            )
+        )
+        shares.append(15 + 5 * len(runs))
     return rrb.Vertical(*rows, row_shares=shares, name=name)
 
 

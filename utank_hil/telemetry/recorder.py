@@ -1,4 +1,4 @@
-"""The recorder: a process that takes rows from a ring to a Rerun file and to live viewers.
+"""The recorder: a process that takes rows and events to a Rerun file and to live viewers.
 
 `RecorderProcess` starts it from a bench or from the deployed controller; `python -m
 utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
@@ -14,11 +14,13 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
+from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.viewer import LOOPBACK, free_port, live_url, rerun_environment
 
@@ -56,7 +58,9 @@ class RecorderReport:
     lost: int
 
 
-def record(ring: str, file: Path, live_port: int | None = None) -> RecorderReport:
+def record(
+    ring: str, file: Path, live_port: int | None = None, events: str | None = None
+) -> RecorderReport:
     """Record a ring until it ends or SIGINT or SIGTERM comes; the work of the recorder process.
 
     Parameters
@@ -67,6 +71,8 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
         The `.rrd` file; written anew.
     live_port : int, optional
         Serve viewers on this loopback port as well.
+    events : str, optional
+        Name of the ring of events (`EventWriter`) that belongs to it.
 
     Raises
     ------
@@ -83,7 +89,9 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
     from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths
 
     stop = _stop_pipe()
-    with RingReader(ring) as reader:
+    with ExitStack() as stack:
+        reader = stack.enter_context(RingReader(ring))
+        told = None if events is None else stack.enter_context(EventReader(events))
         _make_room(file)
         sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(file)]
         if live_port is not None:
@@ -92,7 +100,7 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
         recording.set_sinks(*sinks, default_blueprint=make_blueprint(reader.columns, [LIVE_RUN]))
         log = RunLog(recording, run_paths([LIVE_RUN])[0], reader.columns)
         _say({"ready": 1})
-        recorded = noted = 0
+        recorded = noted = unheard = 0
         while True:
             last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
             rows = reader.read()
@@ -101,8 +109,14 @@ def record(ring: str, file: Path, live_port: int | None = None) -> RecorderRepor
                 noted = reader.lost
             if len(rows):
                 log.write(rows)
-                _flush(recording)  # into the file, so that a kill finds it there
                 recorded += len(rows)
+            happened = [] if told is None else told.read()
+            log.write_events(happened)
+            if told is not None and told.lost > unheard:
+                log.note(f"{told.lost - unheard} events lost: the recorder was too slow")
+                unheard = told.lost
+            if len(rows) or happened:
+                _flush(recording)  # into the file, so that a kill finds it there
             if last:
                 break
         _flush(recording)
@@ -128,6 +142,8 @@ class RecorderProcess:
         The `.rrd` file; written anew.
     live : bool
         Serve viewers on a free loopback port.
+    events : str, optional
+        Name of the ring of events (`EventWriter`) that belongs to it.
 
     Attributes
     ----------
@@ -140,8 +156,12 @@ class RecorderProcess:
         If the recorder does not come up, with its reason.
     """
 
-    def __init__(self, ring: str, file: Path, live: bool = False) -> None:
+    def __init__(
+        self, ring: str, file: Path, live: bool = False, events: str | None = None
+    ) -> None:
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
+        if events is not None:
+            command += ["--events", events]
         self.url: str | None = None
         if live:
             port = free_port()
@@ -213,11 +233,13 @@ def _main() -> None:
     parser.add_argument("--ring", required=True, metavar="NAME")
     parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
     parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
+    parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
     arguments = parser.parse_args()
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
-        _say(asdict(record(arguments.ring, arguments.file, arguments.live_port)))
+        report = record(arguments.ring, arguments.file, arguments.live_port, arguments.events)
+        _say(asdict(report))
     except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
         _say({"error": str(error)})

@@ -13,6 +13,7 @@ from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
 from utank_hil.arrays import FloatArray
+from utank_hil.runtime.retuning.adaptive import RetuningEvent
 from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.rerun_log import (
     APPLICATION,
@@ -32,7 +33,12 @@ _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _BLOCK_ROWS: Final = 8192  # the viewer loads a file by such blocks
 
 
-def write_recording(path: Path, columns: Sequence[str], runs: Mapping[str, FloatArray]) -> None:
+def write_recording(
+    path: Path,
+    columns: Sequence[str],
+    runs: Mapping[str, FloatArray],
+    events: Mapping[str, Sequence[RetuningEvent]] | None = None,
+) -> None:
     """Write runs side by side on one time line into a recording, with its blueprint.
 
     Parameters
@@ -43,6 +49,8 @@ def write_recording(path: Path, columns: Sequence[str], runs: Mapping[str, Float
         Names of the values of a row, SI units, `time_s` among them.
     runs : mapping of str to array (n, len(columns))
         Rows of each run by its name; the first is taken for the one to compare with.
+    events : mapping of str to sequence of RetuningEvent, optional
+        What retuning did in the runs that retuned; `time_ns` counts as `time_s` does.
 
     Raises
     ------
@@ -63,10 +71,11 @@ def write_recording(path: Path, columns: Sequence[str], runs: Mapping[str, Float
     blueprint = make_blueprint(columns, list(runs), span_s=(time_s.min(), time_s.max()))
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
-    for path_of_run, rows in zip(run_paths(list(runs)), runs.values(), strict=True):
+    for path_of_run, (run, rows) in zip(run_paths(list(runs)), runs.items(), strict=True):
         log = RunLog(recording, path_of_run, columns)
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])
+        log.write_events((events or {}).get(run, ()))
     recording.flush()
     recording.disconnect()
 

@@ -2,8 +2,9 @@
 
 A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
 One entity instead of one a signal makes the file two to three times smaller at a live recorder's
-batch size, and the names in the file say what is in it. Mode and fault are logged once more as
-text, on change only, for the state lane.
+batch size, and the names in the file say what is in it. Mode and fault are logged once more by
+name, on change only, for the state lane and for the text log, which holds what retuning did and why
+besides.
 """
 
 import re
@@ -16,7 +17,9 @@ import pyarrow as pa  # it ships no annotations
 import rerun as rr
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
+from utank_hil.runtime.retuning.adaptive import RetuningEvent
+from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.units import field_of
 
 APPLICATION: Final = "utank-hil"
@@ -45,6 +48,13 @@ def _state_name(mode: float, fault: float) -> str:
     if fault == Fault.NONE:
         return name
     return f"{name}: {Fault(int(fault)).name if fault in set(Fault) else f'fault {fault:g}'}"
+
+
+def _level(mode: float, fault: float) -> rr.TextLogLevel:
+    """How loud a state is told."""
+    if mode == Mode.FAULT:
+        return rr.TextLogLevel.ERROR
+    return rr.TextLogLevel.INFO if fault == Fault.NONE else rr.TextLogLevel.WARN
 
 
 class RunLog:
@@ -100,16 +110,44 @@ class RunLog:
         changed = (states != before).any(axis=1)
         self._last = states[-1].copy()
         if changed.any():
+            names = [_state_name(*state) for state in states[changed]]
             self._recording.send_columns(
                 state_path(self._path),
                 [rr.TimeColumn(TIMELINE, duration=time_ns[changed])],
-                rr.StateChange.columns(state=[_state_name(*state) for state in states[changed]]),
+                rr.StateChange.columns(state=names),
                 strict=True,
+            )
+            self._write_text(time_ns[changed], names, [_level(*state) for state in states[changed]])
+
+    def write_events(self, events: Sequence[RetuningEvent]) -> None:
+        """Log what retuning did and why; `time_ns` counts as the rows' `time_s` does."""
+        if events:
+            bad = (RetuningState.REFUSED, RetuningState.UNDONE)
+            self._write_text(
+                np.array([event.time_ns for event in events], dtype="timedelta64[ns]"),
+                [event_text(event) for event in events],
+                [
+                    rr.TextLogLevel.WARN if event.state in bad else rr.TextLogLevel.INFO
+                    for event in events
+                ],
             )
 
     def note(self, text: str) -> None:
         """Log a warning about the recording itself."""
-        self._recording.log(f"{self._path}/log", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+        self._recording.log(log_path(self._path), rr.TextLog(text, level=rr.TextLogLevel.WARN))
+
+    def _write_text(
+        self,
+        time_ns: npt.NDArray[np.timedelta64],
+        texts: list[str],
+        levels: Sequence[rr.TextLogLevel],
+    ) -> None:
+        self._recording.send_columns(
+            log_path(self._path),
+            [rr.TimeColumn(TIMELINE, duration=time_ns)],
+            rr.TextLog.columns(text=texts, level=[str(level) for level in levels]),
+            strict=True,
+        )
 
 
 def time_index(columns: Sequence[str]) -> int:
@@ -138,3 +176,8 @@ def run_of(path: str) -> str:
 def state_path(path: str) -> str:
     """Return the entity of a run's state lane."""
     return f"{path}/state"
+
+
+def log_path(path: str) -> str:
+    """Return the entity of a run's text log."""
+    return f"{path}/log"

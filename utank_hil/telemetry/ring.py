@@ -1,10 +1,10 @@
 """A ring of float64 rows in shared memory: one writer that never waits, any number of readers.
 
-The controller writes a row every tick; the recorder, and later the retuner, read in processes of
-their own. It is a broadcast ring: the writer overwrites the oldest row, never blocks, never looks
-at a reader, and cannot tell whether there is one. Each reader has its own cursor, notices when it
-was lapped and counts the rows it lost. Readers map the segment read-only, so nothing they do
-reaches the controller.
+The controller writes a row every tick; the recorder reads in a process of its own. It is a
+broadcast ring: the writer overwrites the oldest row, never blocks, never looks at a reader, and
+cannot tell whether there is one. Each reader has its own cursor, notices when it was lapped and
+counts the rows it lost. Readers map the segment read-only, so nothing they do reaches the
+controller.
 
 Layout, in 8-byte words: header (`_Word`), column names as JSON, then `capacity` slots of
 `width` values and one seal. The seal of row number k is the CRC-32 of the row's bytes, started

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import Mode, OperatorCommand
+from utank_hil.canbus import Mode, OperatorCommand, RetuningState
 from utank_hil.control import ARX, PredictiveLaw
 from utank_hil.runtime.retuning import (
     AdaptiveController,
@@ -50,6 +50,7 @@ class ToyRetuner:
 
     reply: Answer | None = None
     looks: int = 0
+    alive: bool = True
     records: list[FloatArray] = field(default_factory=list)
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
@@ -116,3 +117,7 @@ class Rig:
     @property
     def reasons(self) -> str:
         return "; ".join(self.controller.events[-1].reasons)
+
+
+def states(rig: Rig) -> list[RetuningState]:
+    return [event.state for event in rig.controller.events]

@@ -26,7 +26,7 @@ def test_empty_mailbox_holds_nothing() -> None:
     assert box.read(1) is None
 
 
-@given(st.integers(0, 23 + 32), st.integers(1, 255))
+@given(st.integers(0, 31 + 32), st.integers(1, 255))
 def test_scribbled_message_is_no_message(at: int, scribble: int) -> None:
     box = Mailbox(32)
     message = bytes(range(32))
@@ -34,8 +34,8 @@ def test_scribbled_message_is_no_message(at: int, scribble: int) -> None:
     memory = memoryview(box.__getstate__()).cast("B")  # type: ignore[arg-type]
     memory[at] ^= scribble
     assert box.read(7) in (None, message)
-    # the upper half of the CRC's word is not part of it
-    if at < 20 or at >= 24:
+    # the upper half of the CRC's word is not part of it, and the heartbeat is none of the message
+    if at < 20 or at >= 32:
         assert box.read(7) is None
 
 
@@ -45,6 +45,17 @@ def test_message_that_is_too_long_is_refused_and_the_one_before_stays() -> None:
     with pytest.raises(ValueError, match="too long"):
         box.post(2, b"123456789")
     assert box.read(1) == b"12345678"
+
+
+@given(st.lists(st.integers(-(1 << 63), (1 << 63) - 1), min_size=1, max_size=5))
+def test_heartbeat_is_the_latest_and_leaves_the_message_alone(beats: list[int]) -> None:
+    box = Mailbox(8)
+    assert box.beat_ns == 0
+    box.post(1, b"message")
+    for beat_ns in beats:
+        box.beat(beat_ns)
+        assert box.beat_ns == beat_ns
+        assert box.read(1) == b"message"
 
 
 @pytest.mark.parametrize("capacity", [0, -1])

@@ -64,6 +64,15 @@ def test_sea_that_only_grows_is_no_change() -> None:
     assert monitor.change < 1.2
 
 
+@pytest.mark.parametrize("coefficient", [1e30, 1.7e308])
+def test_model_that_foretells_nonsense_leaves_a_finite_measure(coefficient: float) -> None:
+    u, y = _record(TRUE, 4000, 3, 0.05)
+    nonsense = ARX(np.full((2, 2, 2), coefficient), TRUE.beta, 0.2)
+    with np.errstate(all="ignore"):
+        monitor = _watched(nonsense, np.vstack([u, u]), np.vstack([y, -y]))
+    assert 1.0 <= monitor.change < np.inf
+
+
 def test_still_water_is_no_change() -> None:
     u, y = _record(TRUE, 6000, 3, 0.05)
     quiet = _watched(TRUE, np.vstack([u, 0 * u]), np.vstack([y, 0 * y]))

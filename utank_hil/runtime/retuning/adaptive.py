@@ -1,17 +1,30 @@
 """The controller that retunes itself: identify, have a law designed, try it, keep it or not.
 
-`AdaptiveController` stands where any other controller stands. Between the steps `update` moves it
-on::
+`AdaptiveController` stands where any other controller stands; `update` moves it on between its
+steps. These are its states, and every way from one to another:
 
-    IDLE -> IDENTIFY (pulses, recorded) -> DESIGN (elsewhere) -> TRIAL -> RETUNED
-             |                              |                     |          |
-             v                              v                     v          v
-           REFUSED, or IDLE if given up   REFUSED              REFUSED     UNDONE
+    state      what drives            to         when
+    at rest    the accepted law       IDENTIFY   ordered, on schedule, or the ship has changed; and
+                                                 allowed, in charge for 30 s without a break, and
+                                                 the retuner alive
+                                      REFUSED    the same, and the retuner shows no sign of life
+                                      UNDONE     undo, if a law was accepted before this one
+    IDENTIFY   the accepted law and   DESIGN     all pulses are given
+               pulses, or the pulses  REFUSED    the roll is above its limit
+    DESIGN     the accepted law       TRIAL      a law was let in and its memory is filled
+                                      REFUSED    a refusal, no answer in time, a law not let in
+    TRIAL      the law on trial       RETUNED    its time is over: it is accepted
+                                      REFUSED    it is worse, its answer is not finite, or `reset`
+    any of the three                  IDLE       forbidden, or not in charge any more
+                                      UNDONE     undo: back to the accepted law from TRIAL, from
+                                                 the others to the one before it (IDLE if none)
 
-The new law's memory is first filled from what was kept of past commands and outputs, a piece at
-each step; then its answer is faded in while the old one's fades out. The old law goes on being
-stepped, so the way back is the same, at any time. Whatever is asked for, the limits on pressure,
-rate, level and power apply to the sum of it all, after this.
+IDLE, RETUNED, REFUSED and UNDONE are at rest, and alike but for what they say. The laws themselves
+change in four ways, those of `Laws`: into TRIAL one is put on trial, into RETUNED it is kept, out
+of TRIAL by any other way it is dropped, and undo goes back to the one accepted before.
+
+Whatever is asked for, the limits on pressure, rate, level and power apply to the sum of it all,
+after this.
 """
 
 from dataclasses import dataclass
@@ -21,24 +34,36 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import OperatorCommand, RetuningState
-from utank_hil.control import ARX, Controller, LinearLaw
-from utank_hil.runtime.retuning.answer import Candidate, Refusal
+from utank_hil.control import ARX, LinearLaw
+from utank_hil.runtime.retuning.answer import Candidate, ModelSummary, Refusal
 from utank_hil.runtime.retuning.history import SampleHistory
+from utank_hil.runtime.retuning.incoming import (
+    FILL_AT_ONCE,
+    FILL_SAMPLES,
+    Entrance,
+    IncomingLaw,
+)
+from utank_hil.runtime.retuning.laws import LawInService, Laws
 from utank_hil.runtime.retuning.monitor import ChangeMonitor
 from utank_hil.runtime.retuning.retuner import Retuner
 from utank_hil.runtime.retuning.settings import EARLIEST_VERDICT_S, RetuningSettings
 from utank_hil.runtime.retuning.trial import Effort, MovingEffort, worsening
 
-FADE_SAMPLES: Final = 15
-FILL_SAMPLES: Final = 1000
-"""Past samples a new law's memory is filled from: more than any law or washout remembers."""
-FILL_AT_ONCE: Final = 50
 EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is taken back before the trial's end."""
-GAIN_FACTOR: Final = 30.0
-"""A law may have so many times the gains of the configured one."""
+MOST_TRIES: Final = 3
+"""Identifications for one change of the ship; when all are refused, she counts as normal."""
+RETRY_NS: Final = 600_000_000_000
+"""Between the end of a retuning and the next because of a change: what the monitor learns in."""
 
+_ORDERED: Final = "ordered by the operator"
+_COMPARABLE: Final = (
+    f"the law has been in charge for {EARLIEST_VERDICT_S:g} s without a break, to compare with it"
+)
+_NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 _BUSY: Final = (RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL)
+# read once: in Python 3.11 a member costs eight times as much from its class as from here
+_IDENTIFY, _DESIGN, _TRIAL = _BUSY
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,22 +75,17 @@ class RetuningEvent:
     time_ns : int
         On the node's clock.
     state : RetuningState
-        Entered then.
+        Entered then; that before, where there is only something to say.
     reasons : tuple of str
         Why.
+    found : ModelSummary or None
+        The ship that a law on trial, or one accepted, was made for.
     """
 
     time_ns: int
     state: RetuningState
     reasons: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Service:
-    """A law in service, or one that was."""
-
-    controller: Controller
-    monitor: ChangeMonitor
+    found: ModelSummary | None = None
 
 
 class AdaptiveController:
@@ -92,6 +112,7 @@ class AdaptiveController:
     events : list of RetuningEvent
     candidate : Candidate or None
         The one last tried.
+    laws : Laws
     """
 
     def __init__(
@@ -107,26 +128,27 @@ class AdaptiveController:
         self.state = RetuningState.IDLE
         self.events: list[RetuningEvent] = []
         self.candidate: Candidate | None = None
+        self.laws = Laws(LawInService(law.controller(), ChangeMonitor(model, roll)))
         self._settings = settings
         self._roll = roll
         self._retuner = retuner
         self._pulses_pa = pulses_pa
-        self._largest_gain = GAIN_FACTOR * _gain(law)
-        self._current = _Service(law.controller(), ChangeMonitor(model, roll))
-        self._other: _Service | None = None
-        self._incoming: _Service | None = None
-        self._filled = 0
-        self._fade = FADE_SAMPLES
         self._history = SampleHistory(
             max(len(pulses_pa), FILL_SAMPLES + FILL_AT_ONCE), model.outputs
         )
+        self._entrance = Entrance(law, self._history, roll)
+        self._incoming: IncomingLaw | None = None
         trial = round(settings.trial_s / law.sample_time_s)
+        self._verdict = min(trial, round(EARLIEST_VERDICT_S / law.sample_time_s))
+        # of the accepted law, in charge without a break and without pulses; and of that on trial
         self._usual, self._tried = MovingEffort(trial), MovingEffort(trial)
-        self._before: Effort | None = None
+        self._before: Effort = self._usual.effort
         self._pulse = 0
         self._number = 0
-        self._since_ns = 0
-        self._idle_since_ns: int | None = None
+        self._ordered = False
+        self._tries = 0
+        self._now_ns = self._since_ns = 0
+        self._rest_since_ns: int | None = None
         self._retune_bit = self._undo_bit = True  # a bit that is set before we look is no edge
         self._applied_pa = 0.0
         self._roll_rad = 0.0
@@ -147,49 +169,47 @@ class AdaptiveController:
         fresh : bool
             Whether the outputs that `step` will get were measured.
         """
-        self._engaged, self._fresh = engaged, fresh
-        if self._idle_since_ns is None:
-            self._idle_since_ns = now_ns
+        self._now_ns, self._engaged, self._fresh = now_ns, engaged, fresh
+        if self._rest_since_ns is None:
+            self._rest_since_ns = now_ns
         forbidden = order is not None and order.forbid_retuning
         ordered = order is not None and order.retune and not self._retune_bit
         undo = order is not None and order.undo and not self._undo_bit
         if order is not None:
             self._retune_bit, self._undo_bit = order.retune, order.undo
-        if self.state in _BUSY and (forbidden or not engaged):
-            self._give_up(now_ns, "forbidden by the operator" if forbidden else "not in charge")
-        elif undo and self.state in (RetuningState.TRIAL, RetuningState.RETUNED):
-            self._take_back()
-            self._finish(RetuningState.UNDONE, now_ns, ("undone by the operator",))
-        elif self.state is RetuningState.IDENTIFY:
-            self._identify(now_ns)
-        elif self.state is RetuningState.DESIGN:
-            self._await_law(now_ns)
-        elif self.state is RetuningState.TRIAL:
-            self._judge(now_ns)
+        if forbidden or undo or not engaged:
+            self._ordered = False  # one that waits
+        if not engaged:
+            self._usual.clear()
+        if undo and (self.state in _BUSY or self.laws.previous is not None):
+            self._undo()
+        elif self.state in _BUSY and (forbidden or not engaged):
+            self._give_up("forbidden by the operator" if forbidden else "not in charge")
+        elif self.state is _IDENTIFY:
+            self._identify()
+        elif self.state is _DESIGN:
+            self._await_law()
+        elif self.state is _TRIAL:
+            self._judge()
         elif engaged and not forbidden:
-            reason = "ordered by the operator" if ordered else self._own_reason(now_ns)
-            if reason:
-                self._begin(now_ns, reason)
+            self._rest(ordered)
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
         self._roll_rad = float(y[self._roll])
         if self._fresh and self._engaged:
-            self._current.monitor.watch(self._history, self._applied_pa, self._roll_rad)
-            effort = self._tried if self.state is RetuningState.TRIAL else self._usual
-            if self.state not in (RetuningState.IDENTIFY, RetuningState.DESIGN):
-                effort.add(self._roll_rad, self._applied_pa)
+            if self.state is _TRIAL:
+                self._tried.add(self._roll_rad, self._applied_pa)
+            elif self.state not in _BUSY:
+                self._usual.add(self._roll_rad, self._applied_pa)
+                self.laws.accepted.monitor.watch(self._history, self._applied_pa, self._roll_rad)
         self._history.add(self._applied_pa, y, fresh=self._fresh)
-        answer = self._current.controller.step(y, reference)
-        if self._other is not None:
-            fading = self._other.controller.step(y, reference)
-            if self._fade < FADE_SAMPLES:
-                self._fade += 1
-                answer = fading + self._fade / FADE_SAMPLES * (answer - fading)
-            elif self.state not in (RetuningState.TRIAL, RetuningState.RETUNED):
-                self._other = None
-        self._fill_incoming()
-        if self.state is RetuningState.IDENTIFY and self._pulse < len(self._pulses_pa):
+        answer = self.laws.step(y, reference)
+        if self.state is _TRIAL and self.laws.on_trial is None:
+            self._refuse(("the law's answer was not finite",))
+        if self._incoming is not None:
+            self._incoming.fill()
+        if self.state is _IDENTIFY and self._pulse < len(self._pulses_pa):
             pulse_pa = self._pulses_pa[self._pulse]
             self._pulse += 1
             answer = np.full(1, pulse_pa) if self._settings.alone else answer + pulse_pa
@@ -198,142 +218,153 @@ class AdaptiveController:
     def applied(self, u: FloatArray) -> None:
         """Take the command that left; see `Controller`."""
         self._applied_pa = float(u[0])
-        self._current.controller.applied(u)
-        if self._other is not None:
-            self._other.controller.applied(u)
+        self.laws.applied(u)
 
     def reset(self) -> None:
         """Forget the past of all laws; one on trial is taken back."""
-        if self.state is RetuningState.TRIAL:
-            self._take_back()
-        self._current.controller.reset()
-        if self._other is not None:
-            self._other.controller.reset()
+        self.laws.reset()
+        if self.state is _TRIAL:
+            self._refuse(("the controller was reset during the trial",))
 
-    def _own_reason(self, now_ns: int) -> str:
+    def _rest(self, ordered: bool) -> None:
+        """Begin, if there is a reason to, something to compare with, and a retuner."""
+        self._ordered = self._ordered or ordered
+        reason = _ORDERED if self._ordered else self._own_reason()
+        if not reason:
+            return
+        if self._usual.samples < self._verdict:
+            if ordered:
+                self._tell((f"{reason}: begins when {_COMPARABLE}",))
+            return
+        self._ordered = False
+        if not self._retuner.alive:
+            self._finish(
+                RetuningState.REFUSED,
+                f"{reason}, but the retuner shows no sign of life: try again later",
+            )
+            return
+        self._before = self._usual.effort
+        self._usual.clear()
+        self._pulse = 0
+        self._enter(_IDENTIFY, reason)
+
+    def _own_reason(self) -> str:
         """Why to retune without an order; empty if there is no reason."""
         settings = self._settings
-        assert self._idle_since_ns is not None
-        every_s = settings.every_s
-        if every_s is not None and now_ns - self._idle_since_ns >= every_s * 1e9:
+        assert self._rest_since_ns is not None
+        rested_ns = self._now_ns - self._rest_since_ns
+        if settings.every_s is not None and rested_ns >= settings.every_s * 1e9:
             return "on schedule"
-        change = self._current.monitor.change
-        if settings.change_factor is not None and change > settings.change_factor:
+        if self._changed and rested_ns >= RETRY_NS:
+            change = self.laws.accepted.monitor.change
             return f"the ship has changed: prediction errors are off the normal {change:.2f} times"
         return ""
 
-    def _begin(self, now_ns: int, reason: str) -> None:
-        self._before = self._usual.effort
-        self._pulse = 0
-        self._since_ns = now_ns
-        self._enter(RetuningState.IDENTIFY, now_ns, (reason,))
+    @property
+    def _changed(self) -> bool:
+        """Whether the ship is no longer the one that the law was accepted for."""
+        factor = self._settings.change_factor
+        return factor is not None and self.laws.accepted.monitor.change > factor
 
-    def _identify(self, now_ns: int) -> None:
+    def _identify(self) -> None:
         if self._fresh and abs(self._roll_rad) > self._settings.roll_limit_rad:
-            self._refuse(now_ns, ("the roll is above the limit for identification",))
+            self._refuse(("the roll is above the limit for identification",))
         elif self._pulse == len(self._pulses_pa):
             self._number += 1
-            self._since_ns = now_ns
-            self._retuner.submit(self._number, self._history.record(self._pulse), now_ns)
-            self._enter(RetuningState.DESIGN, now_ns, ())
+            self._since_ns = self._now_ns
+            record = self._history.record(self._pulse)
+            self._retuner.submit(self._number, record, self._now_ns)
+            self._enter(_DESIGN)
 
-    def _await_law(self, now_ns: int) -> None:
+    def _await_law(self) -> None:
         if self._incoming is not None:
-            if self._filled == self._history.count:
-                self._put_on_trial(self._incoming, now_ns)
+            if self._incoming.filled:
+                self._put_on_trial(self._incoming.law)
             return
-        answer = self._retuner.answer(self._number, now_ns)
+        answer = self._retuner.answer(self._number, self._now_ns)
         if isinstance(answer, Refusal):
-            self._refuse(now_ns, answer.reasons)
+            self._refuse(answer.reasons)
         elif answer is not None:
-            self._take_in(answer, now_ns)
-        elif now_ns - self._since_ns > self._settings.answer_within_s * 1e9:
-            self._refuse(now_ns, ("no answer in time: the retuner hangs or is dead",))
+            incoming = self._entrance.let_in(answer)
+            if isinstance(incoming, str):
+                self._refuse((incoming,))
+            else:
+                self.candidate, self._incoming = answer, incoming
+        elif self._now_ns - self._since_ns > self._settings.answer_within_s * 1e9:
+            self._refuse(("no answer in time: the retuner hangs or is dead",))
 
-    def _take_in(self, candidate: Candidate, now_ns: int) -> None:
-        """Look once more at a candidate, which came from another process, and take it in."""
-        law = candidate.whole_law()
-        if law.sample_time_s != self.sample_time_s:
-            self._refuse(now_ns, (f"the law's sample time is {law.sample_time_s} s",))
-        elif candidate.law.output_gains.shape[1:] != (1, self._history.outputs):
-            self._refuse(now_ns, ("the law is for other signals",))
-        elif not _gain(law) <= self._largest_gain:
-            self._refuse(now_ns, ("the law's gains are out of bounds",))
-        else:
-            self.candidate = candidate
-            self._incoming = _Service(law.controller(), ChangeMonitor(candidate.model, self._roll))
-            self._filled = max(0, self._history.count - FILL_SAMPLES)
-
-    def _fill_incoming(self) -> None:
-        """Step an incoming law through the past, some samples at a time."""
-        if self._incoming is None:
-            return
-        controller, missing = self._incoming.controller, self._history.count - self._filled
-        rows = self._history.latest(missing)[:FILL_AT_ONCE]
-        for row in rows:
-            controller.applied(row[:1])
-            controller.step(row[1:])
-        self._filled += len(rows)
-
-    def _put_on_trial(self, incoming: _Service, now_ns: int) -> None:
-        incoming.controller.applied(np.full(1, self._applied_pa))
-        self._current, self._other, self._incoming = incoming, self._current, None
-        self._fade = 0
+    def _put_on_trial(self, law: LawInService) -> None:
+        law.controller.applied(np.full(1, self._applied_pa))
+        self.laws.try_out(law)
+        self._incoming = None
         self._tried.clear()
         assert self.candidate is not None
         found = self.candidate.summary
         self._enter(
-            RetuningState.TRIAL,
-            now_ns,
-            (
-                f"roll period {found.roll_period_s:.2f} s; in the recorded waves "
-                f"{found.roll_below_passive:.0%} less roll than passive",
-            ),
+            _TRIAL,
+            f"roll period {found.roll_period_s:.2f} s; in the recorded waves "
+            f"{found.roll_below_passive:.0%} less roll than passive",
         )
 
-    def _judge(self, now_ns: int) -> None:
-        settings, after = self._settings, self._tried.effort
-        early = self._tried.samples * self.sample_time_s < EARLIEST_VERDICT_S
-        if after is None or early:
+    def _judge(self) -> None:
+        settings, tried = self._settings, self._tried
+        if tried.samples < self._verdict:
             return
-        worse: tuple[str, ...] = ()
-        if self._before is not None:
-            factor = 1.0 if self._tried.full else EARLY_FACTOR
-            worse = worsening(
-                self._before, after, factor * settings.roll_factor, factor * settings.effort_factor
-            )
+        factor = 1.0 if tried.full else EARLY_FACTOR
+        worse = worsening(
+            self._before,
+            tried.effort,
+            factor * settings.roll_factor,
+            factor * settings.effort_factor,
+        )
         if worse:
-            self._take_back()
-            self._refuse(now_ns, worse)
-        elif self._tried.full:
-            self._usual, self._tried = self._tried, self._usual
-            self._finish(RetuningState.RETUNED, now_ns, ())
+            self._refuse(worse)
+        elif tried.full:
+            self.laws.keep()
+            self._usual, self._tried = tried, self._usual
+            self._learn_anew()
+            self._finish(RetuningState.RETUNED)
 
-    def _take_back(self) -> None:
-        """Fade over to the law before this one."""
-        assert self._other is not None
-        self._current, self._other = self._other, self._current
-        self._fade = 0
+    def _undo(self) -> None:
+        """As the operator orders: back to the law before, and nothing goes on."""
+        reason = "undone by the operator"
+        if self.state is not _TRIAL:
+            if self.laws.previous is None:
+                self._give_up(f"{reason}: there was no law before this one to go back to")
+                return
+            self.laws.undo()
+        self._usual.clear()
+        self._finish(RetuningState.UNDONE, reason)
+        self._learn_anew()
 
-    def _give_up(self, now_ns: int, reason: str) -> None:
-        if self.state is RetuningState.TRIAL:
-            self._take_back()
-        self._finish(RetuningState.IDLE, now_ns, (reason,))
+    def _give_up(self, reason: str) -> None:
+        self._finish(RetuningState.IDLE, reason)
 
-    def _refuse(self, now_ns: int, reasons: tuple[str, ...]) -> None:
-        self._finish(RetuningState.REFUSED, now_ns, reasons)
+    def _refuse(self, reasons: tuple[str, ...]) -> None:
+        """End without a new law; a change of the ship is remembered, for a number of tries."""
+        if self._changed:
+            self._tries += 1
+            if self._tries == MOST_TRIES:
+                self._learn_anew()
+                reasons = (*reasons, f"refused {MOST_TRIES} times: the ship as she is is the usual")
+        self._finish(RetuningState.REFUSED, *reasons)
 
-    def _finish(self, state: RetuningState, now_ns: int, reasons: tuple[str, ...]) -> None:
+    def _learn_anew(self) -> None:
+        """Take ship and sea as they are for the usual ones of the law in charge."""
+        self._tries = 0
+        self.laws.accepted.monitor.restart()
+
+    def _finish(self, state: RetuningState, *reasons: str) -> None:
+        """Come to rest with the accepted law."""
+        if self.laws.on_trial is not None:
+            self.laws.drop()
         self._incoming = None
-        self._idle_since_ns = now_ns
-        self._current.monitor.restart()  # what is normal with the present law, in the present sea
-        self._enter(state, now_ns, reasons)
+        self._rest_since_ns = self._now_ns
+        self._enter(state, *reasons)
 
-    def _enter(self, state: RetuningState, now_ns: int, reasons: tuple[str, ...]) -> None:
+    def _enter(self, state: RetuningState, *reasons: str) -> None:
         self.state = state
-        self.events.append(RetuningEvent(now_ns, state, reasons))
+        self._tell(reasons, self.candidate.summary if self.candidate and state in _NEW else None)
 
-
-def _gain(law: LinearLaw) -> float:
-    """Sum of a law's gains on its outputs; cheap, for the loop."""
-    return float(np.abs(law.matrices().B).sum())
+    def _tell(self, reasons: tuple[str, ...], found: ModelSummary | None = None) -> None:
+        self.events.append(RetuningEvent(self._now_ns, self.state, reasons, found))

@@ -18,13 +18,13 @@ class SampleHistory:
 
     Attributes
     ----------
-    outputs : int
+    capacity, outputs : int
     count : int
         Samples taken so far.
     """
 
     def __init__(self, capacity: int, outputs: int) -> None:
-        self._capacity = capacity
+        self.capacity = capacity
         self.outputs = outputs
         self._rows = np.zeros((2 * capacity, 1 + outputs))
         self._fresh = np.zeros(2 * capacity, dtype=np.bool_)
@@ -44,7 +44,7 @@ class SampleHistory:
             Whether it was measured.
         """
         if self._end == len(self._rows):
-            kept = self._capacity - 1
+            kept = self.capacity - 1
             self._rows[:kept] = self._rows[self._end - kept :]
             self._fresh[:kept] = self._fresh[self._end - kept :]
             self._end = kept
@@ -57,7 +57,7 @@ class SampleHistory:
 
     def latest(self, samples: int) -> FloatArray:
         """The latest rows, at most `samples`; a view, good until the next `add`."""
-        return self._rows[max(0, self._end - min(samples, self._capacity)) : self._end]
+        return self._rows[max(0, self._end - min(samples, self.capacity)) : self._end]
 
     def record(self, samples: int) -> FloatArray:
         """The latest rows, at most `samples`, with gaps as NaN; a copy."""

@@ -1,9 +1,10 @@
 """One message in shared memory: read whole or not at all, and never waited for.
 
-Layout, in 8-byte words: number of the message, its length in bytes, its CRC-32; then the bytes. The
-writer stores the number last. A reader looks at nothing else until it is the number it waits for,
-and believes the bytes when their CRC, started from the number, fits: a message half written or
-scribbled over is no message.
+Layout, in 8-byte words: number of the message, its length in bytes, its CRC-32, the writer's
+heartbeat; then the bytes. The writer stores the number last. A reader looks at nothing else until
+it is the number it waits for, and believes the bytes when their CRC, started from the number, fits:
+a message half written or scribbled over is no message. The heartbeat is a time that the writer
+stores again and again while it lives.
 """
 
 import multiprocessing
@@ -11,7 +12,7 @@ from ctypes import c_char
 from typing import Final
 from zlib import crc32
 
-_HEADER_WORDS: Final = 3
+_HEADER_WORDS: Final = 4
 
 
 class Mailbox:
@@ -49,6 +50,15 @@ class Mailbox:
     def number(self) -> int:
         """Number of the message that is in it, 0 if none ever was."""
         return self._words[0]
+
+    @property
+    def beat_ns(self) -> int:
+        """The writer's latest heartbeat, 0 if there never was one."""
+        return self._words[3]
+
+    def beat(self, now_ns: int) -> None:
+        """Store a heartbeat: a time on a clock that both ends read."""
+        self._words[3] = now_ns
 
     def post(self, number: int, data: bytes) -> None:
         """Put a message in, over the one that was there.

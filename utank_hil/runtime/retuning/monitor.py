@@ -18,6 +18,7 @@ from utank_hil.runtime.retuning.history import SampleHistory
 _MEMORY_S: Final = 300.0
 _LEARNING_S: Final = 600.0
 _LEAST_ROLL_RAD: Final = 0.005  # below it the sensor's noise is what is predicted
+_MOST_ERROR_RAD: Final = 10.0  # no ship rolls so far; keeps every figure finite
 
 
 class ChangeMonitor:
@@ -63,6 +64,8 @@ class ChangeMonitor:
         if history.count < self._order:
             return
         error = roll_rad - self.predict(history, command_pa)
+        if not abs(error) < _MOST_ERROR_RAD:  # a model may foretell anything, or nothing
+            error = _MOST_ERROR_RAD
         self._samples += 1
         # plain means to begin with, then exponentially forgetting ones
         share = max(self._share, 1.0 / self._samples)

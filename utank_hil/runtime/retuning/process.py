@@ -2,7 +2,12 @@
 
 The controller's loop writes one mailbox and looks at one number of the other; that is all that
 connects them. The process may hang, die or write nonsense: the number never comes, or its message
-is refused, and the controller goes on with the law it has.
+is refused, and the controller goes on with the law it has. There are two of them:
+
+    keeper   started before the loop; forks the worker, and forks it anew when it has died or hangs
+    worker   beats its heart between orders, and works them off
+
+Neither needs the loop for that, nor the loop them: it asks for a heartbeat before it begins.
 """
 
 import multiprocessing
@@ -10,20 +15,22 @@ import os
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import Final, Self
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.runtime.retuning.answer import Answer, Refusal, answer_bytes, read_answer
+from utank_hil.runtime.retuning.answer import Answer, Refusal, read_answer
 from utank_hil.runtime.retuning.mailbox import Mailbox
 from utank_hil.runtime.retuning.retuner import Work
+from utank_hil.runtime.retuning.worker import keep
 
 _ANSWER_BYTES: Final = 1 << 20
-_LOOK_S: Final = 0.1
-_NICENESS: Final = 10
+_START_S: Final = 30.0
+_ALIVE_NS: Final = 5_000_000_000  # a nice process on a busy machine may have to wait for its turn
+_HANGS_S: Final = 600.0
 _END_S: Final = 2.0
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -31,30 +38,48 @@ _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class RetunerProcess:
     """A `Retuner` in a process of its own; start it before the loop.
 
+    It is ready when the constructor returns. If it does not come up, the constructor returns too,
+    after half a minute: the loop goes on with the law it has, and refuses to begin.
+
     Parameters
     ----------
     work : callable
         Importable in another process (a function, or a `functools.partial` of one).
     longest_record : tuple of int
         Rows and columns of the longest record.
+    hangs_after_s : float
+        A worker that is busy for longer is killed, and another takes its place.
 
     Attributes
     ----------
     pid : int
-        Of the process.
+        Of the keeper, and of the process group that both are in.
     """
 
-    def __init__(self, work: Work, longest_record: tuple[int, int]) -> None:
+    def __init__(
+        self, work: Work, longest_record: tuple[int, int], hangs_after_s: float = _HANGS_S
+    ) -> None:
         rows, columns = longest_record
         self._orders = Mailbox(8 * (rows * columns + 1))
         self._answers = Mailbox(_ANSWER_BYTES)
         self._process = multiprocessing.get_context("spawn").Process(
-            target=serve, args=(work, self._orders, self._answers, os.getpid()), daemon=True
+            target=keep,
+            args=(work, self._orders, self._answers, os.getpid(), hangs_after_s),
+            daemon=True,
         )
         with _one_thread():
             self._process.start()
         assert self._process.pid is not None
         self.pid: int = self._process.pid
+        self._closed = False
+        deadline_s = time.monotonic() + _START_S
+        while not self.alive and self._process.is_alive() and time.monotonic() < deadline_s:
+            time.sleep(0.01)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the worker's heart beats."""
+        return abs(time.monotonic_ns() - self._answers.beat_ns) < _ALIVE_NS
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:  # noqa: ARG002
         """Hand over a record."""
@@ -71,9 +96,13 @@ class RetunerProcess:
             return Refusal((f"the retuner answered nonsense: {error}",))
 
     def close(self) -> None:
-        """End the process; idempotent."""
-        if self._process.is_alive():
-            self._process.kill()
+        """End both processes; idempotent."""
+        if self._closed:
+            return
+        self._closed = True
+        with suppress(ProcessLookupError):  # the keeper has not made the group yet, or all are gone
+            os.killpg(self.pid, signal.SIGKILL)
+        self._process.kill()
         self._process.join(_END_S)
 
     def __enter__(self) -> Self:
@@ -105,19 +134,3 @@ def _one_thread() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-def serve(work: Work, orders: Mailbox, answers: Mailbox, parent_pid: int) -> None:
-    """Work off orders until the parent is gone; the whole life of the process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the loop; it ends this process
-    os.nice(_NICENESS)
-    done = 0
-    while os.getppid() == parent_pid:
-        number = orders.number
-        data = orders.read(number) if number != done else None
-        if data is None:
-            time.sleep(_LOOK_S)
-            continue
-        values = np.frombuffer(data)
-        answers.post(number, answer_bytes(work(values[1:].reshape(-1, int(values[0])))))
-        done = number

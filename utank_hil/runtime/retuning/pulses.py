@@ -3,7 +3,7 @@
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control import PumpLimits, pump_model
+from utank_hil.control import ARX, PumpLimits, pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -19,7 +19,7 @@ def make_pulses(
     delay_s: float,
     lag_s: float,
 ) -> FloatArray:
-    """Random pulses within pressure and rate, and within roll and level on the given ship.
+    """Pulses of the chosen kind within pressure and rate, and within roll and level on this ship.
 
     Roll and level are those that the pulses alone cause in still water. The level limit of `limits`
     applies to the sum of waves, law and pulses, at every command; this is only its first guard.
@@ -28,20 +28,29 @@ def make_pulses(
     -------
     ndarray, shape (N,)
         Pressure in Pa.
+
+    Raises
+    ------
+    ValueError
+        If the signal does not fit the sample time, such as a band beyond its Nyquist frequency.
     """
-    from utank_hil.identification import random_pulses  # scipy.optimize: not for every start
+    # scipy.optimize: not for every start
+    from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
     within = PumpLimits(
         pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
     )
-    pulses = random_pulses(
-        settings.identification_s, within, settings.seed, settings.pulse_hold_s, sample_time_s
-    )
+    how_long_s, seed = settings.identification_s, settings.seed
+    match settings.excitation.kind:
+        case "random_pulses":
+            pulses = random_pulses(how_long_s, within, seed, settings.pulse_hold_s, sample_time_s)
+        case "prbs":
+            pulses = prbs(how_long_s, within, seed, settings.pulse_hold_s[0], sample_time_s)
+        case "multisine":
+            pulses = multisine(how_long_s, within, seed, settings.excitation.band, sample_time_s)
+        case "chirp":
+            pulses = chirp(how_long_s, within, settings.excitation.band, sample_time_s)
     plant = sample(pump_model(ship, tank, ("roll_rad", "level_m")), sample_time_s, delay_s, lag_s)
-    state = np.zeros(len(plant.A))
-    largest = np.zeros(2)
-    for pressure_pa in pulses:
-        largest = np.maximum(largest, np.abs(plant.C @ state + plant.D[:, 0] * pressure_pa))
-        state = plant.A @ state + plant.B[:, 0] * pressure_pa
-    room = np.array([settings.added_roll_rad, limits.level_m]) / np.maximum(largest, 1e-300)
-    return pulses * min(1.0, float(room.min()))
+    model = ARX.from_state_space(plant, len(plant.A))
+    room = np.array([settings.added_roll_rad, limits.level_m])
+    return pulses * response_scale(pulses, model, room)

@@ -13,6 +13,10 @@ Work = Callable[[FloatArray], Answer]
 class Retuner(Protocol):
     """Takes records and gives answers, some time later or never."""
 
+    @property
+    def alive(self) -> bool:
+        """Whether a record would be worked off; known at once."""
+
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
         """Hand over a record under a number of its own; returns at once."""
 
@@ -28,7 +32,14 @@ class SimulatedRetuner:
     work : callable
     latency_s : float
         Simulated time that the work takes.
+
+    Attributes
+    ----------
+    alive : bool
+        Always.
     """
+
+    alive = True
 
     def __init__(self, work: Work, latency_s: float) -> None:
         self._work = work

@@ -1,13 +1,55 @@
 """What a configuration says about retuning."""
 
-from dataclasses import dataclass
-from typing import Annotated, Final
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal
 
 from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.runtime.supervisor import RollLimit
 
 EARLIEST_VERDICT_S: Final = 30.0
 """A few rolls: what a trial tells before is chance."""
+
+
+_SWEPT: Final = ("multisine", "chirp")
+_BAND_RAD_S: Final = (0.2, 1.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """What the pump gives while the ship is identified: key ``excitation`` of the section.
+
+    Attributes
+    ----------
+    kind : str
+        Of `utank_hil.identification`: ``random_pulses``, or ``prbs`` (full pressure one way or the
+        other, drawn anew after each shortest pulse), ``multisine`` or ``chirp``.
+    band_rad_s : tuple of float or None
+        Frequencies of multisine and chirp; None: 0.2 to 1.2 rad/s.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, or a band is given that is not used.
+    """
+
+    kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
+    band_rad_s: tuple[Positive, Positive] | None = None
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.band_rad_s is not None:
+            low, high = self.band_rad_s
+            if self.kind not in _SWEPT:
+                problems.append(("band_rad_s", f"is for {' and '.join(_SWEPT)}, not {self.kind}"))
+            elif not low < high:
+                problems.append(("band_rad_s", f"must rise, got {low} and {high}"))
+        refuse("excitation", problems)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """The band in use."""
+        return self.band_rad_s or _BAND_RAD_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +69,8 @@ class RetuningSettings:
         Greatest pressure of the pulses.
     pulse_hold_s : tuple of float
         Shortest and longest pulse.
+    excitation : Excitation
+        What kind of signal the pulses are.
     alone : bool
         Give the pulses without the law's pressure instead of adding them to it.
     added_roll_rad : float
@@ -61,6 +105,7 @@ class RetuningSettings:
     identification_s: Positive = 500.0
     pulse_pa: Positive = 30e3
     pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)
+    excitation: Excitation = field(default_factory=Excitation)
     alone: bool = False
     added_roll_rad: Positive = 0.05
     roll_limit_rad: RollLimit = 0.3
@@ -77,4 +122,14 @@ class RetuningSettings:
         low, high = self.roll_period_range_s
         if not low < high:
             problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
+        if self.excitation.kind == "multisine":
+            least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
+            if self.identification_s < least_s:  # at least one harmonic of it in the band
+                problems.append(
+                    (
+                        "identification_s",
+                        f"must be {least_s:.0f} or more for a multisine in the band "
+                        f"{self.excitation.band}, got {self.identification_s:g}",
+                    )
+                )
         refuse("retuning", problems)

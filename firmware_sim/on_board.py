@@ -1,0 +1,140 @@
+"""What the roll of a bench means for people: how often it is great, and how it feels at a place.
+
+Roll is all that the bench knows; sway, heave and pitch add to it on a real ship.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from rich.table import Table
+
+from utank_hil.analysis.comfort import EXPOSURE_S, Comfort, comfort
+from utank_hil.analysis.exceedance import exceedance, rayleigh_exceedance
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.parameters import Finite, range_problems, refuse
+
+if TYPE_CHECKING:
+    from firmware_sim.bench import BenchResult
+
+LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
+"""Single amplitudes of roll whose exceedance is told."""
+_SHOWN_RAD: Final = (LEVELS_RAD[1], LEVELS_RAD[3])
+_NO_TANK: Final = "no tank"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place on board, seen from the ship's centre of gravity.
+
+    Parameters
+    ----------
+    height_m : float
+        Above it.
+    starboard_m : float
+        To starboard of it.
+    """
+
+    height_m: Finite
+    starboard_m: Finite = 0.0
+
+    def __post_init__(self) -> None:
+        refuse("place", range_problems(self))
+
+    @classmethod
+    def over_reservoir(cls, tank: Tank) -> "Place":
+        """The deck over the starboard reservoir, where a scenario names no place."""
+        return cls(tank.height_m + tank.level_limit_m - tank.lz_m, tank.width_m / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class OnBoard:
+    """A run, for people.
+
+    Attributes
+    ----------
+    exceedance : tuple of float, or None
+        Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None where the record
+        holds no half-cycle.
+    rayleigh : tuple of float
+        The same of a narrow-banded Gaussian roll of this standard deviation.
+    comfort : Comfort
+        At the place.
+    """
+
+    exceedance: tuple[float, ...] | None
+    rayleigh: tuple[float, ...]
+    comfort: Comfort
+
+
+def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
+    """Judge a roll record, shape (n,), n of three or more."""
+    levels = np.array(LEVELS_RAD)
+    try:
+        above: tuple[float, ...] | None = tuple(exceedance(roll_rad, levels).tolist())
+    except ValueError:
+        above = None
+    deviation = float(roll_rad.std())
+    rayleigh = rayleigh_exceedance(deviation, levels) if deviation > 0 else 0 * levels
+    return OnBoard(
+        above,
+        tuple(rayleigh.tolist()),
+        comfort(roll_rad, np.gradient(roll_rad, step_s), step_s, place.height_m, place.starboard_m),
+    )
+
+
+def judged_runs(result: "BenchResult") -> dict[str, OnBoard]:
+    """The bare ship and the runs that can be compared with her, over the bench's window."""
+    from firmware_sim.run import RECORD_S
+
+    place = result.scenario.place_on_board
+    rolls = {_NO_TANK: result.without_tank_rad[round(result.settle_s / RECORD_S) :]}
+    for run in result.runs:
+        if result.compares(run):
+            window = run.between(result.settle_s, result.end_s)
+            rolls[run.name] = run.column("true_roll_rad")[window]
+    return {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}
+
+
+def on_board_json(result: "BenchResult") -> dict[str, Any]:
+    """The figures in SI units, ready for `json.dumps`."""
+    return {
+        "place": asdict(result.scenario.place_on_board),
+        "exposure_s": EXPOSURE_S,
+        "levels_rad": list(LEVELS_RAD),
+        "runs": {name: asdict(each) for name, each in judged_runs(result).items()},
+    }
+
+
+def on_board_table(result: "BenchResult") -> Table:
+    """Table of what the roll is like for people at the scenario's place."""
+    place = result.scenario.place_on_board
+    table = Table(title="On board")
+    table.add_column("", no_wrap=True)
+    for heading in (
+        *(f"above\n{math.degrees(level):g}°" for level in _SHOWN_RAD),
+        "lateral\nRMS g",
+        "MII\n/min",
+        "MSI\n2 h",
+        "work\nallowed",
+    ):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.caption = (
+        "shares of the roll's amplitudes; interruptions of who stands, motion sickness,\n"
+        f"NORDFORSK 1987, at {place.height_m:.1f} m above and {place.starboard_m:.1f} m to "
+        "starboard of\nthe centre of gravity, by roll alone"
+    )
+    for name, each in judged_runs(result).items():
+        felt, above = each.comfort, each.exceedance
+        shares = dict(zip(LEVELS_RAD, above, strict=True)) if above is not None else {}
+        table.add_row(
+            name,
+            *(f"{shares[level]:.1%}" if shares else "" for level in _SHOWN_RAD),
+            f"{felt.lateral_rms_m_s2 / GRAVITY_M_S2:.3f}",
+            f"{felt.interruptions_per_min:.2f}",
+            f"{felt.sickness_percent:.1f}%",
+            felt.allowed_work[-1] if felt.allowed_work else "none",
+        )
+    return table

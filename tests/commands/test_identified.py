@@ -1,0 +1,78 @@
+"""Configurations of ships that were found: they load, say what was found, and stay."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from utank_hil.commands.identified import IdentifiedShips, read_controller
+from utank_hil.config import ControllerConfig
+from utank_hil.config_files import load_config
+from utank_hil.config_laws import build_law
+from utank_hil.control import PredictiveDesign
+from utank_hil.runtime.retuning import ModelSummary
+
+CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
+FOUND = ModelSummary(9.0, 0.01, 1.8e9, 8.8e8, 5e7, 0.12, 0.99, 1.4, 0.3)
+
+
+def ships(folder: Path) -> IdentifiedShips:
+    return IdentifiedShips(
+        folder, load_config(CONFIG, ControllerConfig).vessel, read_controller(CONFIG)
+    )
+
+
+def test_configuration_loads_with_the_ship_that_was_found_and_all_else_as_it_was(
+    tmp_path: Path,
+) -> None:
+    files = ships(tmp_path / "new" / "folder").write(FOUND)
+    given = load_config(CONFIG, ControllerConfig)
+    found = load_config(files["config"], ControllerConfig)
+    ship, tank = found.vessel.ship, found.vessel.tank
+    assert (ship.inertia_kg_m2, ship.stiffness_nm_rad, ship.damping_nms_rad) == (1.8e9, 8.8e8, 5e7)
+    assert tank.damping_ratio == 0.12
+    assert tank.width_m == given.vessel.tank.width_m
+    assert found.vessel.pump == given.vessel.pump
+    assert found.vessel.version != given.vessel.version
+    same = {"vessel": given.vessel}
+    assert found.model_copy(update=same) == given
+
+
+def test_ship_found_later_is_written_beside_the_earlier(tmp_path: Path) -> None:
+    keep = ships(tmp_path)
+    pairs = [keep.write(FOUND) for _ in range(5)]
+    assert len(list(tmp_path.iterdir())) == 10
+    for pair in pairs:
+        named = yaml.safe_load(pair["config"].read_text())["vessel"]
+        assert named == pair["vessel"].name
+
+
+@pytest.mark.parametrize("name", ["limits.yaml", "./limits.yaml", "../{}/limits.yaml"])
+def test_files_that_the_configuration_names_are_still_found(tmp_path: Path, name: str) -> None:
+    there = tmp_path / "there"
+    there.mkdir()
+    content = read_controller(CONFIG) | {"limits": name.format("there")}
+    (there / "limits.yaml").write_text("pressure_pa: 40000.0\n")
+    config = there / "controller.yaml"
+    config.write_text(yaml.safe_dump(content))
+    keep = IdentifiedShips(
+        tmp_path / "out", load_config(config, ControllerConfig).vessel, read_controller(config)
+    )
+    files = keep.write(FOUND)
+    assert load_config(files["config"], ControllerConfig).limits.pressure_pa == 40e3
+
+
+def test_next_start_has_the_law_that_was_retuned(tmp_path: Path) -> None:
+    given = load_config(CONFIG, ControllerConfig)
+    files = ships(tmp_path).write(FOUND)
+    started = load_config(files["config"], ControllerConfig)
+    assert isinstance(given.law, PredictiveDesign)
+    ship, tank = started.vessel.ship, started.vessel.tank
+    retuned = given.law.law(ship, tank, given.delay_s, given.vessel.pump.lag_s)  # as `retune` does
+    again = build_law(started.law, started.vessel, started.delay_s, started.limits).linear
+    assert again is not None
+    for part in "ABCD":
+        np.testing.assert_array_equal(
+            getattr(retuned.matrices(), part), getattr(again.matrices(), part)
+        )

@@ -1,0 +1,137 @@
+"""Tells what retuning does while the loop goes on: a process of its own, as the loop has no time.
+
+The loop writes an event into shared memory; this process prints it, and keeps the ship that was
+found in files. It reads what is left when the loop was killed, too.
+"""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Final
+
+from rich.markup import escape
+
+from utank_hil.canbus import RetuningState
+from utank_hil.commands.common import notes, shown
+from utank_hil.commands.identified import IdentifiedShips
+from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.telemetry import EventReader, EventWriter, event_text
+
+LOOK_S: Final = 0.5
+_NICENESS: Final = 5
+_START_S: Final = 30.0
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+_END_S: Final = 10.0
+
+
+class Announcer:
+    """Event ring of a run, and the process that tells what comes through it, ready at once.
+
+    Parameters
+    ----------
+    ships : IdentifiedShips, optional
+        Where a ship that a law was retuned for is kept.
+
+    Attributes
+    ----------
+    ring : str or None
+        Name of the ring, for a recorder; None if there was no room for it.
+    error : str or None
+        Why events are not told; the controller runs all the same.
+    """
+
+    def __init__(self, ships: IdentifiedShips | None = None) -> None:
+        self.ring: str | None = None
+        self.error: str | None = None
+        self._writer: EventWriter | None = None
+        self._process: SpawnProcess | None = None
+        context = multiprocessing.get_context("spawn")
+        try:
+            self._writer = EventWriter()
+            self.ring = self._writer.name
+            heard, says = context.Pipe(duplex=False)
+            process = context.Process(target=announce, args=(self.ring, ships, says))
+            with _signals_waiting():
+                process.start()
+        except OSError as error:
+            self.error = str(error)
+            self.stop()
+            return
+        self._process = process
+        says.close()  # the process has its own, so that its death is heard, too
+        with heard:
+            if not heard.poll(_START_S):
+                process.kill()
+
+    def write(self, event: RetuningEvent, start_ns: int) -> None:
+        """Take one event; never waits."""
+        if self._writer is not None:
+            self._writer.write(event, start_ns)
+
+    def stop(self) -> None:
+        """Have the last events told, and find out whether all went well; idempotent."""
+        writer, self._writer = self._writer, None
+        if writer is None:
+            return
+        writer.close()
+        if self._process is None:
+            return
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+            self.error = "the process that tells events did not end and was killed"
+        elif self._process.exitcode != 0:
+            self.error = f"the process that tells events ended with code {self._process.exitcode}"
+
+
+def announce(ring: str, ships: IdentifiedShips | None, ready: Connection) -> None:
+    """Tell events until their writer ends or dies; the whole life of the process."""
+    with EventReader(ring) as reader:
+        ready.close()
+        # what ends it is the end of the ring, not Ctrl-C, a closed terminal or a stopped service
+        os.setsid()
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        os.nice(_NICENESS)
+        while True:
+            last = reader.ended
+            for event in reader.read():
+                _tell(event, ships)
+            if last:
+                break
+            time.sleep(LOOK_S)
+        if reader.lost:
+            _print(f"[red]{reader.lost} events of retuning were lost[/red]")
+
+
+@contextlib.contextmanager
+def _signals_waiting() -> Iterator[None]:
+    """Have a process start with these signals held back: they must not end it as it imports."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
+    _print(f"{event.time_ns * 1e-9:8.1f} s {escape(event_text(event))}")
+    if ships is None or event.found is None or event.state is not RetuningState.RETUNED:
+        return
+    try:
+        files = ships.write(event.found)
+    except OSError as error:
+        _print(f"[red]the ship that was found could not be written:[/red] {escape(str(error))}")
+    else:
+        _print(escape(f"the ship that was found: {', '.join(map(shown, files.values()))}"))
+
+
+def _print(text: str) -> None:
+    with contextlib.suppress(OSError):  # a terminal that is gone is no reason to keep no files
+        notes.print(text, soft_wrap=True)

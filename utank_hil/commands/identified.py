@@ -1,0 +1,130 @@
+"""The configuration for a ship that was identified: her vessel, and a controller that names it."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from utank_hil.commands.stamps import unused_stamp
+from utank_hil.config import Vessel
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.runtime.retuning import ModelSummary
+
+VESSEL: Final = "identified_vessel.yaml"
+CONTROLLER: Final = "identified_controller.yaml"
+
+
+def read_controller(config: Path) -> dict[str, Any]:
+    """Content of a controller's file, the files it names given by their whole path."""
+    content: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8"))
+    whole: dict[str, Any] = _with_whole_paths(content, config.resolve().parent)
+    return whole
+
+
+def write_identified(
+    folder: Path, vessel: Vessel, ship: RollShip, tank: Tank, content: dict[str, Any]
+) -> dict[str, Path]:
+    """Write vessel and controller for a ship that was found.
+
+    Parameters
+    ----------
+    folder : Path
+    vessel : Vessel
+        As configured.
+    ship, tank : RollShip, Tank
+        As found.
+    content : dict
+        Of the controller's file, from `read_controller`.
+
+    Returns
+    -------
+    dict
+        Paths of both: "vessel" and "config".
+    """
+    return _write(folder / VESSEL, folder / CONTROLLER, vessel, ship, tank, content)
+
+
+@dataclasses.dataclass(frozen=True)
+class IdentifiedShips:
+    """Where the ships go that retuning found while running: each into files of its own.
+
+    Attributes
+    ----------
+    folder : Path
+        Made if it is not there.
+    vessel : Vessel
+        As configured.
+    content : dict
+        Of the controller's file, from `read_controller`.
+    """
+
+    folder: Path
+    vessel: Vessel
+    content: dict[str, Any]
+
+    def write(self, found: ModelSummary) -> dict[str, Path]:
+        """Write vessel and controller, named by the time (UTC).
+
+        Returns
+        -------
+        dict
+            Paths of both: "vessel" and "config".
+
+        Raises
+        ------
+        OSError
+            If they can't be written.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
+        stamp = unused_stamp(self.folder, *names)
+        vessel_file, controller_file = (self.folder / name.format(stamp) for name in names)
+        ship = dataclasses.replace(
+            self.vessel.ship,
+            inertia_kg_m2=found.inertia_kg_m2,
+            stiffness_nm_rad=found.stiffness_nm_rad,
+            damping_nms_rad=found.damping_nms_rad,
+        )
+        tank = dataclasses.replace(self.vessel.tank, damping_ratio=found.tank_damping_ratio)
+        return _write(vessel_file, controller_file, self.vessel, ship, tank, self.content)
+
+
+def _write(
+    vessel_file: Path,
+    controller_file: Path,
+    vessel: Vessel,
+    ship: RollShip,
+    tank: Tank,
+    content: dict[str, Any],
+) -> dict[str, Path]:
+    found = vessel.model_copy(update={"ship": ship, "tank": tank})
+    vessel_file.write_text(yaml.safe_dump(_vessel_content(found), sort_keys=False))
+    controller = content | {"vessel": vessel_file.name}
+    controller_file.write_text(yaml.safe_dump(controller, sort_keys=False))
+    return {"vessel": vessel_file, "config": controller_file}
+
+
+def _vessel_content(vessel: Vessel) -> dict[str, Any]:
+    """What a vessel's file holds; values at their defaults are left out."""
+    content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
+    for key in ("ship", "tank", "pump"):
+        part = getattr(vessel, key)
+        content[key] = {
+            field.name: getattr(part, field.name)
+            for field in dataclasses.fields(part)
+            if getattr(part, field.name) != field.default
+        }
+    return content
+
+
+def _with_whole_paths(value: Any, folder: Path) -> Any:
+    """Content of a file in `folder` as it can stand in another: see `utank_hil.config_files`."""
+    if isinstance(value, dict):
+        return {key: _with_whole_paths(item, folder) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_with_whole_paths(item, folder) for item in value]
+    if isinstance(value, str) and (value.endswith(".yaml") or value.startswith(("./", "../"))):
+        return str(folder / value)
+    return value

@@ -1,0 +1,216 @@
+"""What ``utank-hil identify`` tells: tables for people, figures for scripts."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from utank_hil.analysis.retune import Identification, RetuningTask
+from utank_hil.arrays import FloatArray
+from utank_hil.commands.common import shown
+from utank_hil.commands.tables import print_table
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.identification import IdentificationError, ModeConfidence, mode_confidence
+from utank_hil.runtime.retuning import Answer, Candidate
+
+STATES: Final = 4
+QUANTILE: Final = 1.96
+"""Standard deviations to either side of a 95 % interval."""
+
+
+def realized_modes(found: Identification) -> ModeConfidence | None:
+    """Modes of the model without physics; None where it has none with deviations."""
+    try:
+        return mode_confidence(found.okid, STATES)
+    except (IdentificationError, ValueError):
+        return None
+
+
+def figures(found: Identification, answer: Answer, files: Mapping[str, Path]) -> dict[str, Any]:
+    """All that was found, for ``--json``; deviations are standard ones, as parts of the values."""
+    fit, validation = found.fit, found.validation
+    modes = realized_modes(found)
+    return {
+        "accepted": isinstance(answer, Candidate),
+        "reasons": [] if isinstance(answer, Candidate) else list(answer.reasons),
+        "wave_frequencies_rad_s": list(found.wave_frequencies_rad_s),
+        "roll_period_s": 2 * math.pi / fit.ship.natural_frequency_rad_s,
+        "roll_period_deviation": fit.period_deviation,
+        "inertia_kg_m2": fit.ship.inertia_kg_m2,
+        "stiffness_nm_rad": fit.ship.stiffness_nm_rad,
+        "damping_nms_rad": fit.ship.damping_nms_rad,
+        "tank_damping_ratio": fit.tank.damping_ratio,
+        "deviations": fit.deviation.tolist(),
+        "later_s": fit.later_s.tolist(),
+        "pressure_over_command": fit.pressure,
+        "dispersion": fit.dispersion,
+        "held_out_fit": _finite(validation.one_step_fit),
+        "simulation_fit": _finite(validation.simulation_fit),
+        "error_correlation": abs(validation.residual_correlation).max(axis=0).tolist(),
+        "whiteness_probability": validation.whiteness_probability.tolist(),
+        "input_correlation": abs(validation.input_correlation).max(axis=(0, 2)).tolist(),
+        "independence_probability": validation.independence_probability.ravel().tolist(),
+        "modes": [] if modes is None else _mode_figures(modes),
+        "law": dataclasses.asdict(answer.summary) if isinstance(answer, Candidate) else None,
+        "files": {name: str(path) for name, path in files.items()},
+    }
+
+
+def _mode_figures(found: ModeConfidence) -> list[dict[str, float]]:
+    columns = {
+        "frequency_rad_s": found.modes.frequency_rad_s,
+        "frequency_std_rad_s": found.frequency_std_rad_s,
+        "damping_ratio": found.modes.damping_ratio,
+        "damping_ratio_std": found.damping_ratio_std,
+    }
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _finite(values: FloatArray) -> list[float | None]:
+    """JSON has no infinity."""
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
+def print_report(
+    console: Console,
+    found: Identification,
+    task: RetuningTask,
+    answer: Answer,
+    files: Mapping[str, Path],
+) -> None:
+    """Print what an engineer asks: which ship, how sure, does it hold, and is it accepted."""
+    print_table(console, _ship_table(found, task))
+    print_table(console, _mode_table(found, task))
+    print_table(console, _check_table(found, task))
+    console.print(_waves(found), soft_wrap=True)
+    if isinstance(answer, Candidate):
+        console.print(
+            f"[green]Accepted:[/green] peak sensitivity {answer.summary.peak_sensitivity:.2f}; in "
+            f"the recorded waves {answer.summary.roll_below_passive:.0%} less roll than passive.",
+            soft_wrap=True,
+        )
+    else:
+        for reason in answer.reasons:
+            console.print(f"[red]refused:[/red] {reason}", soft_wrap=True)
+    for name, path in files.items():
+        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+
+
+def _waves(found: Identification) -> str:
+    waves = found.wave_frequencies_rad_s
+    if not waves:
+        return "Waves: no regular one found; an irregular sea is in the model of the errors."
+    named = (f"{w:.4f} rad/s ({2 * math.pi / w:.2f} s)" for w in waves)
+    return f"Waves: regular, {', '.join(named)}, taken out."
+
+
+def _ship_table(found: Identification, task: RetuningTask) -> Table:
+    fit = found.fit
+    table = _table("Ship and tank", ("", "configured", "identified", "change", "± 95 %"))
+    inertia, stiffness, damping, tank = fit.deviation.tolist()
+    rows = (
+        ("roll period, s", 2 * math.pi / task.ship.natural_frequency_rad_s,
+         2 * math.pi / fit.ship.natural_frequency_rad_s, fit.period_deviation),
+        ("inertia, t m²", task.ship.inertia_kg_m2 / 1e3, fit.ship.inertia_kg_m2 / 1e3, inertia),
+        ("stiffness, MN m/rad", task.ship.stiffness_nm_rad / 1e6,
+         fit.ship.stiffness_nm_rad / 1e6, stiffness),
+        ("damping, MN m s/rad", task.ship.damping_nms_rad / 1e6, fit.ship.damping_nms_rad / 1e6,
+         damping),
+        ("tank damping ratio", task.tank.damping_ratio, fit.tank.damping_ratio, tank),
+    )  # fmt: skip
+    for name, configured, identified, deviation in rows:
+        table.add_row(
+            name,
+            f"{configured:.4g}",
+            f"{identified:.4g}",
+            f"{identified / configured - 1:+.1%}" if configured else "",
+            f"{QUANTILE * deviation:.2%}",
+        )
+    later = ", ".join(
+        f"{name} {1e3 * late_s:+.0f} ms"
+        for name, late_s in zip(task.design.predictor.measured, fit.later_s.tolist(), strict=True)
+    )
+    table.caption = (
+        f"later than configured: {later}; pressure {fit.pressure - 1:+.1%} of the command; misfit "
+        f"{fit.dispersion:.1f} times its uncertainty (limit {task.limits.dispersion:g})"
+    )
+    return table
+
+
+def _mode_table(found: Identification, task: RetuningTask) -> Table:
+    """Modes of ship and tank together, with physics and without."""
+    table = _table(
+        "Modes of ship and tank together",
+        ("", "configured", "identified", "without\nphysics", "± 95 %"),
+    )
+    configured = _modes(task.ship, task.tank)
+    fitted = _modes(found.fit.ship, found.fit.tank)
+    realized = realized_modes(found)
+    for number, ((w0, z0), (w1, z1)) in enumerate(zip(configured, fitted, strict=True), start=1):
+        free = [("", ""), ("", "")]
+        if realized is not None:
+            modes = realized.modes
+            swinging = np.where(modes.damping_ratio < 1, modes.frequency_rad_s, np.inf)
+            k = int(np.argmin(abs(swinging - w1)))
+            free = [
+                (f"{value:.4f}", f"{QUANTILE * deviation:.4f}")
+                for value, deviation in (
+                    (float(modes.frequency_rad_s[k]), float(realized.frequency_std_rad_s[k])),
+                    (float(modes.damping_ratio[k]), float(realized.damping_ratio_std[k])),
+                )
+            ]
+        table.add_row(f"{number}: frequency, rad/s", f"{w0:.4f}", f"{w1:.4f}", *free[0])
+        table.add_row("   damping ratio", f"{z0:.4f}", f"{z1:.4f}", *free[1])
+    table.caption = "without physics: nearest mode of OKID and ERA, ± if the errors are white"
+    return table
+
+
+def _modes(ship: RollShip, tank: Tank) -> list[tuple[float, float]]:
+    """Undamped frequency and damping ratio of the two modes, by rising frequency."""
+    poles = np.linalg.eigvals(state_matrices(ship, tank)[0])
+    frequency = abs(poles)
+    order = np.argsort(frequency)[::2]  # of each pair one
+    return [(float(frequency[k]), float(-poles[k].real / frequency[k])) for k in order]
+
+
+def _check_table(found: Identification, task: RetuningTask) -> Table:
+    validation, limits = found.validation, task.limits
+    table = _table(
+        "On held-out data",
+        ("", "one-step\nfit", "simulation\nfit", "errors\ncorrelated", "if\nwhite",
+         "with the\ninput", "if\napart"),
+    )  # fmt: skip
+    for column, name in enumerate(task.design.predictor.measured):
+        table.add_row(
+            name,
+            f"{validation.one_step_fit[column]:.3f}",
+            f"{validation.simulation_fit[column]:.3f}",
+            f"{abs(validation.residual_correlation[:, column]).max():.2f}",
+            _probability(float(validation.whiteness_probability[column])),
+            f"{abs(validation.input_correlation[:, column]).max():.2f}",
+            _probability(float(validation.independence_probability[column].min())),
+        )
+    table.caption = (
+        f"{validation.rows} predictions; fit {limits.fit:g} or more and correlation "
+        f"{limits.correlation:g} or less are asked for; 'if' is the probability of more by chance"
+    )
+    return table
+
+
+def _probability(value: float) -> str:
+    return "< 0.001" if value < 1e-3 else f"{value:.3f}"
+
+
+def _table(title: str, headings: tuple[str, ...]) -> Table:
+    table = Table(title=title)
+    for heading in headings:
+        table.add_column(heading, justify="right" if heading else "left")
+    return table

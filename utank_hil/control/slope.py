@@ -1,0 +1,41 @@
+"""A nonlinear law as its loop sees it at rest: the slope of its answer.
+
+A law that is unstable for the smallest roll is unstable; so its slope about rest must have the
+margins of a linear law. A law that adapts is taken with the parameters it starts from.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from utank_hil.control.gain import GainLaw
+from utank_hil.control.interface import Controller
+
+STEP: Final = 1e-6
+"""To either side, in the unit of each input: far below what a sensor tells from noise."""
+
+
+def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
+    """Slope of the answer of a law at rest, as a law of constant gain.
+
+    Parameters
+    ----------
+    controller : callable
+        Makes a controller at rest, whose first answer is from its first measurement alone.
+    inputs : int
+        Measurements of the law.
+
+    Raises
+    ------
+    ValueError
+        If the slope is not finite.
+    """
+    columns = []
+    for push in STEP * np.eye(inputs):
+        up, down = (controller().step(sign * push) for sign in (1.0, -1.0))
+        columns.append((up - down) / (2 * STEP))
+    slope = np.column_stack(columns)
+    if not np.isfinite(slope).all():
+        raise ValueError("its answer at rest is beyond all scale")
+    return GainLaw(-slope, controller().sample_time_s)

@@ -1,0 +1,38 @@
+"""Transfer matrices of linear models at many points, in little memory whatever their order."""
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray
+from utank_hil.dynamics.sampling import LinearModel
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+_AT_ONCE: Final = 1_000_000  # elements of the resolvents that are held at a time: 16 MB
+
+
+def state_space_response(system: "StateSpace | LinearModel", points: ComplexArray) -> ComplexArray:
+    """Transfer matrix C (p I - A)^-1 B + D of a model at complex points s (or z).
+
+    Parameters
+    ----------
+    system : control.StateSpace or LinearModel
+        n states.
+    points : ndarray, shape (N,)
+
+    Returns
+    -------
+    ndarray, shape (N, outputs, inputs)
+    """
+    a, b, c, d = system.A, system.B, system.C, system.D
+    points = np.asarray(points, dtype=np.complex128)
+    unit, reach = np.eye(len(a)), b.astype(np.complex128)
+    response = np.empty((len(points), *d.shape), dtype=np.complex128)
+    some = max(1, _AT_ONCE // max(1, a.size))
+    for first in range(0, len(points), some):
+        part = slice(first, first + some)
+        resolvent = points[part, None, None] * unit - a
+        response[part] = c @ np.linalg.solve(resolvent, reach) + d
+    return response

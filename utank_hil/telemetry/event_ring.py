@@ -1,0 +1,151 @@
+"""Retuning events out of the loop: a telemetry ring whose rows hold text instead of numbers.
+
+Like rows, events are written in microseconds into shared memory, wait for nobody, can be read by
+several processes, and are there to be read after the writer was killed.
+"""
+
+import json
+from dataclasses import asdict
+from types import TracebackType
+from typing import Final, Self
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import RetuningState
+from utank_hil.runtime.retuning.adaptive import RetuningEvent
+from utank_hil.runtime.retuning.answer import ModelSummary
+from utank_hil.telemetry.ring import RingReader, RingWriter
+
+_TEXT_WORDS: Final = 1024
+_WORDS: Final = ("length", *(f"text_{number}" for number in range(_TEXT_WORDS)))
+_CAPACITY: Final = 64  # a retuning has four events in as many minutes; readers look every 0.5 s
+_LONGEST_BYTES: Final = 8 * _TEXT_WORDS
+_MOST_BYTES_A_CHARACTER: Final = 6  # of JSON, for what must be escaped
+
+
+class EventWriter:
+    """The writing end, for the loop; creates the ring and owns it.
+
+    Attributes
+    ----------
+    name : str
+        Under which readers find it.
+
+    Raises
+    ------
+    RingError
+        If there is no room for it.
+    """
+
+    def __init__(self) -> None:
+        self._ring = RingWriter(_WORDS, capacity=_CAPACITY)
+        self.name = self._ring.name
+        self._row = np.zeros(len(_WORDS))
+        self._text = self._row[1:].view(np.uint8)
+
+    def write(self, event: RetuningEvent, start_ns: int) -> None:
+        """Append one event; never waits. Reasons too long for the ring are cut.
+
+        Parameters
+        ----------
+        event : RetuningEvent
+        start_ns : int
+            From which readers count the event's time: that of the first telemetry row.
+        """
+        data = _encoded(event, event.reasons, start_ns)
+        if len(data) > _LONGEST_BYTES:
+            length = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
+            data = _encoded(event, ("; ".join(event.reasons)[:length] + " ...",), start_ns)
+        self._row[0] = len(data)
+        self._text[: len(data)] = np.frombuffer(data, dtype=np.uint8)
+        self._ring.write(self._row)
+
+    def close(self) -> None:
+        """Tell readers that no more events will come; idempotent."""
+        self._ring.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class EventReader:
+    """A reading end with its own cursor, which starts at the oldest event still there.
+
+    Parameters
+    ----------
+    name : str
+        The writer's `name`.
+
+    Raises
+    ------
+    RingError
+        If there is no such ring.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._ring = RingReader(name)
+
+    def read(self) -> list[RetuningEvent]:
+        """Events since the last call, oldest first, at times since the start; never waits."""
+        return [_decoded(row) for row in self._ring.read()]
+
+    @property
+    def ended(self) -> bool:
+        """Whether no more events will be written; ask before reading."""
+        return self._ring.ended
+
+    @property
+    def lost(self) -> int:
+        """Events overwritten before this reader got to them."""
+        return self._ring.lost
+
+    def close(self) -> None:
+        """Release the memory; idempotent."""
+        self._ring.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def event_text(event: RetuningEvent) -> str:
+    """What people read of an event, such as `retuning REFUSED: the record is too short`."""
+    said = f"retuning {event.state.name}"
+    return f"{said}: {'; '.join(event.reasons)}" if event.reasons else said
+
+
+def _encoded(event: RetuningEvent, reasons: tuple[str, ...], start_ns: int) -> bytes:
+    content = {
+        "time_ns": event.time_ns - start_ns,
+        "state": int(event.state),
+        "reasons": reasons,
+        "found": None if event.found is None else asdict(event.found),
+    }
+    return json.dumps(content, ensure_ascii=False).encode(errors="replace")
+
+
+def _decoded(row: FloatArray) -> RetuningEvent:
+    content = json.loads(row[1:].tobytes()[: int(row[0])])
+    found = content["found"]
+    return RetuningEvent(
+        content["time_ns"],
+        RetuningState(content["state"]),
+        tuple(content["reasons"]),
+        None if found is None else ModelSummary(**found),
+    )
