@@ -154,6 +154,21 @@ def test_thousand_limited_steps_equal_an_independent_optimum():
     assert worst < 1e-5
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e12])
+def test_cost_in_another_unit_makes_the_same_law(size):
+    arx, limits = random_arx(np.random.default_rng(11), 3), PumpLimits(1.0, 2.0, 0.5)
+    rng = np.random.default_rng(3)
+    measured = 3 * rng.normal(size=(40, 2))
+
+    def commands(size):
+        controller = design_constrained_gpc(
+            arx, limits, 12, 15, (5.0 * size, size), size, level_output=1
+        ).controller()
+        return [float(controller.step(y)[0]) for y in measured]
+
+    np.testing.assert_allclose(commands(size), commands(2.0), atol=1e-5)
+
+
 def saturating(iteration_limit=100) -> ConstrainedController:
     arx = random_arx(np.random.default_rng(11), 3)
     limits = PumpLimits(pressure_pa=1.0, rate_pa_s=2.0, level_m=0.5)

@@ -20,7 +20,7 @@ def design_constrained_gpc(
     first_output: int = 0,
     *,
     level_output: int | None = None,
-    level_penalty: float = 1e14,
+    level_penalty: float | None = None,
     reservoir_area_m2: float | None = None,
     iteration_limit: int = 100,
 ) -> ConstrainedLaw:
@@ -36,8 +36,9 @@ def design_constrained_gpc(
         As in `design_gpc`; one weight for each output.
     level_output : int, optional
         Which output is the level in m; its limit is left out if not given.
-    level_penalty : float
-        Cost of a metre above the limit, positive.
+    level_penalty : float, optional
+        Cost of a metre above the limit, positive; that of a unit of the output with the greatest
+        weight if not given. One much greater than what the plan weighs hides it behind rounding.
     reservoir_area_m2 : float, optional
         At, for a limit on the power: At times pressure and rate of the level.
     iteration_limit : int
@@ -66,6 +67,8 @@ def design_constrained_gpc(
             f"a power limit, {limits.power_w:g} W, needs the reservoir_area_m2: give it, or set "
             "power_w to infinity"
         )
+    if level_penalty is None:
+        level_penalty = max(output_weight) or input_weight
     model = arx.matrices()
     # the deadbeat gain that makes this model's predictor the ARX predictor
     observer_gain = arx.alpha.reshape(len(model.A), arx.outputs)
