@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import Scenario
-from utank_hil.analysis.metrics import roll_statistics
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
@@ -46,7 +45,8 @@ class RetuningFigures:
     retuned_at_s : float or None
         When the last new law took charge, on trial at first; None if none did.
     roll_before_rad : float or None
-        Root mean square before the first identification; None if there is no such time.
+        Root mean square about the heel, before the first identification; None if there is no such
+        time.
     roll_after_rad : float or None
         From `SETTLING_S` after the last new law took charge for as long as it stayed there and
         nothing was identified; None if there is no such time.
@@ -77,15 +77,7 @@ class RetuningFigures:
 
     def as_json(self) -> dict[str, Any]:
         """All of it, ready for `json.dumps`."""
-        events = [
-            {
-                "time_s": event.time_ns * 1e-9,
-                "state": event.state.name,
-                "reasons": list(event.reasons),
-                "found": None if event.found is None else asdict(event.found),
-            }
-            for event in self.events
-        ]
+        events = [event.as_json() for event in self.events]
         return asdict(replace(self, events=())) | {"events": events}
 
 
@@ -172,4 +164,4 @@ def _truth(scenario: Scenario, time_s: float) -> ShipInFigures:
 
 def _rms(run: Run, start_s: float, end_s: float) -> float | None:
     roll_rad = run.column("true_roll_rad")[run.between(start_s, end_s)]
-    return roll_statistics(roll_rad).rms_rad if len(roll_rad) else None
+    return float(roll_rad.std()) if len(roll_rad) else None

@@ -167,11 +167,10 @@ class Scenario(Section):
             return [(f"actual_ship.{name}", reason) for name, reason in error.problems]
         if unstable:
             return [("actual_ship", f"with it, the tank {reason}") for _, reason in unstable]
-        return [
-            (key, reason)
-            for key, ship in (("vessel", self.vessel.ship), ("actual_ship", self.sailing_ship))
-            for reason in self._heel_problems(ship)
-        ]
+        ships = {"vessel": self.vessel.ship}
+        if self.actual_ship:
+            ships["actual_ship"] = self.sailing_ship
+        return [(key, why) for key, ship in ships.items() for why in self._heel_problems(ship)]
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
         """Why a ship can't be heeled as she is: the water would be at the tank's roof."""

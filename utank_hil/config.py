@@ -6,6 +6,7 @@ is the parameter of the same name.
 
 import hashlib
 import json
+import math
 import warnings
 from dataclasses import asdict
 from typing import Annotated, Any, Final
@@ -16,7 +17,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from utank_hil.config_files import Section
 from utank_hil.config_laws import Law, build_law, sample_time
 from utank_hil.control import PredictiveDesign, PumpLimits
-from utank_hil.control.ship_design import MOST_ORDER
+from utank_hil.control.ship_design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
@@ -182,6 +183,14 @@ class ControllerConfig(Section):
         if settings.identification_s > MOST_PULSES_S:
             reason = f"must be {MOST_PULSES_S:g} at most, got {settings.identification_s:g}"
             problems.append(("identification_s", reason))
+        longest_roll_s = settings.roll_period_range_s[1]
+        most_rad_s = WASHOUT_SHARE * 2 * math.pi / longest_roll_s
+        if law.washout_rad_s > most_rad_s:
+            reason = (
+                f"must leave {most_rad_s:.4g} or more for the law's washout_rad_s, "
+                f"{law.washout_rad_s:g}: lower one of the two"
+            )
+            problems.append(("roll_period_range_s", reason))
         problems += record_problems(
             settings.order,
             round(settings.identification_s / period_s),

@@ -114,7 +114,9 @@ class StimulationLaw(Section):
     ramp_s: Positive
     roll_limit_rad: Positive
     correction_s: Positive = 120.0
-    duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
+    duration_s: Annotated[float, Field(allow_inf_nan=True), Range(above=0, infinite=True)] = (
+        math.inf
+    )
 
 
 Law = Annotated[

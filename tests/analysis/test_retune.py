@@ -158,6 +158,15 @@ def test_numbers_that_are_no_ships_end_in_a_refusal(
     assert all(len(reason.split()) > 4 for reason in answer.reasons)
 
 
+def test_ship_that_the_design_does_not_suit_is_refused() -> None:
+    task = task_of(2, 40)
+    # right for the configured ship, and more than a quarter of a slower one's roll frequency
+    task = replace(task, design=replace(task.design, washout_rad_s=0.12))
+    answer = retune(record_of(2, 14.0), task)
+    assert isinstance(answer, Refusal)
+    assert "washout_rad_s" in "; ".join(answer.reasons)
+
+
 def test_record_of_other_signals_is_an_error_of_the_caller() -> None:
     with pytest.raises(ValueError, match="columns"):
         retune(record_of(1), task_of(2, 40))

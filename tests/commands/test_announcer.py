@@ -1,5 +1,6 @@
 """What retuning does is told while it happens, by a process that outlives the loop's."""
 
+import os
 import subprocess
 import sys
 import time
@@ -15,7 +16,7 @@ from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.config import ControllerConfig
 from utank_hil.config_files import load_config
 from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
-from utank_hil.telemetry import RingError
+from utank_hil.telemetry import EventReader, RingError
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
 FOUND = ModelSummary(9.0, 0.01, 1.8e9, 8.8e8, 5e7, 0.12, 0.99, 1.4, 0.3)
@@ -110,6 +111,52 @@ if __name__ == "__main__":
     assert result.returncode == -9
     assert "retuning REFUSED: too [short]; no pulses" in result.stderr
     assert len(list((tmp_path / "out").glob("identified_vessel-*.yaml"))) == 1
+
+
+def test_broken_pipe_keeps_no_ship_from_being_kept(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    saved = os.dup(2)
+    os.dup2(writing, 2)
+    try:
+        announcer = Announcer(ships(tmp_path))
+        os.close(writing)
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+    os.close(reading)  # as `run ... 2>&1 | tee log` when tee is gone
+    announcer.write(TRIAL, 0)
+    announcer.write(RETUNED, 0)
+    announcer.stop()
+    assert announcer.error is None
+    assert len(list(tmp_path.glob("identified_vessel-*.yaml"))) == 1
+
+
+def test_process_that_can_not_be_started_leaves_the_events_to_the_recorder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(_self: object) -> None:
+        raise OSError(11, "no more processes")
+
+    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", full)
+    announcer = Announcer()
+    assert announcer.error is not None
+    assert "no more processes" in announcer.error
+    assert announcer.ring is not None
+    with EventReader(announcer.ring) as reader:
+        announcer.write(TRIAL, 0)
+        assert [event.state for event in reader.read()] == [RetuningState.TRIAL]
+    announcer.stop()
+
+
+def test_process_that_dies_at_its_start_is_an_error_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "announce", os.getpid)  # takes no arguments
+    announcer = Announcer()
+    assert announcer.error is not None
+    assert "did not start" in announcer.error
+    announcer.write(TRIAL, 0)
+    announcer.stop()
 
 
 def test_process_that_died_is_an_error_and_nothing_waits_for_it() -> None:

@@ -136,6 +136,9 @@ def test_after_its_time_it_ramps_out_and_ends_until_reset():
     assert np.abs(np.diff(pressure)).max() < 0.02 * size  # no jumps
     assert (pressure[time > 160.1] == 0).all()
     assert controller.ended
+    for _ in range(10):  # what a sea does then is no business of its
+        controller.step(np.array([0.3, 0.0, 0.0, 0.0]))
+        controller.applied(np.zeros(1))
     assert controller.passed_limit == ""
     controller.reset()
     assert not controller.ended

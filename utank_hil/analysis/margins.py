@@ -153,9 +153,8 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
 def _phase_margin(loop: ComplexArray) -> float:
     """Least angle of L from the positive real axis where its magnitude crosses one."""
     size = np.abs(loop)
-    turn = np.flatnonzero((size[:-1] < 1) != (size[1:] < 1))  # a loop may be zero, its log is not
-    before, after = np.log(size[turn]), np.log(size[turn + 1])
-    share = before / (before - after)
+    turn = np.flatnonzero((size[:-1] < 1) != (size[1:] < 1))
+    share = (1 - size[turn]) / (size[turn + 1] - size[turn])
     angle = np.angle(loop[turn] + share * (loop[turn + 1] - loop[turn]))
     return float(np.abs(angle).min(initial=np.inf))
 

@@ -166,7 +166,7 @@ def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Answ
         return Refusal(objections)
     try:
         return _designed(record, found, task)
-    except np.linalg.LinAlgError as error:
+    except ValueError as error:  # a design's demands on the ship, or an equation's (LinAlgError)
         return Refusal((str(error),))
 
 

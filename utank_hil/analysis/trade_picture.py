@@ -100,7 +100,7 @@ def _draw_trade(axes: "Axes", points: list[TradePoint], trade: Trade) -> None:
 
 def _draw_costs(column: "list[Axes]", points: list[TradePoint]) -> None:
     titles = (
-        "Largest eigenvalue over ±30 % roll period, ±20 % gain",
+        "Largest eigenvalue over ships, gains, delays",
         "Pressure RMS demanded (kPa)",
         "Tank level RMS (m)",
     )

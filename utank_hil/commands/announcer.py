@@ -55,18 +55,24 @@ class Announcer:
             self._writer = EventWriter()
             self.ring = self._writer.name
             heard, says = context.Pipe(duplex=False)
-            process = context.Process(target=announce, args=(self.ring, ships, says))
-            with _signals_waiting():
-                process.start()
         except OSError as error:
             self.error = str(error)
-            self.stop()
             return
-        self._process = process
-        says.close()  # the process has its own, so that its death is heard, too
         with heard:
-            if not heard.poll(_START_S):
+            try:
+                process = context.Process(target=announce, args=(self.ring, ships, says))
+                with _signals_waiting():
+                    process.start()
+            except OSError as error:
+                self.error = str(error)
+                return
+            finally:
+                says.close()  # the process has its own, so that its death is heard, too
+            self._process = process
+            if not _ready(heard):
                 process.kill()
+                process.join()
+                self.error = f"the process that tells events did not start ({process.exitcode})"
 
     def write(self, event: RetuningEvent, start_ns: int) -> None:
         """Take one event; never waits."""
@@ -93,6 +99,7 @@ class Announcer:
 def announce(ring: str, ships: IdentifiedShips | None, ready: Connection) -> None:
     """Tell events until their writer ends or dies; the whole life of the process."""
     with EventReader(ring) as reader:
+        ready.send_bytes(b"ready")
         ready.close()
         # what ends it is the end of the ring, not Ctrl-C, a closed terminal or a stopped service
         os.setsid()
@@ -110,6 +117,14 @@ def announce(ring: str, ships: IdentifiedShips | None, ready: Connection) -> Non
             _print(f"[red]{reader.lost} events of retuning were lost[/red]")
 
 
+def _ready(heard: Connection) -> bool:
+    """Wait until the process says that it listens."""
+    try:
+        return heard.poll(_START_S) and bool(heard.recv_bytes())
+    except EOFError:
+        return False
+
+
 @contextlib.contextmanager
 def _signals_waiting() -> Iterator[None]:
     """Have a process start with these signals held back: they must not end it as it imports."""
@@ -121,17 +136,21 @@ def _signals_waiting() -> Iterator[None]:
 
 
 def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
+    kept = ""
+    if ships is not None and event.found is not None and event.state is RetuningState.RETUNED:
+        # first of all: a terminal may be held up, or gone
+        try:
+            files = ships.write(event.found)
+        except OSError as error:
+            kept = f"[red]the ship that was found could not be written:[/red] {escape(str(error))}"
+        else:
+            kept = escape(f"the ship that was found: {', '.join(map(shown, files.values()))}")
     _print(f"{event.time_ns * 1e-9:8.1f} s {escape(event_text(event))}")
-    if ships is None or event.found is None or event.state is not RetuningState.RETUNED:
-        return
-    try:
-        files = ships.write(event.found)
-    except OSError as error:
-        _print(f"[red]the ship that was found could not be written:[/red] {escape(str(error))}")
-    else:
-        _print(escape(f"the ship that was found: {', '.join(map(shown, files.values()))}"))
+    if kept:
+        _print(kept)
 
 
 def _print(text: str) -> None:
-    with contextlib.suppress(OSError):  # a terminal that is gone is no reason to keep no files
+    # a terminal that is gone is no reason to keep no files; at a broken pipe Rich would exit
+    with contextlib.suppress(OSError, SystemExit):
         notes.print(text, soft_wrap=True)

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import yaml
 
-from utank_hil.commands.stamps import unused_stamp
+from utank_hil.commands.stamps import claimed_files
 from utank_hil.config import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -79,8 +79,7 @@ class IdentifiedShips:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
-        stamp = unused_stamp(self.folder, *names)
-        vessel_file, controller_file = (self.folder / name.format(stamp) for name in names)
+        vessel_file, controller_file = claimed_files(self.folder, *names)
         ship = dataclasses.replace(
             self.vessel.ship,
             inertia_kg_m2=found.inertia_kg_m2,

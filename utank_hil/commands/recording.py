@@ -6,7 +6,7 @@ from typing import Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
-from utank_hil.commands.stamps import unused_stamp
+from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter
 
@@ -61,13 +61,19 @@ class RunRecording:
         if reason is not None:
             self.summary.error = reason
             return
-        file = folder / NAME.format(unused_stamp(folder, NAME))
+        try:
+            (file,) = claimed_files(folder, NAME)
+        except OSError as error:
+            self.summary.error = str(error)
+            return
         try:
             self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
             self._recorder = RecorderProcess(self._ring.name, file, live=live, events=events)
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
             self.stop()
+            if file.exists() and file.stat().st_size == 0:
+                file.unlink()  # nothing in it
         if file.exists():
             self.summary.file = str(file)
 

@@ -56,6 +56,8 @@ def run(
     """
     loaded = load(config, ControllerConfig)
     refuse_low_margins(loaded)
+    if loaded.safety.overruns_in_ten > 10:
+        notes.print("[yellow]repeated late ticks are not judged:[/yellow] safety.overruns_in_ten")
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
@@ -70,6 +72,8 @@ def run(
         if work is not None:
             announcer = _announcer(config, loaded, folder)
             stack.callback(announcer.stop)
+            if announcer.error is not None:
+                notes.print(f"[red]no word of retuning:[/red] {escape(announcer.error)}")
         recording = None
         if folder is not None:
             recording = RunRecording(
@@ -83,6 +87,8 @@ def run(
             elif recording.url is not None:
                 _show(recording.url, stack)
         retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
+        if retuner is not None and not retuner.alive:
+            notes.print("[red]the retuner did not start:[/red] nothing will be retuned")
         node = build_controller_node(
             loaded,
             retuner=retuner,
@@ -106,15 +112,7 @@ def run(
             "mode": node.mode.name,
             "fault": node.fault.name,
             "fallbacks": node.fallbacks,
-            "retuning": [
-                {
-                    "time_s": (event.time_ns - node.start_ns) * 1e-9,
-                    "state": event.state.name,
-                    "reasons": list(event.reasons),
-                    "found": None if event.found is None else asdict(event.found),
-                }
-                for event in node.retuning_events
-            ],
+            "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
             "loop": statistics.summary(),
             "recording": None if recording is None else asdict(recording.summary),
         }

@@ -5,18 +5,29 @@ from itertools import count
 from pathlib import Path
 
 
-def unused_stamp(folder: Path, *names: str) -> str:
-    """The time (UTC) to name files by, numbered where it is taken.
+def claimed_files(folder: Path, *names: str) -> tuple[Path, ...]:
+    """Files named by the time (UTC), numbered where that is taken; the first is made, and empty.
 
     Parameters
     ----------
     folder : Path
     *names : str
-        Of the files to come, with `{}` in the stamp's place.
+        With `{}` in the time's place.
+
+    Raises
+    ------
+    OSError
+        If the first can't be made.
     """
     now = stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     for number in count(2):
-        if not any((folder / name.format(stamp)).exists() for name in names):
-            break
+        files = tuple(folder / name.format(stamp) for name in names)
+        if not any(file.exists() for file in files):
+            try:
+                files[0].touch(exist_ok=False)
+            except FileExistsError:  # another program's, this very moment
+                pass
+            else:
+                break
         stamp = f"{now}-{number}"
-    return stamp
+    return files

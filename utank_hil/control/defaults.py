@@ -2,7 +2,8 @@
 
 Both were found by minimizing the roll of the first ship (0.5 rad/s, 2.5 % damping) in the hour of
 NDBC 41010, 2019-02-10 05:40, behind 50 ms of delay, 0.1 s of lag and default `PumpLimits`, while
-peak sensitivity stays below 1.75 and the loop stable over +-30 % of roll period and +-20 % of gain.
+peak sensitivity stays below 1.75 and the loop stable over +-30 % of roll period, 0.8 to 1.25 of
+inertia and +-20 % of gain.
 """
 
 from typing import Final

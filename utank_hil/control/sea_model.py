@@ -120,7 +120,7 @@ class SeaModel:
                 f"{self.order} must be below {samples}, the samples in {_MEMORY_S:g} s at "
                 f"sample_time_s {sample_time_s:g}: lower one of the two"
             )
-            refuse("sea", [("order", reason)])
+            refuse("", [("sea.order", reason)])
         kept = self._impulse_response(sample_time_s)[:samples]
         return _balanced(kept, self.order, sample_time_s)
 

@@ -176,7 +176,7 @@ class StimulationController:
         """
         plan = self._plan
         self._lock_in(float(y[0]))
-        if not self.passed_limit and self._steps_in_charge > 1:  # not while another law is
+        if not self.ended and self._steps_in_charge > 1:  # not while another law is
             self.passed_limit = self._beyond(y)
         target = plan.amplitude_rad if reference is None else abs(float(reference[0]))
         target = 0.0 if self._time_is_over else min(target, plan.roll_limit_rad)

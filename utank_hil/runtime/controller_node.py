@@ -53,6 +53,7 @@ _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
 _DRIVE_FAULT: Final = DriveState.FAULT
 _NO_DRIVE_FAULT: Final = DriveFault.NONE
 _CONTROL: Final = Demand.CONTROL
+_NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {"roll_rad": Fault.HEEL_LIMIT, "level_m": Fault.LEVEL_LIMIT}
 
 Measure = Callable[[Inbox, LevelObserver], FloatArray]
@@ -198,7 +199,7 @@ class ControllerNode:
     @property
     def _law_fault(self) -> Fault:
         law = self._starts_anew
-        return _FAULT_OF_LIMIT.get(law.passed_limit, Fault.NONE) if law else Fault.NONE
+        return _FAULT_OF_LIMIT.get(law.passed_limit, _NO_FAULT) if law else _NO_FAULT
 
     @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:

@@ -52,7 +52,7 @@ class SafetyLimits:
       righting levers. Heel 0.28 rad at most: 16 degrees, which it lets a steady wind cause (2.3.1).
     * Bus load 0.85 at most: it is counted in mean frames of 143 bits, of which a bus that is full
       of the longest, 160 bits, shows 0.89.
-    * Late ticks 10 of ten at most: there are no more to be counted.
+    * Late ticks 11 of ten at most, which none are: `run` tells of it.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class SafetyLimits:
         One tick this late cuts the pressure.
     overruns_in_ten : int
         So many late ticks among the last ten end in a ramp to zero; 11 leaves that to
-        `long_overrun_ms`, for a bench under a kernel that keeps no time.
+        `long_overrun_ms` and the drive's timeout, for a bench under a kernel that keeps no time.
 
     Raises
     ------

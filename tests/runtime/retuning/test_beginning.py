@@ -154,6 +154,29 @@ def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_t
     assert f"refused {MOST_TRIES} times" in rig.reasons
 
 
+def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
+    flags: list[int] = []
+    rig = Rig(ToyRetuner(candidate_of(9e4)), replace(SETTINGS, change_factor=1.5), changing(flags))
+    for _ in range(MOST_TRIES + 1):  # rolls above the limit, each time
+        rig.run_until(IDENTIFY, 20000)
+        flags[:] = [1]
+        rig.run_until(REFUSED)
+    rig.run_until(RETUNED, 10000)
+
+
+def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
+    def roll(k: int, u: float) -> float:
+        shorter = k in range(12000, 13500) or k > 40000  # 12,000 samples are 40 minutes
+        return float(0.02 * np.sin((0.3 if shorter else 0.1) * k))
+
+    rig = Rig(ToyRetuner(Refusal(("no",))), replace(SETTINGS, change_factor=1.5), roll)
+    rig.run(40000)
+    before = states(rig).count(IDENTIFY)
+    assert 0 < before < MOST_TRIES
+    rig.run(30000)
+    assert states(rig).count(IDENTIFY) == before + MOST_TRIES
+
+
 def test_change_is_tried_again_after_a_refusal_and_found() -> None:
     flags: list[int] = [0]
     retuner = ToyRetuner(candidate_of(9e4))

@@ -208,3 +208,19 @@ def test_law_whose_answer_is_not_finite_is_dropped_before_anyone_hears_of_it() -
     assert states(rig) == [IDENTIFY, DESIGN, TRIAL, REFUSED]
     assert rig.reasons == "the law's answer was not finite"
     assert np.isfinite(rig.commands).all()
+
+
+def test_law_that_is_faded_from_is_cut_off_when_its_answer_is_not_finite() -> None:
+    rig = Rig(ToyRetuner(candidate_of(9e4)))
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run_until(TRIAL)
+    rig.run(60)
+    law = rig.controller.laws.on_trial
+    assert law is not None
+    rig.engaged = False  # back to the accepted law, by a fade
+    rig.run(3)
+    law.controller.step = lambda y, reference=None: np.full(1, np.nan)  # type: ignore[method-assign]
+    rig.run(50)
+    assert states(rig) == [IDENTIFY, DESIGN, TRIAL, IDLE]
+    assert np.isfinite(rig.commands).all()

@@ -27,8 +27,8 @@ Whatever is asked for, the limits on pressure, rate, level and power apply to th
 after this.
 """
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import asdict, dataclass
+from typing import Any, Final
 
 import numpy as np
 
@@ -52,7 +52,7 @@ from utank_hil.runtime.retuning.trial import Effort, MovingEffort, worsening
 EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is taken back before the trial's end."""
 MOST_TRIES: Final = 3
-"""Identifications for one change of the ship; when all are refused, she counts as normal."""
+"""Identifications of one change of the ship; when all are refused, she counts as normal."""
 RETRY_NS: Final = 600_000_000_000
 """Between the end of a retuning and the next because of a change: what the monitor learns in."""
 
@@ -86,6 +86,15 @@ class RetuningEvent:
     state: RetuningState
     reasons: tuple[str, ...]
     found: ModelSummary | None = None
+
+    def as_json(self, start_ns: int = 0) -> dict[str, Any]:
+        """All of it, ready for `json.dumps`, at its time since the start."""
+        return {
+            "time_s": (self.time_ns - start_ns) * 1e-9,
+            "state": self.state.name,
+            "reasons": list(self.reasons),
+            "found": None if self.found is None else asdict(self.found),
+        }
 
 
 class AdaptiveController:
@@ -224,7 +233,7 @@ class AdaptiveController:
         """Forget the past of all laws; one on trial is taken back."""
         self.laws.reset()
         if self.state is _TRIAL:
-            self._refuse(("the controller was reset during the trial",))
+            self._end("the controller was reset during the trial")
 
     def _rest(self, ordered: bool) -> None:
         """Begin, if there is a reason to, something to compare with, and a retuner."""
@@ -255,7 +264,11 @@ class AdaptiveController:
         rested_ns = self._now_ns - self._rest_since_ns
         if settings.every_s is not None and rested_ns >= settings.every_s * 1e9:
             return "on schedule"
-        if self._changed and rested_ns >= RETRY_NS:
+        if rested_ns < RETRY_NS:
+            return ""
+        if not self._changed:
+            self._tries = 0  # she is as she was: what comes next is another change
+        else:
             change = self.laws.accepted.monitor.change
             return f"the ship has changed: prediction errors are off the normal {change:.2f} times"
         return ""
@@ -268,7 +281,7 @@ class AdaptiveController:
 
     def _identify(self) -> None:
         if self._fresh and abs(self._roll_rad) > self._settings.roll_limit_rad:
-            self._refuse(("the roll is above the limit for identification",))
+            self._end("the roll is above the limit for identification")
         elif self._pulse == len(self._pulses_pa):
             self._number += 1
             self._since_ns = self._now_ns
@@ -291,7 +304,7 @@ class AdaptiveController:
             else:
                 self.candidate, self._incoming = answer, incoming
         elif self._now_ns - self._since_ns > self._settings.answer_within_s * 1e9:
-            self._refuse(("no answer in time: the retuner hangs or is dead",))
+            self._end("no answer in time: the retuner hangs or is dead")
 
     def _put_on_trial(self, law: LawInService) -> None:
         law.controller.applied(np.full(1, self._applied_pa))
@@ -339,6 +352,10 @@ class AdaptiveController:
 
     def _give_up(self, reason: str) -> None:
         self._finish(RetuningState.IDLE, reason)
+
+    def _end(self, reason: str) -> None:
+        """End without a new law, for a reason that says nothing of the ship."""
+        self._finish(RetuningState.REFUSED, reason)
 
     def _refuse(self, reasons: tuple[str, ...]) -> None:
         """End without a new law; a change of the ship is remembered, for a number of tries."""

@@ -95,7 +95,7 @@ Answer = Candidate | Refusal
 def answer_bytes(answer: Answer) -> bytes:
     """An answer as bytes for another process."""
     if isinstance(answer, Refusal):
-        return _REFUSAL + "\n".join(answer.reasons).encode()[:_REASONS_BYTES]
+        return _REFUSAL + "\n".join(answer.reasons).encode(errors="replace")[:_REASONS_BYTES]
     law, model = answer.law, answer.model
     order, inputs, outputs = law.output_gains.shape
     numbers: list[FloatArray | list[float]] = [

@@ -83,7 +83,8 @@ class Laws:
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Step them all; the answer of the one in charge.
 
-        A law on trial whose answer is not finite is dropped there and then, without a fade.
+        A law on trial whose answer is not finite is dropped there and then, without a fade; so is
+        one that answers are faded from.
         """
         charge = self.in_charge
         answer = accepted = outgoing = _NOTHING
@@ -99,6 +100,8 @@ class Laws:
             self.on_trial = None
             self._stop_fading()
             return accepted
+        if self._fading is not None and not math.isfinite(outgoing[0]):
+            self._stop_fading()  # there is nothing to fade from
         if self._fading is not None:
             self._fade += 1
             answer = outgoing + self._fade / FADE_SAMPLES * (answer - outgoing)

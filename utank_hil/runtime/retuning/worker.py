@@ -36,6 +36,8 @@ def keep(
         if worker_pid == 0:
             try:
                 serve(work, orders, answers, keeper_pid)
+            except BaseException:
+                traceback.print_exc(file=sys.stderr)
             finally:
                 os._exit(1)
         end = _watch(worker_pid, answers, parent_pid, hangs_after_s)
