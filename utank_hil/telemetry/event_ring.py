@@ -6,13 +6,13 @@ several processes, and are there to be read after the writer was killed.
 
 import json
 from dataclasses import asdict
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
+from utank_hil.closing import Closing
 from utank_hil.runtime.retuning.adaptive import RetuningEvent
 from utank_hil.runtime.retuning.answer import ModelSummary
 from utank_hil.telemetry.ring import RingReader, RingWriter
@@ -24,7 +24,7 @@ _LONGEST_BYTES: Final = 8 * _TEXT_WORDS
 _MOST_BYTES_A_CHARACTER: Final = 6  # of JSON, for what must be escaped
 
 
-class EventWriter:
+class EventWriter(Closing):
     """The writing end, for the loop; creates the ring and owns it.
 
     Attributes
@@ -65,19 +65,8 @@ class EventWriter:
         """Tell readers that no more events will come; idempotent."""
         self._ring.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-
-class EventReader:
+class EventReader(Closing):
     """A reading end with its own cursor, which starts at the oldest event still there.
 
     Parameters
@@ -111,17 +100,6 @@ class EventReader:
     def close(self) -> None:
         """Release the memory; idempotent."""
         self._ring.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def event_text(event: RetuningEvent) -> str:

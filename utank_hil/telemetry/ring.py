@@ -32,14 +32,14 @@ from collections.abc import Sequence
 from enum import IntEnum
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
 
 from utank_hil.arrays import FloatArray
+from utank_hil.closing import Closing
 
 _SHM: Final = Path("/dev/shm")
 _MAGIC: Final = int.from_bytes(b"UTNKRING", "little")
@@ -65,7 +65,7 @@ class RingError(OSError):
     """There is no such ring, or the segment is not one."""
 
 
-class RingWriter:
+class RingWriter(Closing):
     """The writing end; creates the segment and owns it.
 
     Parameters
@@ -171,19 +171,8 @@ class RingWriter:
         shm.close()
         shm.unlink()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-
-class RingReader:
+class RingReader(Closing):
     """A reading end with its own cursor, which starts at the oldest row still there.
 
     Parameters
@@ -275,17 +264,6 @@ class RingReader:
         if not self._map.closed:
             del self._words, self._slots  # mapped memory can be released only without views
             self._map.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _first_slot_word(names_bytes: int) -> int:

@@ -5,14 +5,15 @@ import os
 import socket
 import subprocess
 from pathlib import Path
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 from urllib.parse import quote
+
+from utank_hil.closing import Closing
 
 LOOPBACK: Final = "127.0.0.1"  # Rerun's own default is every interface
 
 
-class Viewer:
+class Viewer(Closing):
     """A running viewer; `open_viewer` makes one.
 
     Attributes
@@ -33,17 +34,6 @@ class Viewer:
         """End the viewer; idempotent."""
         self._process.terminate()
         self._process.wait()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def open_viewer(source: Path | str) -> Viewer:

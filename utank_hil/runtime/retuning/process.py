@@ -16,12 +16,12 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.closing import Closing
 from utank_hil.runtime.retuning.answer import Answer, Refusal, read_answer
 from utank_hil.runtime.retuning.mailbox import Mailbox
 from utank_hil.runtime.retuning.retuner import Work
@@ -35,7 +35,7 @@ _END_S: Final = 2.0
 _THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-class RetunerProcess:
+class RetunerProcess(Closing):
     """A `Retuner` in a process of its own; start it before the loop.
 
     It is ready when the constructor returns. If it does not come up, the constructor returns too,
@@ -104,17 +104,6 @@ class RetunerProcess:
             os.killpg(self.pid, signal.SIGKILL)
         self._process.kill()
         self._process.join(_END_S)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 @contextmanager
