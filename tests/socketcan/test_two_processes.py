@@ -90,7 +90,7 @@ def tell_story(folder: Path) -> Story:
             told.recordings.append(read_recording(only_recording(folder / name))["live"])
     finally:
         watcher.close()
-        candump.stop()
+        candump.close()
     return told
 
 

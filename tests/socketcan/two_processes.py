@@ -102,23 +102,34 @@ class Candump:
         self._output = self._file.open("wb")
         self._process = subprocess.Popen(["candump", "-L", CHANNEL], stdout=self._output)
 
-    def stop(self) -> list[Logged]:
-        """End it and read its log."""
+    def close(self) -> None:
+        """End it; idempotent."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)  # on which it writes out what it holds
             self._process.wait(30)
             self._output.close()
+
+    def stop(self, *names: str) -> list[Logged]:
+        """End it and read its log: all messages, or those of these names.
+
+        A process in a user-mode kernel that grows beyond 250 MB is killed (docs/vcan.md): of many
+        minutes read only what is needed.
+        """
+        self.close()
         database = cantools.database.load_file(DBC, strict=True)
         assert isinstance(database, cantools.database.Database)
         log = []
-        for line in self._file.read_text().splitlines():
-            parts = LINE.fullmatch(line)
-            assert parts, f"candump wrote {line!r}"
-            message = database.get_message_by_frame_id(int(parts["id"], 16))
-            signals = message.decode(bytes.fromhex(parts["data"]), decode_choices=False)
-            assert isinstance(signals, dict)
-            time_s = int(parts["s"]) + int(parts["us"]) * 1e-6
-            log.append(Logged(time_s, message.name, dict(signals)))
+        with self._file.open() as lines:
+            for line in lines:
+                parts = LINE.fullmatch(line.rstrip("\n"))
+                assert parts, f"candump wrote {line!r}"
+                message = database.get_message_by_frame_id(int(parts["id"], 16))
+                if names and message.name not in names:
+                    continue
+                signals = message.decode(bytes.fromhex(parts["data"]), decode_choices=False)
+                assert isinstance(signals, dict)
+                time_s = int(parts["s"]) + int(parts["us"]) * 1e-6
+                log.append(Logged(time_s, message.name, dict(signals)))
         return log
 
 
