@@ -5,6 +5,7 @@ same keys for all of them.
 """
 
 import math
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -33,15 +34,15 @@ class _AnySea(Section):
     effective_slope: EffectiveSlope = EffectiveSlope()
 
 
-class _IrregularSea(_AnySea):
+class _IrregularSea(_AnySea, ABC):
     """A sea drawn from a spectrum."""
 
     spreading: Annotated[float, Field(ge=0)] | None = None
     """Exponent s of the spreading cos^2s(theta / 2); long-crested without it."""
 
+    @abstractmethod
     def spectrum(self) -> Spectrum:
         """What the waves are drawn from."""
-        raise NotImplementedError
 
     def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:  # noqa: ARG002, one for all
         """Where the waves go relative to the ship, for all or for each band."""

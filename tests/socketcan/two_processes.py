@@ -57,7 +57,7 @@ def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
     content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
     content["command_timeout_ms"] = command_timeout_ms
     content["safety"] = {
-        "overruns_in_ten": 11,
+        "overruns_in_ten": None,
         "long_overrun_ms": 1000,
         "motion_age_ms": 500,
         "tank_degraded_age_ms": 500,

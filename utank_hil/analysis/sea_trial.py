@@ -10,9 +10,8 @@ import dataclasses
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +31,7 @@ from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
 
 NO_TANK, PASSIVE, CLAIRVOYANT = "no tank", "passive", "clairvoyant"
@@ -196,7 +196,7 @@ def run_trials(
     """
     context = multiprocessing.get_context("spawn")
     with (
-        _one_thread_each(),
+        one_thread_each(),
         ProcessPoolExecutor(
             min(len(trials), os.cpu_count() or 1) or 1,
             mp_context=context,
@@ -217,21 +217,6 @@ def run_trials(
 
 def _leave_interrupts_to_the_caller() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Processes started meanwhile keep their linear algebra to one thread."""
-    name = "OPENBLAS_NUM_THREADS"
-    before = os.environ.get(name)
-    os.environ[name] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 def _motion_figures(motion: FloatArray) -> TrialFigures:

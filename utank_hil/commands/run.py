@@ -56,7 +56,7 @@ def run(
     """
     loaded = load(config, ControllerConfig)
     refuse_low_margins(loaded)
-    if loaded.safety.overruns_in_ten > 10:
+    if loaded.safety.overruns_in_ten is None:
         notes.print("[yellow]repeated late ticks are not judged:[/yellow] safety.overruns_in_ten")
     statistics = LoopStatistics()
     with ExitStack() as stack:

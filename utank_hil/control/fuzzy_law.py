@@ -6,6 +6,7 @@ water may be added. Nothing is learnt from a command that was cut short: what fo
 what the law asked for.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 from typing import NamedTuple
 
@@ -96,7 +97,7 @@ class FuzzyInputs(NamedTuple):
     learning: bool
 
 
-class FuzzyController:
+class FuzzyController(ABC):
     """Steps a fuzzy law; what is learnt, and the acceleration, are its subclasses'.
 
     What was learnt before a fault, or before an operator disarmed, may be what led to it: an armed
@@ -151,9 +152,10 @@ class FuzzyController:
         left, asked = float(u[0]), self._command_pa
         self._learning = abs(left - asked) <= (1 - _OBEYED) * abs(asked)
 
+    @abstractmethod
     def _answer(self, now: FuzzyInputs) -> float:
         """Give the roll acceleration, and learn."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _forget(self) -> None:
-        raise NotImplementedError
+        """Go back to the parameters that the law starts with."""

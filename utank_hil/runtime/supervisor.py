@@ -6,6 +6,7 @@ resets and arms again: arming needs a *rising* edge of the arm bit that this ver
 while ready, so neither a restart nor a fault is ever followed by pressure on its own.
 """
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Final
@@ -52,7 +53,8 @@ class SafetyLimits:
       righting levers. Heel 0.28 rad at most: 16 degrees, which it lets a steady wind cause (2.3.1).
     * Bus load 0.85 at most: it is counted in mean frames of 143 bits, of which a bus that is full
       of the longest, 160 bits, shows 0.89.
-    * Late ticks 11 of ten at most, which none are: `run` tells of it.
+    * Late ticks 10 of ten at most. They may be left to the limit of a single one and the drive's
+      own timeout (None), for a bench under a kernel that keeps no time: `run` tells of it.
 
     Attributes
     ----------
@@ -74,9 +76,8 @@ class SafetyLimits:
         Largest share of the bus in use over a second.
     long_overrun_ms : float
         One tick this late cuts the pressure.
-    overruns_in_ten : int
-        So many late ticks among the last ten end in a ramp to zero; 11 leaves that to
-        `long_overrun_ms` and the drive's timeout, for a bench under a kernel that keeps no time.
+    overruns_in_ten : int or None
+        So many late ticks among the last ten end in a ramp to zero; None: they are not judged.
 
     Raises
     ------
@@ -98,7 +99,7 @@ class SafetyLimits:
     heel_limit_rad: _HeelLimit = 0.14
     bus_load_limit: _BusLoad = 0.8
     long_overrun_ms: _Silence = 50.0
-    overruns_in_ten: Annotated[int, Range(least=1, most=11)] = 3
+    overruns_in_ten: Annotated[int, Range(least=1, most=10)] | None = 3
 
     def __post_init__(self) -> None:
         refuse("safety", range_problems(self))
@@ -172,6 +173,7 @@ class Supervisor:
         self._panel_age_ns = _ns(limits.panel_age_armed_ms)
         self._arming_timeout_ns = _ns(limits.arming_timeout_ms)
         self._long_overrun_ns = _ns(limits.long_overrun_ms)
+        self._overruns_in_ten = limits.overruns_in_ten or math.inf
         self.mode = Mode.INIT
         self.fault = Fault.NONE
         self.demand = Demand.ZERO
@@ -332,7 +334,7 @@ class Supervisor:
             return faults.PROTECTION
         if abs(seen.roll_rad) > limits.roll_limit_rad or abs(seen.heel_rad) > limits.heel_limit_rad:
             return faults.HEEL_LIMIT
-        if seen.overruns_in_ten >= limits.overruns_in_ten:
+        if seen.overruns_in_ten >= self._overruns_in_ten:
             return faults.REPEATED_OVERRUNS
         if seen.panel_age_ns > self._panel_age_ns:
             return faults.OPERATOR_SILENT

@@ -17,9 +17,9 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final
 
+from utank_hil.closing import Closing
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.viewer import LOOPBACK, free_port, live_url, rerun_environment
@@ -128,7 +128,7 @@ def record(
         return RecorderReport(recorded, reader.lost)
 
 
-class RecorderProcess:
+class RecorderProcess(Closing):
     """A recorder in a process of its own; ready when the constructor returns.
 
     Start it before the loop: it takes about a second, most of it Rerun's import. It runs in a
@@ -211,21 +211,14 @@ class RecorderProcess:
                 self._report = RecorderReport(**said)
         return self._report
 
+    def close(self) -> None:
+        """As `stop`."""
+        self.stop()
+
     def _kill(self) -> None:
         self._process.kill()
         self._process.wait()
         self._output.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.stop()
 
 
 def _main() -> None:

@@ -14,14 +14,14 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
+from utank_hil.one_thread import one_thread_each
 from utank_hil.runtime.retuning.answer import Answer, Refusal, read_answer
 from utank_hil.runtime.retuning.mailbox import Mailbox
 from utank_hil.runtime.retuning.retuner import Work
@@ -32,7 +32,6 @@ _START_S: Final = 30.0
 _ALIVE_NS: Final = 5_000_000_000  # a nice process on a busy machine may have to wait for its turn
 _HANGS_S: Final = 600.0
 _END_S: Final = 2.0
-_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class RetunerProcess(Closing):
@@ -67,7 +66,7 @@ class RetunerProcess(Closing):
             args=(work, self._orders, self._answers, os.getpid(), hangs_after_s),
             daemon=True,
         )
-        with _one_thread():
+        with one_thread_each():
             self._process.start()
         assert self._process.pid is not None
         self.pid: int = self._process.pid
@@ -104,22 +103,3 @@ class RetunerProcess(Closing):
             os.killpg(self.pid, signal.SIGKILL)
         self._process.kill()
         self._process.join(_END_S)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Have a process that is started meanwhile compute in one thread.
-
-    Linear algebra spread over all cores takes them from the loop; and on a busy machine its
-    threads wait for one another and take twenty times as long.
-    """
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
