@@ -21,9 +21,9 @@ help:
 	@echo "make test-fast  the tests that take seconds, without CAN"
 	@echo "make test-quiet retuning of order 200 from 500 s on a real CAN bus; 12 min, an idle machine"
 	@echo "make search     the property tests with new random examples, until one fails or they end"
-	@echo "make check      lint, format, strict types, generated documents"
+	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
-	@echo "make peers      the environment of those packages, 480 MB, for tools/compare_*.py"
+	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
 	@echo "make docs       write the generated documents anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
@@ -47,8 +47,9 @@ check: setup
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
-	$(VENV)/bin/mypy $(wildcard tools/*.py)
-	$(PYTHON) tools/document_catalogue.py --check
+	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents peers studies thesis)
+	$(VENV)/bin/lint-imports --no-logo
+	$(PYTHON) -m tools.documents.catalogue --check
 
 test: check
 	$(PARALLEL) -m "not socketcan"
@@ -69,8 +70,10 @@ format: setup
 	$(VENV)/bin/ruff format .
 
 benchmark: setup peers
-	@for script in tools/benchmark_*.py; do echo; echo "== $$script"; $(PYTHON) $$script || exit 1; done
-	@for script in tools/compare_*.py; do echo; echo "== $$script"; $(PEERS)/bin/python $$script || exit 1; done
+	@for name in $(basename $(notdir $(wildcard tools/benchmarks/*.py))); do \
+		echo; echo "== $$name"; $(PYTHON) -m tools.benchmarks.$$name || exit 1; done
+	@for name in $(basename $(notdir $(wildcard tools/peers/compare_*.py))); do \
+		echo; echo "== $$name"; $(PEERS)/bin/python -m tools.peers.$$name || exit 1; done
 
 peers: $(PEERS_READY)
 
@@ -85,7 +88,7 @@ $(PEERS_READY): tools/peers/requirements.lock | $(READY)
 	@touch $@
 
 docs: setup
-	$(PYTHON) tools/document_catalogue.py
+	$(PYTHON) -m tools.documents.catalogue
 
 lock: setup
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock

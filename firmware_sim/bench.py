@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from multiprocessing.context import SpawnContext
 from typing import Any, Final
 
-from firmware_sim.assembly import PASSIVE_SCRIPT
 from firmware_sim.run import (
     RECORD_S,
     Job,
@@ -22,9 +21,10 @@ from firmware_sim.run import (
     run_ship,
 )
 from firmware_sim.scenario import PASSIVE, Scenario
-from utank_hil.analysis.bare_ship import roll_without_tank
+from firmware_sim.ship_side import PASSIVE_SCRIPT
+from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.arrays import FloatArray
-from utank_hil.config_laws import PassiveLaw
+from utank_hil.configuration.laws import PassiveLaw
 from utank_hil.runtime import stop_on_signals
 
 POLL_S: Final = 0.1

@@ -1,6 +1,6 @@
 """Command line ``firmware-sim``: the ship's side alone."""
 
-from utank_hil.commands.loading import quietly_interruptible
+from utank_hil.commands.interruptible import quietly_interruptible
 
 with quietly_interruptible():
     import json
@@ -13,11 +13,11 @@ with quietly_interruptible():
     from rich.console import Console
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from firmware_sim.assembly import build_ship_side
     from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
     from firmware_sim.scenario import Scenario
+    from firmware_sim.ship_side import build_ship_side
     from firmware_sim.truth import TRUTH, TruthRecorder
-    from utank_hil.analysis.metrics import pump_statistics, roll_statistics
+    from utank_hil.analysis.motion.statistics import pump_statistics, roll_statistics
     from utank_hil.canbus import SocketCanPort
     from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
     from utank_hil.commands.tables import print_table

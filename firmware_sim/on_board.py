@@ -5,48 +5,22 @@ Roll is all that the bench knows; sway, heave and pitch add to it on a real ship
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from rich.table import Table
 
-from utank_hil.analysis.comfort import EXPOSURE_S, Comfort, comfort
-from utank_hil.analysis.exceedance import exceedance, rayleigh_exceedance
+from firmware_sim.bench import BenchResult
+from firmware_sim.place import Place
+from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
+from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
 from utank_hil.arrays import FloatArray
-from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.parameters import Finite, range_problems, refuse
-
-if TYPE_CHECKING:
-    from firmware_sim.bench import BenchResult
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
 """Single amplitudes of roll whose exceedance is told."""
 _SHOWN_RAD: Final = (LEVELS_RAD[1], LEVELS_RAD[3])
 _NO_TANK: Final = "no tank"
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A place on board, seen from the ship's centre of gravity.
-
-    Parameters
-    ----------
-    height_m : float
-        Above it.
-    starboard_m : float
-        To starboard of it.
-    """
-
-    height_m: Finite
-    starboard_m: Finite = 0.0
-
-    def __post_init__(self) -> None:
-        refuse("place", range_problems(self))
-
-    @classmethod
-    def over_reservoir(cls, tank: Tank) -> "Place":
-        """The deck over the starboard reservoir, where a scenario names no place."""
-        return cls(tank.height_m + tank.level_limit_m - tank.lz_m, tank.width_m / 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +59,7 @@ def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
     )
 
 
-def judged_runs(result: "BenchResult") -> dict[str, OnBoard]:
+def judged_runs(result: BenchResult) -> dict[str, OnBoard]:
     """The bare ship and the runs that can be compared with her, over the bench's window."""
     from firmware_sim.run import RECORD_S
 
@@ -98,7 +72,7 @@ def judged_runs(result: "BenchResult") -> dict[str, OnBoard]:
     return {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}
 
 
-def on_board_json(result: "BenchResult") -> dict[str, Any]:
+def on_board_json(result: BenchResult) -> dict[str, Any]:
     """The figures in SI units, ready for `json.dumps`."""
     return {
         "place": asdict(result.scenario.place_on_board),
@@ -108,7 +82,7 @@ def on_board_json(result: "BenchResult") -> dict[str, Any]:
     }
 
 
-def on_board_table(result: "BenchResult") -> Table:
+def on_board_table(result: BenchResult) -> Table:
     """Table of what the roll is like for people at the scenario's place."""
     place = result.scenario.place_on_board
     table = Table(title="On board")

@@ -19,14 +19,15 @@ from firmware_sim.retuning_figures import (
 )
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import PASSIVE
-from utank_hil.analysis.metrics import (
+from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
     pump_statistics,
     roll_statistics,
 )
 from utank_hil.canbus import Fault, Mode
-from utank_hil.telemetry import BenchCurve, draw_bench, write_recording
+from utank_hil.pictures import BenchCurve, draw_bench
+from utank_hil.telemetry import write_recording
 
 NO_TANK: Final = "no tank"
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"

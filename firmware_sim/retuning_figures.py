@@ -11,7 +11,7 @@ from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
-from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
+from utank_hil.retuning import ModelSummary, RetuningEvent
 
 SETTLING_S: Final = 60.0
 """Left out after a new law came into service."""

@@ -8,13 +8,19 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from firmware_sim.assembly import ShipSide, build_ship_side
 from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import ShipSide, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
-from utank_hil.analysis.retune import retuner_work
 from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import SocketCanPort
-from utank_hil.config import ControllerConfig
+from utank_hil.configuration import ControllerConfig
+from utank_hil.retuning import (
+    Retuner,
+    RetunerProcess,
+    RetuningEvent,
+    SimulatedRetuner,
+)
 from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
@@ -26,15 +32,8 @@ from utank_hil.runtime import (
     heard_by,
     real_time_scheduling,
 )
-from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.controller_node import TICK_NS, ControllerNode
 from utank_hil.runtime.panel import TimedAction
-from utank_hil.runtime.retuning import (
-    Retuner,
-    RetunerProcess,
-    RetuningEvent,
-    SimulatedRetuner,
-)
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.table import Table
 

@@ -8,11 +8,11 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from firmware_sim.drive import DriveLimits
-from firmware_sim.on_board import Place
+from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
-from utank_hil.config import ControllerConfig, Vessel, tank_problems
-from utank_hil.config_files import Section
+from utank_hil.configuration import ControllerConfig, Section, Vessel
+from utank_hil.configuration.vessel import tank_problems
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.parameters import ParameterError, Problem, refuse

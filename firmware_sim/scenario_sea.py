@@ -12,8 +12,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from utank_hil.arrays import FloatArray
-from utank_hil.config_files import Section
-from utank_hil.config_sea import (
+from utank_hil.configuration import Section
+from utank_hil.configuration.spectra import (
     IttcSpectrum,
     JonswapSpectrum,
     MeasuredSpectrum,

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import firmware_sim.report
 from firmware_sim.cli import app as ship_app
 from utank_hil.cli import app
+from utank_hil.cli import commands as entry_points
 from utank_hil.telemetry import read_recording
 
 CONFIGS = Path("configs").resolve()
@@ -31,14 +32,15 @@ def said(result) -> str:
     return re.sub(r"[\s│]+", " ", result.output)
 
 
-def names(application: typer.Typer) -> list[str]:
-    return [c.name or c.callback.__name__ for c in application.registered_commands]
-
-
 def commands() -> list[tuple[typer.Typer, tuple[str, ...], str]]:
-    words = [(name,) for name in names(app)]
-    for group in app.registered_groups:
-        words += [(group.name, name) for name in names(group.typer_instance)]
+    words = []
+    for name, point in entry_points().items():
+        loaded = point.load()
+        if isinstance(loaded, typer.Typer):
+            words += [(name, each.name or each.callback.__name__)
+                      for each in loaded.registered_commands]  # fmt: skip
+        else:
+            words.append((name,))
     return [
         (ship_app, (), "firmware-sim"),
         *((app, each, " ".join(("utank-hil", *each))) for each in words),

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from utank_hil.arrays import FloatArray
 from utank_hil.cli import app
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import pump_model
 from utank_hil.dynamics import RollShip
 from utank_hil.dynamics.sampling import sample

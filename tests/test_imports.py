@@ -15,9 +15,9 @@ from utank_hil.canbus import SocketCanPort
 from utank_hil.commands.common import load
 from utank_hil.commands.recording import RunRecording
 from utank_hil.commands.run import run
-from utank_hil.config import ControllerConfig
+from utank_hil.configuration import ControllerConfig
 from utank_hil.runtime import RealTimeLoop, real_time_scheduling, stop_on_signals
-from utank_hil.runtime.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RingWriter
 
@@ -59,8 +59,7 @@ def test_margins_are_judged_without_anything_heavy_because_run_does_it_first() -
     source = """
 from pathlib import Path
 from utank_hil.commands.check import judge
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
+from utank_hil.configuration import ControllerConfig, load_config
 assert judge(load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)) is not None
 """
     assert loaded_by(source) == ""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from firmware_sim.scenario import Scenario
-from utank_hil.config import ControllerConfig, Vessel
+from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.parameters import (
     NotNegative,
     ParameterError,

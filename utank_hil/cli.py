@@ -1,24 +1,57 @@
-"""Command line ``utank-hil``."""
+"""Command line ``utank-hil``: one entry point of the group ``utank_hil.commands`` a command.
 
-from utank_hil.commands.loading import quietly_interruptible
+A command's module is imported when the command is named, so ``run`` starts without the bench, and a
+package beside this one adds commands of its own.
+"""
+
+from utank_hil.commands.interruptible import quietly_interruptible
 
 with quietly_interruptible():
-    import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.commands.bench import bench
-    from utank_hil.commands.check import check
-    from utank_hil.commands.common import new_app
-    from utank_hil.commands.design import design
-    from utank_hil.commands.identify import identify_log
-    from utank_hil.commands.panel import panel
-    from utank_hil.commands.run import run
+    from functools import cache
+    from importlib.metadata import EntryPoint, entry_points
+    from typing import Any
 
-app = new_app("Hardware-in-the-loop controller stack for active U-tube anti-roll tanks.")
-app.command()(bench)
-app.command()(run)
-app.command()(check)
-app.command()(panel)
-app.command("identify")(identify_log)
-app.add_typer(design, name="design")
+    import typer
+    from typer.core import TyperGroup
+
+    import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
+    from utank_hil.commands.common import new_app
+
+GROUP = "utank_hil.commands"
+
+
+@cache
+def commands() -> dict[str, EntryPoint]:
+    """The installed commands by name: entry points of a function or of a `typer.Typer`."""
+    return {point.name: point for point in sorted(entry_points(group=GROUP))}
+
+
+class _Commands(TyperGroup):
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002
+        return list(commands())
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002
+        if cmd_name not in commands():
+            return None
+        with quietly_interruptible():
+            loaded = commands()[cmd_name].load()
+        if not isinstance(loaded, typer.Typer):
+            application = new_app()
+            application.command(cmd_name)(loaded)
+            loaded = application
+        command = typer.main.get_command(loaded)
+        command.name = cmd_name
+        return command
+
+
+app = new_app(
+    "Hardware-in-the-loop controller stack for active U-tube anti-roll tanks.", cls=_Commands
+)
+
+
+@app.callback()
+def _utank_hil() -> None:
+    pass
 
 
 def main() -> None:

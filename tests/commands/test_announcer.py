@@ -13,9 +13,8 @@ from utank_hil.canbus import RetuningState
 from utank_hil.commands import announcer as module
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
-from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.retuning import ModelSummary, RetuningEvent
 from utank_hil.telemetry import EventReader, RingError
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")

@@ -14,14 +14,12 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 from wrong_values import WRONG
 
-from firmware_sim.assembly import build_ship_side
 from firmware_sim.scenario import Scenario
-from utank_hil.analysis.retune import retuner_work
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.cli import app
-from utank_hil.config import ControllerConfig, Vessel
-from utank_hil.config_files import ConfigError, load_config
-from utank_hil.runtime.assembly import build_controller_node
-from utank_hil.runtime.retuning import SimulatedRetuner
+from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
+from utank_hil.retuning import SimulatedRetuner
 
 CONFIGS = Path("configs").resolve()
 WIDE = {"TERM": "dumb", "COLUMNS": "300", "NO_COLOR": "1"}

@@ -7,11 +7,10 @@ import pytest
 import yaml
 
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
-from utank_hil.config_laws import build_law
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.configuration.laws import build_law
 from utank_hil.control import PredictiveDesign
-from utank_hil.runtime.retuning import ModelSummary
+from utank_hil.retuning import ModelSummary
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
 FOUND = ModelSummary(9.0, 0.01, 1.8e9, 8.8e8, 5e7, 0.12, 0.99, 1.4, 0.3)

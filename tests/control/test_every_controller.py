@@ -17,14 +17,14 @@ from utank_hil.control import (
     design_pd,
     pump_model,
 )
-from utank_hil.control.direct_fuzzy import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.indirect_fuzzy import IndirectFuzzy
+from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr
 from utank_hil.control.lqg_design import LQG_ROLL_RATE_LEVEL
 from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
-from utank_hil.control.stimulate import Stimulation
+from utank_hil.control.stimulation import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.dynamics.linear import STATES

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.control.feedback_linearization import FeedbackLinearization
 from utank_hil.control.gain import GainLaw
-from utank_hil.control.ship_design import pump_model
+from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import sample

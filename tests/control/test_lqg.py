@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.analysis.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr, kalman_predictor
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.sampling import LinearModel, sampled_model

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from utank_hil.analysis.closed_loop import closed_loop_response
-from utank_hil.analysis.margins import margins
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import margins
 from utank_hil.control import WashoutLaw, pump_model
 from utank_hil.control.lqg_design import LQG_ROLL_RATE_LEVEL, LQGDesign, wave_plant
-from utank_hil.control.ship_design import Predictor
+from utank_hil.control.predictive.design import Predictor
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)

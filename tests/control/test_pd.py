@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.closed_loop import closed_loop_response
-from utank_hil.analysis.margins import margins
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import margins
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.control.pd import PD_MEASURED, design_pd
-from utank_hil.control.ship_design import pump_model
+from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.analysis.survival import controlled_run
+from utank_hil.analysis.capsize.survival import controlled_run
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from utank_hil.control.direct_fuzzy import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
-from utank_hil.control.fuzzy_basis import FuzzyBasis
-from utank_hil.control.indirect_fuzzy import IndirectFuzzy
+from utank_hil.control.fuzzy.basis import FuzzyBasis
+from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
+from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics import RollModel, RollShip, Tank

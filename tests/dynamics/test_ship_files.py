@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.config import Vessel
-from utank_hil.config_files import load_config
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.restoring import restoring
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from firmware_sim.assembly import ShipSide, build_ship_side
 from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import ShipSide, build_ship_side
+from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import (
     DriveState,
     DriveStatus1,
@@ -17,10 +18,8 @@ from utank_hil.canbus import (
     SensorMotion,
     load_catalogue,
 )
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.runtime import Lockstep, Node
-from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import Action, TimedAction
 

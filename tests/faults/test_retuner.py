@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from fault_bench import CATALOGUE, SECOND, Listener, storm
 
-from firmware_sim.assembly import build_ship_side
+from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import ControllerStatus, Fault, Mode, PumpCommand, RetuningState
-from utank_hil.config import ControllerConfig
+from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ARX, PredictiveLaw
-from utank_hil.runtime import Lockstep
-from utank_hil.runtime.assembly import build_controller_node
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.retuning import (
+from utank_hil.retuning import (
     Answer,
     Candidate,
     ModelSummary,
@@ -23,6 +20,9 @@ from utank_hil.runtime.retuning import (
     Retuner,
     RetuningSettings,
 )
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.controller_node import ControllerNode
+from utank_hil.runtime.panel import Action, TimedAction
 
 SETTINGS = RetuningSettings(
     (6.0, 20.0), identification_s=20.0, answer_within_s=5.0, trial_s=60.0, pulse_pa=10e3

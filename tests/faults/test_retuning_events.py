@@ -3,17 +3,17 @@
 import pytest
 from fault_bench import storm
 
-from firmware_sim.assembly import build_ship_side
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import RetuningState
-from utank_hil.runtime import Lockstep
-from utank_hil.runtime.assembly import build_controller_node
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.retuning import (
+from utank_hil.retuning import (
     Refusal,
     RetuningEvent,
     RetuningSettings,
     SimulatedRetuner,
 )
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry import EventReader, EventWriter
 
 SECOND = 1_000_000_000

@@ -14,8 +14,7 @@ from utank_hil.canbus import (
     PumpCommand,
     load_catalogue,
 )
-from utank_hil.config import Vessel
-from utank_hil.config_files import load_config
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.sea import Harmonics
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)

@@ -12,7 +12,7 @@ from firmware_sim.retuning_figures import retuning_figures
 from firmware_sim.run import Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus import RetuningState
-from utank_hil.config_files import load_config
+from utank_hil.configuration import load_config
 
 SCENARIOS = Path("configs/scenarios")
 IDENTIFY, DESIGN, TRIAL, RETUNED = list(RetuningState)[1:5]

@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from firmware_sim.assembly import build_ship_side
 from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Frame
-from utank_hil.config_files import load_config
+from utank_hil.configuration import load_config
 from utank_hil.runtime import Lockstep, Node
-from utank_hil.runtime.assembly import build_controller_node
 from utank_hil.runtime.node import Selective
 from utank_hil.runtime.panel import Action, TimedAction
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
-from firmware_sim.on_board import LEVELS_RAD, Place, on_board
+from firmware_sim.on_board import LEVELS_RAD, on_board
+from firmware_sim.place import Place
 from firmware_sim.scenario import Scenario
-from utank_hil.analysis.comfort import comfort
-from utank_hil.config_files import ConfigError, load_config
+from utank_hil.analysis.motion.comfort import comfort
+from utank_hil.configuration import ConfigError, load_config
 from utank_hil.dynamics import Tank
 
 STEP_S = 0.05

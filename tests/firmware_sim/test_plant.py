@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from firmware_sim import plant_kernel as kernel
 from firmware_sim.plant import TICK_NS, Plant
-from utank_hil.config import Vessel
-from utank_hil.config_files import load_config
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import AT_REST, pump_coast, pump_step
 from utank_hil.sea import Harmonics

@@ -14,8 +14,8 @@ from firmware_sim.retuning_figures import RetuningFigures, events_on_ships_time,
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus import RetuningState
-from utank_hil.config_files import load_config
-from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
+from utank_hil.configuration import load_config
+from utank_hil.retuning import ModelSummary, RetuningEvent
 
 ADAPTIVE = load_config(Path("configs/scenarios/adaptive.yaml"), Scenario)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = list(RetuningState)

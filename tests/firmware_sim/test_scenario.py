@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from firmware_sim.scenario import Scenario
-from utank_hil.config_files import ConfigError, load_config
+from utank_hil.configuration import ConfigError, load_config
 
 CONFIGS = Path("configs").resolve()
 STORM = CONFIGS / "scenarios" / "storm.yaml"

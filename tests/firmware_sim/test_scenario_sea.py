@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from firmware_sim.scenario_sea import ScenarioSea
-from utank_hil.config_files import ConfigError, Section, load_config
+from utank_hil.configuration import ConfigError, Section, load_config
 from utank_hil.sea import Sea, ittc, jonswap, load_ndbc, pierson_moskowitz
 
 ROOT = Path(__file__).resolve().parents[2]

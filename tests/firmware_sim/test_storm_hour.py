@@ -9,7 +9,7 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Mode
-from utank_hil.config_files import load_config
+from utank_hil.configuration import load_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.assembly import measure_of
 from utank_hil.canbus import (
     Address,
     ControllerStatus,
@@ -29,10 +30,8 @@ from utank_hil.canbus import (
     Switch,
     load_catalogue,
 )
-from utank_hil.config import Vessel
-from utank_hil.config_files import load_config
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
-from utank_hil.runtime.assembly import measure_of
 from utank_hil.runtime.controller_node import TICK_NS, ControllerNode, ControllerSettings
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics

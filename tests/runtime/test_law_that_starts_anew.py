@@ -8,7 +8,7 @@ from controller_bench import VESSEL, ControllerBench, ToyLaw
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode, Quality, SensorMotion
-from utank_hil.control.stimulate import Stimulation
+from utank_hil.control.stimulation import Stimulation
 
 PLAN = Stimulation(
     VESSEL.ship,

@@ -12,9 +12,9 @@ from two_processes import BIN, CHANNEL, CONFIGS, patient_controller
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
-from utank_hil.analysis.bare_ship import roll_without_tank
+from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode
-from utank_hil.config_files import load_config
+from utank_hil.configuration import load_config
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry import read_recording
 

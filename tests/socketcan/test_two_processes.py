@@ -21,7 +21,7 @@ from two_processes import (
 )
 
 from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
-from utank_hil.runtime.schedule import Schedule
+from utank_hil.runtime.periodic import Schedule
 from utank_hil.telemetry import read_recording
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus import RetuningState
-from utank_hil.runtime.retuning import ModelSummary, RetuningEvent
+from utank_hil.retuning import ModelSummary, RetuningEvent
 from utank_hil.telemetry import EventReader, EventWriter, RingError, event_text
 
 finite = st.floats(allow_nan=False, allow_infinity=False)

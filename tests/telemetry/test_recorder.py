@@ -15,7 +15,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus import Mode, RetuningState
-from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import (
     EventWriter,
@@ -170,7 +170,7 @@ def test_reasons_survive_a_controller_that_is_killed(tmp_path: Path) -> None:
 import os, signal, sys
 import numpy as np
 from utank_hil.canbus import RetuningState
-from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.retuning import RetuningEvent
 from utank_hil.telemetry import EventWriter, RingWriter
 ring, events = RingWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)

@@ -7,7 +7,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus.enumerations import Fault, RetuningState
-from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import read_recording, write_recording
 

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import pytest
 
-TOOLS = Path(__file__).resolve().parents[2] / "tools"
 LIMIT_S = 280
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, str(TOOLS / arguments[0]), *arguments[1:]],
+        [sys.executable, "-m", f"tools.{arguments[0]}", *arguments[1:]],
         capture_output=True,
         text=True,
         timeout=LIMIT_S,
@@ -33,7 +32,7 @@ def answer(*arguments: str):
 @pytest.mark.slow
 def test_campaign_compares_seed_by_seed_and_draws(tmp_path: Path):
     found = answer(
-        "constrained_campaign.py", "--seeds", "2", "--seconds", "60", "--out", str(tmp_path)
+        "studies.constrained_campaign", "--seeds", "2", "--seconds", "60", "--out", str(tmp_path)
     )
     assert len(found["cases"]) >= 4
     assert (tmp_path / "campaign.png").stat().st_size > 10_000
@@ -52,7 +51,7 @@ def test_campaign_compares_seed_by_seed_and_draws(tmp_path: Path):
 
 @pytest.mark.slow
 def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passive():
-    rows = answer("share_of_possible.py", "--seeds", "2", "--seconds", "90")["rows"]
+    rows = answer("studies.share_of_possible", "--seeds", "2", "--seconds", "90")["rows"]
     passive, best = rows["passive"]["roll_rms_deg"], rows["clairvoyant"]["roll_rms_deg"]
     for name, row in rows.items():
         if "share" in row:
@@ -63,7 +62,7 @@ def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passiv
 
 @pytest.mark.slow
 def test_model_errors_change_what_the_laws_take_away():
-    found = answer("model_errors.py", "--seeds", "2", "--seconds", "60")
+    found = answer("studies.model_errors", "--seeds", "2", "--seconds", "60")
     nominal, weak = (found[name]["below_passive"] for name in ("none", "pump gain 0.8"))
     assert nominal["GPC"]["mean"] != weak["GPC"]["mean"]
     assert "GPC, designed for her" in found["roll period x 0.7"]["below_passive"]
@@ -71,7 +70,7 @@ def test_model_errors_change_what_the_laws_take_away():
 
 @pytest.mark.slow
 def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best():
-    found = answer("forecast_errors.py", "--seeds", "2", "--seconds", "900")
+    found = answer("studies.forecast_errors", "--seeds", "2", "--seconds", "900")
     errors = {
         name: [sum(column) / 2 for column in zip(*model["error_shares"], strict=True)]
         for name, model in found["models"].items()
@@ -83,14 +82,14 @@ def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best():
 
 @pytest.mark.slow
 def test_tables_of_the_linear_laws_hold_the_printed_ratios():
-    found = answer("linear_law_tables.py", "index")["index"]
+    found = answer("studies.linear_law_tables", "index")["index"]
     assert found["printed"]["GPC (roll)"] == pytest.approx(578 / 499)
     assert found["printed laws, 25.2 m²"]["GPC (roll)"] == pytest.approx(578 / 499, rel=0.01)
 
 
 @pytest.mark.slow
 def test_undelayed_linearization_without_brake_or_shift_hardly_grows():
-    found = answer("nonlinear_law_tables.py", "growth")["growth"]
+    found = answer("studies.nonlinear_law_tables", "growth")["growth"]
     assert 0 < found["first ship, kL = 0"]["ideal, 10 ms: 1/s"] < 0.01
     assert all(
         value < 0
@@ -101,7 +100,7 @@ def test_undelayed_linearization_without_brake_or_shift_hardly_grows():
 
 @pytest.mark.slow
 def test_benchmark_times_every_kind_of_controller():
-    found = answer("benchmark_controllers.py", "--steps", "100")
+    found = answer("benchmarks.controllers", "--steps", "100")
     assert {"gpc", "constrained_gpc", "fuzzy_indirect", "clipped valve"} <= set(found)
     for cost in found.values():
         assert 0 < cost["p50_us"] <= cost["p99_us"] <= cost["max_us"] < math.inf
@@ -111,11 +110,11 @@ def test_benchmark_times_every_kind_of_controller():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("share_of_possible.py", "--seeds", "1"), "--seeds must be 2 or more"),
-        (("constrained_campaign.py", "--horizon-s", "2"), "--horizon-s must be 12 or more"),
-        (("model_errors.py", "--seconds", "nan"), "--seconds must be 60 or more"),
-        (("storm_seeds.py", "nowhere.yaml"), "nowhere.yaml: can't be read"),
-        (("chapter4_contest.py", "--pump-pa", "-1"), "--pump-pa must be positive"),
+        (("studies.share_of_possible", "--seeds", "1"), "--seeds must be 2 or more"),
+        (("studies.constrained_campaign", "--horizon-s", "2"), "--horizon-s must be 12 or more"),
+        (("studies.model_errors", "--seconds", "nan"), "--seconds must be 60 or more"),
+        (("studies.storm_seeds", "nowhere.yaml"), "nowhere.yaml: can't be read"),
+        (("thesis.chapter4_contest", "--pump-pa", "-1"), "--pump-pa must be positive"),
     ],
 )
 def test_wrong_arguments_are_refused_with_the_remedy(arguments, message):

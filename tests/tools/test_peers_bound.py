@@ -3,11 +3,10 @@
 import clarabel
 import numpy as np
 import pytest
-from peers.bound_programme import bound_programme
-from peers.plan_programmes import CONTROLLER
 
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
+from tools.peers.bound_programme import bound_programme
+from tools.peers.plan_programmes import CONTROLLER
+from utank_hil.configuration import ControllerConfig, load_config
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from peers.identification_records import (
+from scipy.linalg import block_diag
+
+from tools.peers.identification_records import (
     SAMPLE_TIME_S,
     WAVE_RAD_S,
     record,
@@ -13,7 +15,6 @@ from peers.identification_records import (
     sampled_plant,
     without_mode,
 )
-from scipy.linalg import block_diag
 
 
 def plant():

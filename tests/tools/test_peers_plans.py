@@ -3,9 +3,10 @@
 import clarabel
 import numpy as np
 import pytest
-from peers import plan_programmes
-from peers.plan_programmes import ProgrammeFamily, constrained_design, constrained_law, sail
 from scipy import sparse
+
+from tools.peers import plan_programmes
+from tools.peers.plan_programmes import ProgrammeFamily, constrained_design, constrained_law, sail
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["shipped knots", "every sample"])

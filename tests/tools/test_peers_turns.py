@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from peers import peers_environment
-from peers.memory import peak_mb
-from peers.turns import in_turns, percentiles_us
 from rich.progress import Progress
+
+from tools.peers import peers_environment
+from tools.peers.memory import peak_mb
+from tools.peers.turns import in_turns, percentiles_us
 
 
 def test_each_does_all_tasks_in_order_before_the_next_does():

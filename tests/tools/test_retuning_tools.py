@@ -3,16 +3,16 @@
 import subprocess
 import sys
 
-import identification_bound
 import numpy as np
 import pytest
-from benchmark_retuning import interval
-from peers.identification_records import response, sampled_plant
-from retuned_voyages import voyages
 
 from firmware_sim.run import COLUMNS, Run
+from tools.benchmarks.retuning import interval
+from tools.peers.identification_records import response, sampled_plant
+from tools.studies import identification_bound
+from tools.studies.retuned_voyages import voyages
 from utank_hil.canbus import RetuningState
-from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.retuning import RetuningEvent
 
 
 def test_interval_of_a_count_is_that_of_the_tables() -> None:
@@ -82,14 +82,14 @@ def test_both_forms_of_the_true_model_are_the_ship_of_the_records() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("retuned_voyages.py", "nowhere.yaml"), "nowhere.yaml: can't be read"),
-        (("identification_bound.py", "--records", "0"), "--records must be 1 or more"),
-        (("benchmark_retuning.py", "--turns", "0"), "--turns must be 2 or more"),
+        (("studies.retuned_voyages", "nowhere.yaml"), "nowhere.yaml: can't be read"),
+        (("studies.identification_bound", "--records", "0"), "--records must be 1 or more"),
+        (("benchmarks.retuning", "--turns", "0"), "--turns must be 2 or more"),
     ],
 )
 def test_wrong_arguments_are_refused_with_the_remedy(arguments, message) -> None:
     done = subprocess.run(
-        [sys.executable, f"tools/{arguments[0]}", *arguments[1:]],
+        [sys.executable, "-m", f"tools.{arguments[0]}", *arguments[1:]],
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 2

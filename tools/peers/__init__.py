@@ -1,10 +1,9 @@
 """The project beside published packages, which live in an environment of their own.
 
 `make peers` makes that environment, `.cache/peers`, from `requirements.lock` here, on top of the
-project's own; `tools/compare_*.py` run in it.
+project's own; `compare_*.py` here run in it.
 """
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -23,5 +22,5 @@ def peers_environment() -> Iterator[None]:
     except ModuleNotFoundError as error:
         raise SystemExit(
             f"{error.name} is not in this environment: run `make peers`, "
-            f"then .cache/peers/bin/python {sys.argv[0]}"
+            f"then run it with .cache/peers/bin/python"
         ) from None

@@ -12,11 +12,11 @@ from unittest.mock import patch
 import numpy as np
 from scipy import sparse
 
-from peers.plan_programmes import HOUR, STORM
-from utank_hil.analysis.clairvoyant import clairvoyant_bound
-from utank_hil.analysis.loop_simulation import passive_motion
+from tools.peers.plan_programmes import HOUR, STORM
+from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
+from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.arrays import FloatArray
-from utank_hil.config import Vessel
+from utank_hil.configuration import Vessel
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
 from utank_hil.sea import EffectiveSlope, Sea, load_ndbc

@@ -3,8 +3,8 @@
 import clarabel
 import numpy as np
 
-from peers import peers_environment
-from peers.bound_programme import BoundProgramme
+from tools.peers import peers_environment
+from tools.peers.bound_programme import BoundProgramme
 from utank_hil.arrays import FloatArray
 
 with peers_environment():

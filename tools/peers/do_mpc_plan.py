@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from peers import peers_environment
-from peers.plan_programmes import Programme, ProgrammeFamily
-from utank_hil.control.constrained import ConstrainedLaw
-from utank_hil.control.constrained_design import ConstrainedDesign
+from tools.peers import peers_environment
+from tools.peers.plan_programmes import Programme, ProgrammeFamily
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.constrained.law import ConstrainedLaw
 
 with peers_environment(), warnings.catch_warnings():
     warnings.simplefilter("ignore")  # of features that were left out of its installation

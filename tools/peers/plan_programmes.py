@@ -1,7 +1,7 @@
 """Programmes of the constrained controller in the storm, set up by hand from its horizon.
 
 The shipped controller sails through the measured storm hour; each step in which a limit bends its
-plan is one programme, as `utank_hil.control.plan_programme` defines it::
+plan is one programme, as `utank_hil.control.constrained.plan_programme` defines it::
 
     minimize    1/2 z'H z + f'z + penalty (s + s^2 / 2)
     subject to  |z| <= 1,    |z_j - z_{j-1}| <= rate Ts (samples between),
@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from utank_hil.analysis.loop_simulation import TICK_S, passive_motion, simulate_loop
+from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
 from utank_hil.arrays import FloatArray
-from utank_hil.config import ControllerConfig
-from utank_hil.config_files import load_config
-from utank_hil.control.constrained import ConstrainedController, ConstrainedLaw
-from utank_hil.control.constrained_design import ConstrainedDesign
-from utank_hil.control.plan_programme import LEVEL_SPACING
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
+from utank_hil.control.constrained.plan_programme import LEVEL_SPACING
 from utank_hil.sea import EffectiveSlope, Sea, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"

@@ -12,10 +12,10 @@ import daqp
 import numpy as np
 from scipy import sparse
 
-from peers import peers_environment
-from peers.plan_programmes import Programme, ProgrammeFamily
+from tools.peers import peers_environment
+from tools.peers.plan_programmes import Programme, ProgrammeFamily
 from utank_hil.arrays import FloatArray
-from utank_hil.control.qp import ActiveSetSolver
+from utank_hil.control.constrained.active_set import ActiveSetSolver
 
 with peers_environment():
     import osqp

@@ -9,8 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from peers import peers_environment
-from peers.identification_records import Matrices
+from tools.peers import peers_environment
+from tools.peers.identification_records import Matrices
 from utank_hil.arrays import FloatArray
 
 with peers_environment():

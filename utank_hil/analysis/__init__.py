@@ -1,15 +1,22 @@
 """Analysis: what a ship, a tank and a law do, without a bus.
 
 The names below are loaded when they are first used, so that the controller process, which needs the
-margins only, gets no compiler and no plotting along. What concerns one law alone stands in modules
-of its own name: `margins`, `robustness`, `trade`, `comfort` and others.
+margins only, imports no compiler. The rooms: `loop` (margins, robustness, bounds, trade-offs),
+`motion` (statistics, decay, comfort, exceedance) and `capsize`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from utank_hil.analysis.capsize import (
+    from utank_hil.analysis.capsize.maps import CapsizeMap, capsize_map, phase_grid
+    from utank_hil.analysis.capsize.sea_stack import stacked_seas
+    from utank_hil.analysis.capsize.survival import (
+        Survival,
+        controlled_run,
+        largest_survivable_wave,
+    )
+    from utank_hil.analysis.capsize.threshold import (
         Equilibrium,
         Probability,
         Threshold,
@@ -20,16 +27,14 @@ if TYPE_CHECKING:
         safe_basin,
         without_tank,
     )
-    from utank_hil.analysis.capsize_maps import CapsizeMap, capsize_map, phase_grid
-    from utank_hil.analysis.capsize_picture import draw_capsize_maps
-    from utank_hil.analysis.comparison import Loop, compare, comparison_table
-    from utank_hil.analysis.decay import RollDecay, roll_decay
-    from utank_hil.analysis.loop_pictures import draw_bode, draw_nyquist
-    from utank_hil.analysis.record_pictures import draw_phase, draw_time
-    from utank_hil.analysis.response import ResponseAmplitude, simulated_response
-    from utank_hil.analysis.sea_stack import stacked_seas
-    from utank_hil.analysis.stimulation import StimulatedRoll, stimulate_on_still_water, tuned_tank
-    from utank_hil.analysis.survival import Survival, controlled_run, largest_survivable_wave
+    from utank_hil.analysis.loop.comparison import Loop, compare, comparison_table
+    from utank_hil.analysis.motion.decay import RollDecay, roll_decay
+    from utank_hil.analysis.motion.response import ResponseAmplitude, simulated_response
+    from utank_hil.analysis.motion.stimulation import (
+        StimulatedRoll,
+        stimulate_on_still_water,
+        tuned_tank,
+    )
 
 __all__ = [
     "CapsizeMap",
@@ -47,11 +52,6 @@ __all__ = [
     "compare",
     "comparison_table",
     "controlled_run",
-    "draw_bode",
-    "draw_capsize_maps",
-    "draw_nyquist",
-    "draw_phase",
-    "draw_time",
     "equilibria",
     "erosion",
     "largest_survivable_wave",
@@ -66,37 +66,32 @@ __all__ = [
 ]
 
 _LAZY = {
-    "CapsizeMap": "capsize_maps",
-    "Equilibrium": "capsize",
-    "Loop": "comparison",
-    "Probability": "capsize",
-    "ResponseAmplitude": "response",
-    "RollDecay": "decay",
-    "StimulatedRoll": "stimulation",
-    "Survival": "survival",
-    "Threshold": "capsize",
-    "capsize_map": "capsize_maps",
-    "capsize_probability": "capsize",
-    "capsize_threshold": "capsize",
-    "compare": "comparison",
-    "comparison_table": "comparison",
-    "controlled_run": "survival",
-    "draw_bode": "loop_pictures",
-    "draw_capsize_maps": "capsize_picture",
-    "draw_nyquist": "loop_pictures",
-    "draw_phase": "record_pictures",
-    "draw_time": "record_pictures",
-    "equilibria": "capsize",
-    "erosion": "capsize",
-    "largest_survivable_wave": "survival",
-    "phase_grid": "capsize_maps",
-    "roll_decay": "decay",
-    "safe_basin": "capsize",
-    "simulated_response": "response",
-    "stacked_seas": "sea_stack",
-    "stimulate_on_still_water": "stimulation",
-    "tuned_tank": "stimulation",
-    "without_tank": "capsize",
+    "CapsizeMap": "capsize.maps",
+    "Equilibrium": "capsize.threshold",
+    "Loop": "loop.comparison",
+    "Probability": "capsize.threshold",
+    "ResponseAmplitude": "motion.response",
+    "RollDecay": "motion.decay",
+    "StimulatedRoll": "motion.stimulation",
+    "Survival": "capsize.survival",
+    "Threshold": "capsize.threshold",
+    "capsize_map": "capsize.maps",
+    "capsize_probability": "capsize.threshold",
+    "capsize_threshold": "capsize.threshold",
+    "compare": "loop.comparison",
+    "comparison_table": "loop.comparison",
+    "controlled_run": "capsize.survival",
+    "equilibria": "capsize.threshold",
+    "erosion": "capsize.threshold",
+    "largest_survivable_wave": "capsize.survival",
+    "phase_grid": "capsize.maps",
+    "roll_decay": "motion.decay",
+    "safe_basin": "capsize.threshold",
+    "simulated_response": "motion.response",
+    "stacked_seas": "capsize.sea_stack",
+    "stimulate_on_still_water": "motion.stimulation",
+    "tuned_tank": "motion.stimulation",
+    "without_tank": "capsize.threshold",
 }
 
 

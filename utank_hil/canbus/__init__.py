@@ -36,7 +36,7 @@ from utank_hil.canbus.messages import (
 from utank_hil.canbus.port import Port, PortError
 
 if TYPE_CHECKING:
-    from utank_hil.canbus.ports import SocketCanPort
+    from utank_hil.canbus.socketcan import SocketCanPort
 
 __all__ = [
     "Address",
@@ -74,7 +74,7 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name == "SocketCanPort":
-        from utank_hil.canbus.ports import SocketCanPort
+        from utank_hil.canbus.socketcan import SocketCanPort
 
         return SocketCanPort
     msg = f"module {__name__!r} has no attribute {name!r}"

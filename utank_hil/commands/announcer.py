@@ -19,7 +19,7 @@ from rich.markup import escape
 from utank_hil.canbus import RetuningState
 from utank_hil.commands.common import notes, shown
 from utank_hil.commands.identified import IdentifiedShips
-from utank_hil.runtime.retuning import RetuningEvent
+from utank_hil.retuning import RetuningEvent
 from utank_hil.telemetry import EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5

@@ -3,16 +3,21 @@
 import json
 import math
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from utank_hil.analysis.robustness import Robustness, robustness
+from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.commands.common import Json, fail, load, notes
-from utank_hil.config import ControllerConfig, Vessel
-from utank_hil.config_files import ConfigError, kind_of
-from utank_hil.config_laws import build_law
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.configuration.files import ConfigError, kind_of
+from utank_hil.configuration.laws import build_law
+from utank_hil.configuration.vessel import Vessel
+
+GROUP = "utank_hil.collections"
+"""Entry points of further kinds of file: models with a name, vessel and mapping `controllers`."""
 
 
 def check(
@@ -26,14 +31,11 @@ def check(
 
     [bold]Example:[/bold] utank-hil check configs/controllers/gpc.yaml
     """
-    # the ship's side stands above this package: loaded only where a scenario may be needed
-    from firmware_sim.scenario import Scenario
     from utank_hil.commands import check_report as report
 
+    collections = {point.name: point.load() for point in entry_points(group=GROUP)}
     try:
-        kind = kind_of(
-            config, {"controller": ControllerConfig, "scenario": Scenario, "ship": Vessel}
-        )
+        kind = kind_of(config, {"controller": ControllerConfig, "ship": Vessel, **collections})
     except ConfigError as error:
         fail(error)
     if kind == "ship":
@@ -41,12 +43,12 @@ def check(
         content = report.ship_json(vessel)
         if not json_:
             report.print_ship(vessel)
-    elif kind == "scenario":
-        scenario = load(config, Scenario)
-        judged = {name: (each, judge(each)) for name, each in scenario.controllers.items()}
-        content = report.scenario_json(scenario.name, scenario.vessel, judged)
+    elif kind in collections:
+        collection = load(config, collections[kind])
+        judged = {name: (each, judge(each)) for name, each in collection.controllers.items()}
+        content = report.collection_json(collection.name, collection.vessel, judged)
         if not json_:
-            report.print_scenario(scenario.name, scenario.vessel, judged)
+            report.print_collection(kind, collection.name, collection.vessel, judged)
     else:
         controller = load(config, ControllerConfig)
         robust = judge(controller)

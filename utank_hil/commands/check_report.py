@@ -9,12 +9,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.analysis.margins import DELAY_SAMPLES, Margins
-from utank_hil.analysis.robustness import Robustness
+from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
+from utank_hil.analysis.loop.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.commands.tables import print_table
-from utank_hil.config import ControllerConfig, Vessel
-from utank_hil.config_laws import ADAPTIVE, NONLINEAR, build_law
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.configuration.laws import ADAPTIVE, NONLINEAR, build_law
+from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
 
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
@@ -41,8 +42,8 @@ def controller_json(config: ControllerConfig, report: Robustness | None) -> dict
     }
 
 
-def scenario_json(name: str, vessel: Vessel, judged: Judged) -> dict[str, Any]:
-    """A scenario with its controllers as one JSON object."""
+def collection_json(name: str, vessel: Vessel, judged: Judged) -> dict[str, Any]:
+    """A file of several controllers, a scenario for one, as one JSON object."""
     controllers = {name: controller_json(*each) for name, each in judged.items()}
     return {
         "name": name,
@@ -137,10 +138,10 @@ def print_controller(config: ControllerConfig, report: Robustness | None) -> Non
         console.print(_met(config))
 
 
-def print_scenario(name: str, vessel: Vessel, judged: Judged) -> None:
-    """Print the margins of all controllers of a scenario."""
+def print_collection(kind: str, name: str, vessel: Vessel, judged: Judged) -> None:
+    """Print the margins of all controllers of a file."""
     console = Console(highlight=False)
-    console.print(f"{name}, {vessel.name}: the scenario is valid.")
+    console.print(f"{name}, {vessel.name}: the {kind} is valid.")
     table = Table(title="Margins, delay and pump lag included")
     table.add_column("", no_wrap=True)
     for heading in (

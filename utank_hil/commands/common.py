@@ -11,8 +11,9 @@ import typer
 from pydantic import BaseModel
 from rich.console import Console
 from rich.markup import escape
+from typer.core import TyperGroup
 
-from utank_hil.config_files import ConfigError, load_config
+from utank_hil.configuration.files import ConfigError, load_config
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -35,9 +36,10 @@ Duration = Annotated[
 notes: Final = Console(stderr=True, highlight=False)
 
 
-def new_app(help_text: str) -> typer.Typer:
+def new_app(help_text: str | None = None, cls: type[TyperGroup] = TyperGroup) -> typer.Typer:
     """A command line in the project's style."""
     return typer.Typer(
+        cls=cls,
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,

@@ -7,10 +7,10 @@ from typing import Any, Final
 import yaml
 
 from utank_hil.commands.stamps import claimed_files
-from utank_hil.config import Vessel
+from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.runtime.retuning import ModelSummary
+from utank_hil.retuning import ModelSummary
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"
@@ -119,7 +119,7 @@ def _vessel_content(vessel: Vessel) -> dict[str, Any]:
 
 
 def _with_whole_paths(value: Any, folder: Path) -> Any:
-    """Content of a file in `folder` as it can stand in another: see `utank_hil.config_files`."""
+    """Content of a file in `folder` as it can stand in another (`configuration.files`)."""
     if isinstance(value, dict):
         return {key: _with_whole_paths(item, folder) for key, item in value.items()}
     if isinstance(value, list):

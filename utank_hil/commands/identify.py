@@ -9,8 +9,6 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from utank_hil.analysis.logged_samples import logged_samples
-from utank_hil.analysis.retune import RetuningTask, identify, judge
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out
 from utank_hil.commands.identified import (
     CONTROLLER,
@@ -19,11 +17,13 @@ from utank_hil.commands.identified import (
     write_identified,
 )
 from utank_hil.commands.identify_report import figures, print_report
-from utank_hil.config import ControllerConfig
+from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.control import PredictiveDesign
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.acceptance import ModelLimits
-from utank_hil.runtime.retuning import Candidate
+from utank_hil.identification.logged_samples import logged_samples
+from utank_hil.retuning import Candidate
+from utank_hil.retuning.redesign import RetuningTask, identify, judge
 
 ANY_PERIOD_S = (1.0, 60.0)
 PICTURE = "identification.png"
@@ -52,7 +52,7 @@ def identify_log(
 
     [bold]Example:[/bold] utank-hil identify out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
-    from utank_hil.analysis.identification_picture import draw_identification
+    from utank_hil.pictures.identification import draw_identification
     from utank_hil.telemetry import read_recording
 
     for option, value in (("--from", from_s), ("--to", to_s)):

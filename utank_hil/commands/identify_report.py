@@ -10,7 +10,6 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from utank_hil.analysis.retune import Identification, RetuningTask
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import shown
 from utank_hil.commands.tables import print_table
@@ -18,7 +17,8 @@ from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification import IdentificationError, ModeConfidence, mode_confidence
-from utank_hil.runtime.retuning import Answer, Candidate
+from utank_hil.retuning import Answer, Candidate
+from utank_hil.retuning.redesign import Identification, RetuningTask
 
 STATES: Final = 4
 QUANTILE: Final = 1.96

@@ -10,7 +10,7 @@ import typer
 
 from utank_hil.canbus import SocketCanPort, load_catalogue
 from utank_hil.commands.common import Duration, fail, load, notes
-from utank_hil.config import Vessel
+from utank_hil.configuration.vessel import Vessel
 from utank_hil.runtime import RealTimeLoop, stop_on_signals
 from utank_hil.runtime.panel import Action, OperatorPanel
 

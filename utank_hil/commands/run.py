@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from utank_hil.analysis.retune import retuner_work
+from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.check import refuse_low_margins
@@ -20,15 +20,14 @@ from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
-from utank_hil.config import ControllerConfig
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
     RealTimeLoop,
     real_time_scheduling,
     stop_on_signals,
 )
-from utank_hil.runtime.assembly import build_controller_node
-from utank_hil.runtime.retuning import RetunerProcess
 from utank_hil.telemetry import event_text, open_viewer
 
 

@@ -8,7 +8,7 @@ inertia and +-20 % of gain.
 
 from typing import Final
 
-from utank_hil.control.ship_design import PredictiveDesign, Predictor
+from utank_hil.control.predictive.design import PredictiveDesign, Predictor
 
 GPC_ROLL: Final = PredictiveDesign(
     kind="gpc",

@@ -73,7 +73,7 @@ class LinearLaw(Protocol):
     """A linear law from outputs y to command u, in the timing of `utank_hil.control.arx`.
 
     u(k) is made from y(k-1), y(k-2), ...: the transfer matrix is strictly proper. What design
-    functions of linear controllers return, and what `utank_hil.analysis.margins` looks at.
+    functions of linear controllers return, and what `utank_hil.analysis.loop.margins` looks at.
     """
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
-from utank_hil.control.ship_design import Predictor, washed, wave_plant, weight_problems
+from utank_hil.control.predictive.design import Predictor, washed, wave_plant, weight_problems
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

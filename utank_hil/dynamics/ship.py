@@ -6,6 +6,10 @@ from typing import Annotated
 
 from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
 
+RollLimit = Annotated[float, Range(above=0, most=0.7)]
+"""Roll at which something is given up: 0.7 rad at most, 40 degrees, to which the IS Code 2008
+(part A, 2.2.1) counts a ship's righting levers."""
+
 _MOST = 1e30  # far beyond any ship, and what designs compute from it stays finite
 
 

@@ -1,7 +1,7 @@
 """Whether an identified model may be believed: what speaks against it, in words.
 
 The model is judged on data it was not made from, and against what is known of the ship. Whether the
-law made with it is good is judged elsewhere (`utank_hil.analysis.retune`).
+law made with it is good is judged elsewhere (`utank_hil.retuning.redesign`).
 """
 
 import math

@@ -31,7 +31,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.control.ship_design import pump_model
+from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

@@ -24,11 +24,11 @@ from utank_hil.canbus import (
 from utank_hil.control.interface import Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
+from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.retuning.adaptive import AdaptiveController, RetuningEvent
-from utank_hil.runtime.schedule import Schedule
+from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Observations, Supervisor

@@ -10,7 +10,7 @@ from utank_hil.canbus import (
     Heartbeat,
     NodeState,
 )
-from utank_hil.runtime.schedule import Schedule
+from utank_hil.runtime.periodic import Schedule
 
 HEARTBEAT_PERIOD_NS = 100_000_000
 NANOSECONDS = 1e-9

@@ -12,6 +12,7 @@ from enum import Enum
 from typing import Annotated, Final
 
 from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.dynamics.ship import RollLimit
 from utank_hil.parameters import Range, range_problems, refuse
 from utank_hil.runtime import faults
 from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
@@ -19,8 +20,6 @@ from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 NEVER_NS = 1 << 62
 """Age of something that was never heard."""
 
-RollLimit = Annotated[float, Range(above=0, most=0.7)]
-"""Roll at which something is given up; why not more, see `SafetyLimits`."""
 _HeelLimit = Annotated[float, Range(above=0, most=0.28)]
 _Silence = Annotated[float, Range(above=0, most=1000)]
 _Patience = Annotated[float, Range(above=0, most=10_000)]

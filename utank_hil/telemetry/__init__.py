@@ -1,6 +1,6 @@
-"""Telemetry: a shared-memory ring out of the loop, Rerun recordings, a live view and pictures.
+"""Telemetry: a shared-memory ring out of the loop, Rerun recordings and a live view.
 
-The ring is light and may be imported by the controller process. What needs Rerun or matplotlib is
+The ring is light and may be imported by the controller process. What needs Rerun is
 loaded when its name is first used; so is the recorder, which is also run as a module.
 """
 
@@ -12,12 +12,10 @@ from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
 from utank_hil.telemetry.viewer import Viewer, open_viewer
 
 if TYPE_CHECKING:
-    from utank_hil.telemetry.picture import BenchCurve, draw_bench
     from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
     from utank_hil.telemetry.recording import read_recording, write_recording
 
 __all__ = [
-    "BenchCurve",
     "EventReader",
     "EventWriter",
     "RecorderError",
@@ -27,7 +25,6 @@ __all__ = [
     "RingReader",
     "RingWriter",
     "Viewer",
-    "draw_bench",
     "event_text",
     "open_viewer",
     "read_recording",
@@ -35,11 +32,9 @@ __all__ = [
 ]
 
 _LAZY = {
-    "BenchCurve": "picture",
     "RecorderError": "recorder",
     "RecorderProcess": "recorder",
     "RecorderReport": "recorder",
-    "draw_bench": "picture",
     "read_recording": "recording",
     "write_recording": "recording",
 }

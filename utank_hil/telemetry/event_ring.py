@@ -13,8 +13,8 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
 from utank_hil.closing import Closing
-from utank_hil.runtime.retuning.adaptive import RetuningEvent
-from utank_hil.runtime.retuning.answer import ModelSummary
+from utank_hil.retuning.adaptive import RetuningEvent
+from utank_hil.retuning.answer import ModelSummary
 from utank_hil.telemetry.ring import RingReader, RingWriter
 
 _TEXT_WORDS: Final = 1024

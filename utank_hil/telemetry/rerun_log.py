@@ -18,7 +18,7 @@ import rerun as rr
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
-from utank_hil.runtime.retuning.adaptive import RetuningEvent
+from utank_hil.retuning.adaptive import RetuningEvent
 from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.units import field_of
 

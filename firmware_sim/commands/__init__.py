@@ -1,0 +1,1 @@
+"""Commands that drive a bench; they join the command line by entry points."""

@@ -1,0 +1,147 @@
+"""``utank-hil bench``: a controller quiets a rolling ship."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from utank_hil.commands.check import refuse_low_margins
+from utank_hil.commands.common import (
+    CONFIGS,
+    OUT,
+    Duration,
+    Json,
+    View,
+    fail,
+    load,
+    notes,
+    prepare_out,
+    shown,
+)
+from utank_hil.commands.tables import print_table
+from utank_hil.commands.timing import timing_table
+
+STORM = CONFIGS / "scenarios" / "storm.yaml"
+REAL_TIME_S = 120.0
+
+
+def bench(
+    scenario: Annotated[
+        Path, typer.Argument(help="Scenario file.", show_default="the measured storm")
+    ] = STORM,
+    real_time: Annotated[
+        bool,
+        typer.Option(
+            "--realtime/--lockstep", help="Real time, or simulated time as fast as it goes."
+        ),
+    ] = False,
+    bus: Annotated[
+        str | None,
+        typer.Option(
+            help="SocketCAN interface for real time; without it all nodes share one process."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
+    ] = None,
+    duration: Duration = None,
+    out: Annotated[Path, typer.Option(help="Folder for picture, recording and figures.")] = OUT,
+    json_: Json = False,
+    view: View = False,
+) -> None:
+    """Run a scenario: the tank passive, then with each controller, in the same waves.
+
+    [bold]Example:[/bold] utank-hil bench --seed 7 --duration 600
+
+    In real time each run lasts its duration; without [bold]--duration[/bold] that is 120 s.
+    """
+    # loaded when it runs: `--help` needs none of it
+    from firmware_sim.bench import BenchOptions, run_bench
+    from firmware_sim.on_board import on_board_table
+    from firmware_sim.report import (
+        REPORT_FILES,
+        as_json,
+        endings,
+        motion_table,
+        pump_table,
+        retuning_table,
+        write_report,
+    )
+    from firmware_sim.scenario import Scenario
+
+    if bus is not None and not real_time:
+        fail("--bus is for real time: add --realtime, or leave --bus out")
+    loaded = load(scenario, Scenario)
+    for controller in loaded.controllers.values():
+        refuse_low_margins(controller)
+    prepare_out(out, REPORT_FILES)
+    if real_time and duration is None:
+        duration = min(loaded.duration_s, REAL_TIME_S)
+    options = BenchOptions(real_time, bus, seed, duration)
+    length_s = loaded.duration_s if duration is None else duration
+    bar = Progress(
+        TextColumn("{task.description:>10}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
+        TimeRemainingColumn(),
+        console=notes,
+        disable=not notes.is_terminal,
+    )
+    with bar:
+        tasks = {
+            name: bar.add_task(name, total=length_s) for name in ("passive", *loaded.controllers)
+        }
+        try:
+            result = run_bench(
+                loaded, options, lambda name, done: bar.update(tasks[name], completed=done)
+            )
+        except OSError as error:
+            fail(error)
+    files, failures = write_report(result, out)
+    if json_:
+        sys.stdout.write(json.dumps(as_json(result, files)) + "\n")
+    else:
+        console = Console()
+        print_table(console, motion_table(result))
+        print_table(console, pump_table(result))
+        print_table(console, on_board_table(result))
+        retuning = retuning_table(result)
+        if retuning is not None:
+            print_table(console, retuning)
+        for ending in endings(result):
+            console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
+        loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
+        if loops:
+            print_table(console, timing_table(loops))
+        else:
+            simulated_s = sum(run.end_s for run in result.runs)
+            console.print(
+                f"Simulated {len(result.runs)} runs, {simulated_s:.0f} s in all, in "
+                f"{result.wall_s:.1f} s, {simulated_s / result.wall_s:.0f} times real time; "
+                "no deadlines there."
+            )
+        for name, path in files.items():
+            console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+    if failures:
+        fail("; ".join(failures))
+    if view:
+        show(files["recording"])
+
+
+def show(source: Path | str) -> None:
+    """Open the viewer and wait until it is closed, or Ctrl-C."""
+    from utank_hil.telemetry import open_viewer
+
+    with open_viewer(source) as viewer:
+        if viewer.url is not None:
+            notes.print(f"Open {viewer.url} in a browser; Ctrl-C ends the viewer.", soft_wrap=True)
+        try:
+            viewer.wait()
+        except KeyboardInterrupt:
+            notes.print("viewer closed")

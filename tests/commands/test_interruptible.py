@@ -1,0 +1,47 @@
+"""Ctrl-C while the command line loads."""
+
+import signal
+import subprocess
+import sys
+
+from utank_hil.commands.interruptible import quietly_interruptible
+
+LOADING = """
+import time
+from utank_hil.commands.interruptible import quietly_interruptible
+with quietly_interruptible():
+    print("loading", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_interrupt_ends_it_at_once_and_without_a_traceback() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", LOADING],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a shell's background job ignores it, and its children with it
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGINT
+    assert errors == ""
+
+
+def test_handlers_are_as_before_and_others_are_left_alone() -> None:
+    found = signal.getsignal(signal.SIGINT)
+    try:
+        for handler, meanwhile in (
+            (signal.default_int_handler, signal.SIG_DFL),
+            (signal.SIG_IGN, signal.SIG_IGN),
+        ):
+            signal.signal(signal.SIGINT, handler)
+            with quietly_interruptible():
+                assert signal.getsignal(signal.SIGINT) is meanwhile
+            assert signal.getsignal(signal.SIGINT) is handler
+    finally:
+        signal.signal(signal.SIGINT, found)

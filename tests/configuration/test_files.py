@@ -1,0 +1,161 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel, Field
+
+from utank_hil.configuration import ConfigError, Section, load_config
+from utank_hil.configuration.files import kind_of
+
+
+class Ship(Section):
+    length_m: float = Field(gt=0)
+    name: str
+
+
+class Scenario(Section):
+    ship: Ship
+    duration_s: float = Field(gt=0)
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_file_named_in_another_stands_for_its_content(tmp_path: Path) -> None:
+    write(tmp_path, "ships/a.yaml", "length_m: 20\nname: A\n")
+    top = write(tmp_path, "scenarios/top.yaml", "ship: ../ships/a.yaml\nduration_s: 10\n")
+    scenario = load_config(top, Scenario)
+    assert scenario.ship.length_m == 20
+
+
+def test_every_problem_is_listed_with_the_file_and_key_where_it_stands(tmp_path: Path) -> None:
+    write(tmp_path, "ships/a.yaml", "length_m: -3\ncolour: red\n")
+    top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: soon\n")
+    with pytest.raises(ConfigError) as caught:
+        load_config(top, Scenario)
+    found = {(problem.file.name, problem.key) for problem in caught.value.problems}
+    assert found == {
+        ("a.yaml", "length_m"),
+        ("a.yaml", "colour"),
+        ("a.yaml", "name"),
+        ("top.yaml", "duration_s"),
+    }
+    assert "(got -3)" in str(caught.value)
+
+
+def test_missing_file_is_named_at_the_key_that_names_it(tmp_path: Path) -> None:
+    top = write(tmp_path, "top.yaml", "ship: nowhere.yaml\nduration_s: 1\n")
+    with pytest.raises(ConfigError, match=r"top\.yaml: ship: names .*nowhere\.yaml"):
+        load_config(top, Scenario)
+
+
+def problems(path: Path, model: type[BaseModel] = Scenario) -> list[tuple[str, str, str]]:
+    """File name, key and reason of all problems of a file."""
+    with pytest.raises(ConfigError) as caught:
+        load_config(path, model)
+    return [(each.file.name, each.key, each.reason) for each in caught.value.problems]
+
+
+def test_missing_file_hides_nothing_but_what_it_was_to_hold(tmp_path: Path) -> None:
+    top = write(tmp_path, "top.yaml", "ship: nowhere.yaml\nduration_s: -1\n")
+    assert {key for _, key, _ in problems(top)} == {"ship", "duration_s"}
+
+
+def test_missing_file_is_a_problem_even_where_nothing_is_required(tmp_path: Path) -> None:
+    class Optional(Section):
+        ship: dict[str, float] = Field(default_factory=dict)
+
+    top = write(tmp_path, "top.yaml", "ship: nowhere.yaml\n")
+    ((_, key, _),) = problems(top, Optional)
+    assert key == "ship"
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "reason"),
+    [
+        ("duration_s: 1\nduration_s: 2\n", "duration_s", "written twice, in lines 1 and 2"),
+        ("ship: {name: A,\n  length_m: 1, name: B}\n", "ship.name", "in lines 1 and 2"),
+        ("ship: {name: A, length_m: 1}\nyes: 3\n", "yes", "is read as a bool and not as a name"),
+        ("? [1, 2]\n: 3\n", "", "line 1, column 3: found unhashable key"),
+        ("ship: &a {name: *a}\n", "", "an alias (*) names what it stands in"),
+        ("ship: 2019-13-45\n", "", "line 1, column 7: month must be in 1..12; put text in quotes"),
+        ("ship: !!int x\n", "", "put text in quotes"),
+        ("[" * 5000, "", "nested too deeply"),
+        ("ship: {name: A\n", "", "is not valid YAML in line 2, column 1"),
+        ("a: 1\n--- \nb: 2\n", "", "is not valid YAML"),
+        ("ship: \x07", "", "is not valid YAML"),
+        ("shp: 1\n", "shp", "did you mean ship?"),
+        ("ship: {nam: A}\n", "ship.nam", "did you mean name?"),
+        ('ship: "\\0.yaml"\n', "ship", "can't be read"),
+        (f"ship: {'x' * 300}.yaml\n", "ship", "can't be read: File name too long"),
+    ],
+)  # fmt: skip
+def test_what_plain_yaml_passes_over_is_told(
+    tmp_path: Path, text: str, key: str, reason: str
+) -> None:
+    top = write(tmp_path, "top.yaml", text)
+    assert any(at == key and reason in why for _, at, why in problems(top)), problems(top)
+
+
+def test_merged_keys_may_be_written_again(tmp_path: Path) -> None:
+    class Fleet(Section):
+        first: Ship
+        second: Ship
+
+    text = "first: &a {name: A, length_m: 1}\nsecond: {<<: *a, name: B}\n"
+    fleet = load_config(write(tmp_path, "fleet.yaml", text), Fleet)
+    assert (fleet.second.name, fleet.second.length_m) == ("B", 1)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(alphabet="ship: duration_s\n{}[]&*<?-!|>'\"\\0129.,#%@`~é", max_size=60))
+def test_any_text_loads_or_is_told_what_is_wrong(tmp_path: Path, text: str) -> None:
+    path = write(tmp_path, "any.yaml", text)
+    try:
+        load_config(path, Scenario)
+    except ConfigError as error:
+        assert all(problem.file == path for problem in error.problems)  # noqa: PT017
+
+
+def test_kind_is_told_by_the_keys_that_no_other_has(tmp_path: Path) -> None:
+    kinds: dict[str, type[BaseModel]] = {"ship": Ship, "scenario": Scenario}
+    assert kind_of(write(tmp_path, "a.yaml", "length_m: wrong\ncolour: 1\n"), kinds) == "ship"
+    assert kind_of(write(tmp_path, "b.yaml", "ship: a.yaml\n"), kinds) == "scenario"
+    for text in ("colour: red\n", "length_m: 1\nship: 2\n"):
+        with pytest.raises(ConfigError, match="a ship has length_m, name; a scenario has"):
+            kind_of(write(tmp_path, "c.yaml", text), kinds)
+    with pytest.raises(ConfigError, match="can't be read"):
+        kind_of(tmp_path / "nowhere.yaml", kinds)
+
+
+def test_files_that_include_each_other_are_refused(tmp_path: Path) -> None:
+    write(tmp_path, "a.yaml", "ship: b.yaml\n")
+    write(tmp_path, "b.yaml", "ship: a.yaml\n")
+    with pytest.raises(ConfigError, match="includes itself"):
+        load_config(tmp_path / "a.yaml", Scenario)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("- 1\n", "mapping"), ("a: [", "not valid YAML"), ("", "mapping")],
+)
+def test_what_is_no_mapping_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    with pytest.raises(ConfigError, match=reason):
+        load_config(write(tmp_path, "bad.yaml", text), Scenario)
+
+
+def test_not_a_number_is_no_value(tmp_path: Path) -> None:
+    top = write(tmp_path, "top.yaml", "ship: {length_m: 1, name: A}\nduration_s: .nan\n")
+    with pytest.raises(ConfigError, match="duration_s"):
+        load_config(top, Scenario)
+
+
+def test_path_of_a_data_file_is_relative_to_the_file_that_names_it(tmp_path: Path) -> None:
+    write(tmp_path, "ships/a.yaml", "length_m: 20\nname: ./data.txt\n")
+    top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: 10\n")
+    assert load_config(top, Scenario).ship.name == str(tmp_path / "ships" / "data.txt")

@@ -1,0 +1,115 @@
+"""The configuration files of the project are fit to be used."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.drive import DriveLimits
+from firmware_sim.scenario import Scenario
+from firmware_sim.sensors import SensorErrors
+from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Mode
+from utank_hil.configuration import ControllerConfig, Vessel, load_config
+from utank_hil.configuration.laws import LQGLaw, RobustFuzzyLaw, build_law
+from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
+from utank_hil.dynamics.linear import STATES
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.runtime.signals import SIGNALS
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+CONTROLLERS = sorted((CONFIGS / "controllers").glob("*.yaml"))
+SEA_OF = {
+    "Thesis ship 1": "storm.yaml",
+    "Naval vessel": "naval_vessel.yaml",
+    "Patti-B": "patti_b.yaml",
+}
+"""A scenario for each ship, by her name."""
+SECOND_NS = 1_000_000_000
+
+
+@pytest.mark.parametrize("path", sorted((CONFIGS / "ships").glob("*.yaml")), ids=lambda p: p.stem)
+def test_ship_loads(path: Path) -> None:
+    assert load_config(path, Vessel).ship.natural_frequency_rad_s > 0
+
+
+@pytest.mark.parametrize(
+    "path", sorted((CONFIGS / "scenarios").glob("*.yaml")), ids=lambda p: p.stem
+)
+def test_scenario_loads(path: Path) -> None:
+    assert load_config(path, Scenario).controllers
+
+
+def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> None:
+    first = load_config(CONFIGS / "scenarios" / "storm.yaml", Scenario)
+    assert first.drive == DriveLimits()
+    assert first.sensors == SensorErrors()
+    naval = load_config(CONFIGS / "scenarios" / "naval_vessel.yaml", Scenario)
+    assert naval.drive.pressure_pa == naval.vessel.pump.max_pressure_pa
+    for controller in naval.controllers.values():
+        assert controller.limits.level_m < naval.sensors.high_level_m
+    assert naval.sensors.high_level_m < naval.vessel.tank.level_limit_m
+
+
+def test_files_hold_the_default_designs() -> None:
+    def law(name: str) -> object:
+        return load_config(CONFIGS / "controllers" / name, ControllerConfig).law
+
+    assert law("gpc.yaml") == GPC_ROLL
+    assert law("dpc.yaml") == DPC_ROLL_LEVEL
+    lqg = law("lqg.yaml")
+    assert isinstance(lqg, LQGLaw)
+    assert lqg.design == LQG_ROLL_RATE_LEVEL
+
+
+@pytest.mark.parametrize("path", CONTROLLERS, ids=lambda p: p.stem)
+def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path) -> None:
+    config = load_config(path, ControllerConfig)
+    scenario = load_config(CONFIGS / "scenarios" / SEA_OF[config.vessel.name], Scenario)
+    assert scenario.vessel == config.vessel
+    ship = build_ship_side(scenario, 1, (TimedAction(2.0, Action.ARM),))
+    pressures: list[float] = []
+    node = build_controller_node(config, sink=lambda row: pressures.append(row[5]))
+    lockstep = Lockstep([*ship.nodes, node])
+    lockstep.run_until(30 * SECOND_NS)
+    assert node.mode is Mode.ACTIVE
+    assert np.ptp(pressures) > 10.0
+    assert ship.drive.refused == 0
+
+
+def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s: int) -> float:
+    """Measured roll, the first minute left out, with a controller or with the tank alone."""
+    controller = config or next(iter(scenario.controllers.values()))
+    script = PASSIVE_SCRIPT if config is None else scenario.operator
+    roll_rad: list[float] = []
+    at = SIGNALS.index("roll_rad")
+    node = build_controller_node(controller, sink=lambda row: roll_rad.append(row[at]))
+    lockstep = Lockstep([*build_ship_side(scenario, scenario.seed, script).nodes, node])
+    lockstep.run_until(duration_s * SECOND_NS)
+    assert node.mode is (Mode.PASSIVE if config is None else Mode.ACTIVE)
+    return float(np.std(roll_rad[6000:]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "below"), [("naval_vessel", 0.15), ("patti_b", 0.2)])
+def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
+    name: str, below: float
+) -> None:
+    scenario = load_config(CONFIGS / "scenarios" / f"{name}.yaml", Scenario)
+    passive = roll_rms_rad(scenario, None, 400)
+    for config in scenario.controllers.values():
+        assert roll_rms_rad(scenario, config, 400) < (1 - below) * passive
+
+
+@pytest.mark.parametrize("inputs", [2, 3, 4])
+def test_fuzzy_law_measures_what_it_has_ranges_for(inputs: int) -> None:
+    config = load_config(CONFIGS / "controllers" / "fuzzy_robust.yaml", ControllerConfig)
+    assert isinstance(config.law, RobustFuzzyLaw)
+    design = replace(config.law.design, ranges=config.law.design.ranges[:inputs])
+    law = config.law.model_copy(update={"design": design})
+    built = build_law(law, config.vessel, config.delay_s, config.limits)
+    assert built.measured == STATES[:inputs]
+    assert built.controller.step(np.full(inputs, 0.1)).shape == (1,)

@@ -1,0 +1,110 @@
+"""The ship's constrained law in its loop: limits, heel, and what the sea's model is good for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
+from utank_hil.control import PumpLimits
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics.linear import coupled_model
+from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
+
+SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
+TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
+SPECTRUM = jonswap(4.7, 10.0)
+DESIGN = ConstrainedDesign(
+    "constrained_gpc", SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density))
+)
+LIMITS = PumpLimits(level_m=4.0)
+UNGUARDED = PumpLimits(level_m=100.0)  # nothing but pressure and rate behind the law
+
+
+def rms(signal) -> float:
+    return float(np.sqrt(np.mean(np.square(signal))))
+
+
+def storm(seconds: float, scale: float = 1.0):
+    moment = Sea.irregular(SPECTRUM, 3, components=128).roll_moment(
+        scale * SHIP.stiffness_nm_rad, EffectiveSlope(0.5)
+    )
+    return passive_motion(SHIP, TANK, moment, TICK_S, round(seconds / TICK_S) + 1)
+
+
+def run(design, waves, limits=LIMITS, behind=UNGUARDED):
+    controller = design.law(SHIP, TANK, limits=limits).controller()
+    result = simulate_loop(SHIP, TANK, waves, controller, design.measured, behind, seed=1)
+    return result, controller
+
+
+def test_in_a_storm_the_roll_is_much_less_than_passive_and_level_and_pressure_keep_their_limits():
+    waves = storm(300.0)
+    result, controller = run(DESIGN, waves)
+    assert rms(result.motion[:, 0]) < 0.8 * rms(waves[:, 0])
+    assert np.abs(result.motion[:, 2]).max() < LIMITS.level_m + 0.2
+    assert np.abs(result.command_pa).max() <= LIMITS.pressure_pa
+    assert controller.fallbacks == 0
+
+
+def test_a_power_limit_is_kept_and_costs_roll():
+    waves = storm(200.0)
+    free, _ = run(DESIGN, waves)
+    limited, _ = run(DESIGN, waves, dataclasses.replace(LIMITS, power_w=4e5))
+
+    def power(result):
+        return result.pressure_pa * TANK.reservoir_area_m2 * result.motion[:, 3]
+
+    assert power(free).max() > 8e5
+    # the speed that the last plan foresaw is not quite the one that comes
+    assert np.quantile(power(limited), 0.999) < 1.2 * 4e5
+    assert rms(limited.motion[:, 0]) > rms(free.motion[:, 0])
+
+
+def heeled(slope_rad: float, seconds: float):
+    moment = Harmonics(np.array([slope_rad * SHIP.stiffness_nm_rad]), np.zeros(1), np.zeros(1))
+    return passive_motion(SHIP, TANK, moment, TICK_S, round(seconds / TICK_S) + 1)
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.0, 1.0), (0.5, 0.5), (1.0, 0.0)])
+def test_of_a_steady_heel_the_tank_takes_out_the_share_asked_for(share, left):
+    design = dataclasses.replace(DESIGN, heel_share=share)
+    waves = heeled(0.005, 400.0)
+    result, _ = run(design, waves)
+    end = slice(-2000, None)
+    passive = np.linalg.solve(coupled_model(SHIP, TANK).A, -coupled_model(SHIP, TANK).B[:, 1])[0]
+    passive *= 0.005 * SHIP.stiffness_nm_rad
+    assert result.motion[end, 0].mean() == pytest.approx(left * passive, abs=0.05 * passive)
+    if share == 0:
+        assert abs(result.pressure_pa[end].mean()) < 500.0
+
+
+def test_level_that_a_heel_brings_is_known_to_the_level_limit():
+    waves = storm(300.0, 0.7) + heeled(0.03, 300.0)
+    result, _ = run(DESIGN, waves)
+    assert np.abs(result.motion[10_000:, 2]).max() < LIMITS.level_m + 0.2
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"measured": ("roll_rad",), "measurement_std": (1e-3,)},
+        {"measured": ("pitch", "level_m", "roll_rad")},
+        {"measurement_std": (1e-3, 1e-3)},
+        {"pressure_weight_rad2": 0.0},
+        {"level_margin_m": -0.1},
+        {"heel_share": 1.5},
+        {"heel_time_s": 0.0},
+        {"slope_noise_rad_rt_s": -1.0},
+    ],
+)
+def test_bad_values_are_refused_by_name(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        dataclasses.replace(DESIGN, **bad)
+
+
+def test_a_margin_that_leaves_no_level_is_refused():
+    with pytest.raises(ValueError, match="level_margin_m"):
+        dataclasses.replace(DESIGN, level_margin_m=4.0).law(SHIP, TANK, limits=LIMITS)

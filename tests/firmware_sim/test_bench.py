@@ -1,0 +1,328 @@
+import dataclasses
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim import report
+from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
+from firmware_sim.on_board import on_board, on_board_table
+from firmware_sim.place import Place
+from firmware_sim.report import as_json, endings, figures, motion_table, write_report
+from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
+from firmware_sim.scenario import Scenario
+from utank_hil.analysis.motion.bare_ship import roll_without_tank
+from utank_hil.canbus import Mode
+from utank_hil.configuration import load_config
+from utank_hil.configuration.laws import PassiveLaw
+from utank_hil.pictures import BenchCurve
+from utank_hil.telemetry import read_recording
+
+STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+DURATION_S = 120.0
+SETTLE_S = 40.0
+
+
+@pytest.fixture(scope="module")
+def storm() -> tuple[BenchResult, list[tuple[str, float]]]:
+    progress: list[tuple[str, float]] = []
+    result = run_bench(
+        STORM.model_copy(update={"settle_s": SETTLE_S}),
+        BenchOptions(duration_s=DURATION_S),
+        lambda name, done_s: progress.append((name, done_s)),
+    )
+    return result, progress
+
+
+def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(storm) -> None:
+    result, progress = storm
+    assert [run.name for run in result.runs] == ["passive", *STORM.controllers]
+    for run in result.runs:
+        assert run.rows.shape == (round(DURATION_S / RECORD_S), len(COLUMNS))
+        np.testing.assert_allclose(np.diff(run.column("time_s")), RECORD_S, atol=1e-9)
+        assert np.isfinite(run.rows).all()
+        assert run.refused_commands == 0
+    assert (result.duration_s, result.not_run, result.interrupted) == (DURATION_S, (), False)
+    assert (result.settle_s, result.end_s) == pytest.approx((SETTLE_S, DURATION_S))
+    assert len(result.without_tank_rad) == len(result.runs[0].rows)
+    assert endings(result) == []
+    assert {name for name, _ in progress} == {run.name for run in result.runs}
+    assert max(done_s for _, done_s in progress) <= DURATION_S
+
+
+def test_people_on_board_are_judged_over_the_window_and_stand_in_the_json(storm) -> None:
+    result, _ = storm
+    told = as_json(result, {})["on_board"]
+    assert list(told["runs"]) == ["no tank", *(run.name for run in result.runs)]
+    assert told["place"] == {"height_m": 4.88 + 4.88 - 1.83, "starboard_m": 8.55}
+    roll = result.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
+    expected = on_board(roll, RECORD_S, Place(**told["place"]))
+    assert told["runs"][result.runs[1].name] == dataclasses.asdict(expected)
+    table = on_board_table(result)
+    assert table.row_count == len(told["runs"])
+    assert "7.9 m above" in str(table.caption)
+
+
+def test_plans_that_were_not_found_in_time_are_told() -> None:
+    path = Path("configs/scenarios/patti_b.yaml")
+    scenario = load_config(path, Scenario)
+    hurried = scenario.controllers["constrained"]
+    starved = hurried.model_copy(
+        update={"law": dataclasses.replace(hurried.law, iteration_limit=1)}
+    )
+    scenario = scenario.model_copy(update={"controllers": {"starved": starved}, "settle_s": 5.0})
+    result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
+    passive, run = result.runs
+    assert passive.fallbacks is None
+    assert run.fallbacks is not None
+    assert run.fallbacks > 0
+    assert [each["fallbacks"] for each in as_json(result, {})["runs"]] == [None, run.fallbacks]
+    assert f"starved: {run.fallbacks} plans were not found in time" in " ".join(endings(result))
+
+
+def test_all_runs_are_in_the_same_waves_and_those_are_the_scenarios(storm) -> None:
+    result, _ = storm
+    time_s = result.runs[0].column("time_s")
+    moment = STORM.wave_moment(STORM.seed).at(time_s)
+    for run in result.runs:
+        np.testing.assert_allclose(
+            run.column("wave_moment_nm"), moment, rtol=0, atol=1e-9 * np.abs(moment).max()
+        )
+
+
+def test_measurements_stand_beside_the_truth_they_were_taken_of(storm) -> None:
+    result, _ = storm
+    for run in result.runs:
+        roll, true = run.column("roll_rad")[10:], run.column("true_roll_rad")[10:]
+        # 20 ms of sensor, 10 ms of bus, noise of 2e-4: the error is roll rate times age, and noise
+        rate = np.abs(run.column("roll_rate_rad_s")[10:]).max()
+        assert np.abs(roll - true).max() < rate * 0.04 + 5 * 2e-4
+        level = (run.column("starboard_level_m") - run.column("port_level_m"))[10:] / 2
+        assert np.abs(level - run.column("true_level_m")[10:]).max() < 0.1
+
+
+def test_armed_runs_quiet_the_ship_and_the_passive_one_holds_zero_pressure(storm) -> None:
+    result, _ = storm
+    _, (passive, *controlled) = figures(result)
+    assert passive.mode == "PASSIVE"
+    assert passive.active_share == 0.0
+    assert (result.runs[0].column("pressure_command_pa") == 0.0).all()
+    assert passive.pump.pressure_peak_pa < 1e3  # what the loop lets through at zero
+    for run in controlled:
+        assert (run.mode, run.fault) == ("ACTIVE", "NONE")
+        assert run.active_share == 1.0
+        assert run.roll_below_passive > 0.1
+        assert run.pump.power_mean_w > 0
+
+
+def test_figures_follow_from_the_rows(storm) -> None:
+    result, _ = storm
+    bare, runs = figures(result)
+    skip = round(SETTLE_S / RECORD_S)
+    without = result.without_tank_rad[skip:]
+    assert bare.rms_rad == pytest.approx(math.sqrt(np.mean(without**2)), rel=1e-12)
+    first = result.runs[0].column("true_roll_rad")[skip:]
+    for run, told in zip(result.runs, runs, strict=True):
+        roll = run.column("true_roll_rad")[skip:]
+        rms = math.sqrt(np.mean(roll**2))
+        assert told.roll.rms_rad == pytest.approx(rms, rel=1e-12)
+        assert told.roll.maximum_rad == np.abs(roll).max()
+        assert told.roll_below_no_tank == pytest.approx(1 - rms / bare.rms_rad, rel=1e-9)
+        assert told.roll_below_passive == pytest.approx(
+            1 - rms / math.sqrt(np.mean(first**2)), rel=1e-9, abs=1e-12
+        )
+        assert told.pump.level_peak_m == np.abs(run.column("true_level_m")[skip:]).max()
+        assert told.active_share == np.mean(run.column("mode")[skip:] == Mode.ACTIVE)
+        # what the controller thinks of the bus's load, and what the bus knows
+        assert run.column("bus_load")[-1] == pytest.approx(told.bus_load, rel=0.05)
+        assert 0.15 < told.bus_load < 0.3
+
+
+def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Path) -> None:
+    result, _ = storm
+    files, failures = write_report(result, tmp_path)
+    assert failures == []
+    assert files["picture"].read_bytes().startswith(b"\x89PNG")
+    recording = read_recording(files["recording"])
+    assert list(recording) == [run.name for run in result.runs]
+    for run in result.runs:
+        for name in COLUMNS:
+            np.testing.assert_allclose(
+                recording[run.name][name], run.column(name), rtol=1e-6, atol=1e-6, err_msg=name
+            )
+    told = json.loads(files["figures"].read_text(), parse_constant=pytest.fail)
+    assert told == json.loads(json.dumps(as_json(result, files), allow_nan=False))
+    assert [run["name"] for run in told["runs"]] == list(recording)
+    assert told["files"]["picture"] == str(files["picture"])
+    assert all(run["compared"] and run["rows"] == run["expected_rows"] for run in told["runs"])
+
+
+def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monkeypatch) -> None:
+    result, _ = storm
+    drawn: list[BenchCurve] = []
+    monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
+    write_report(result, tmp_path)
+    cells = [list(column.cells) for column in motion_table(result).columns]
+    table = {row[0]: row for row in zip(*cells, strict=True)}
+    for run, curve in zip(result.runs, drawn, strict=True):
+        name, rms, *_, below = table[run.name]
+        assert f"{name}: roll {rms}° RMS" in curve.label
+        if below:
+            share = re.search(r"\((−|\+)(\d+)%\)", curve.label)
+            assert share
+            sign = -1 if share[1] == "+" else 1
+            assert sign * int(share[2]) == pytest.approx(float(below.rstrip("%")), abs=0.51)
+
+
+def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path: Path) -> None:
+    result, _ = storm
+    (tmp_path / "bench.rrd").mkdir()
+    files, failures = write_report(result, tmp_path)
+    assert set(files) == {"picture", "figures"}
+    assert len(failures) == 1
+    assert "recording" in failures[0]
+    assert set(json.loads(files["figures"].read_text())["files"]) == {"picture", "figures"}
+
+
+class Unwatched:
+    def stopped(self, done_s: float) -> bool:
+        return False
+
+
+def test_same_seed_same_rows_in_any_process_and_another_seed_another_sea(storm) -> None:
+    result, _ = storm
+    for job, run in zip(jobs_of(STORM, STORM.seed, 20.0), result.runs, strict=True):
+        again = run_lockstep(job, Unwatched())
+        assert again.rows.tobytes() == run.rows[: len(again.rows)].tobytes()
+    other = run_lockstep(jobs_of(STORM, 99, 5.0)[0], Unwatched())
+    assert not np.array_equal(
+        other.column("wave_moment_nm"), result.runs[0].column("wave_moment_nm")[:100]
+    )
+
+
+def cut(run: Run, rows: slice) -> Run:
+    return dataclasses.replace(run, rows=run.rows[rows])
+
+
+def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> None:
+    result, _ = storm
+    *whole, last = result.runs
+    runs = (*whole, cut(last, slice(1800)))
+    settle_s, end_s = window_s(runs, SETTLE_S)
+    assert (settle_s, end_s) == pytest.approx((SETTLE_S, 90.0))
+    shortened = dataclasses.replace(
+        result,
+        runs=runs,
+        end_s=end_s,
+        without_tank_rad=result.without_tank_rad[:1800],
+        interrupted=True,
+        not_run=("lqg",),
+    )
+    skip = round(SETTLE_S / RECORD_S)
+    bare, told = figures(shortened)
+    rms = [
+        math.sqrt(np.mean(roll[skip:1800] ** 2))
+        for roll in (result.without_tank_rad, *(run.column("true_roll_rad") for run in runs))
+    ]
+    assert bare.rms_rad == pytest.approx(rms[0], rel=1e-12)
+    for run, own in zip(told, rms[1:], strict=True):
+        assert run.roll.rms_rad == pytest.approx(own, rel=1e-12)
+        assert run.roll_below_no_tank == pytest.approx(1 - own / rms[0], rel=1e-9)
+        assert run.roll_below_passive == pytest.approx(1 - own / rms[1], abs=1e-9)
+    assert endings(shortened) == ["ended at 90 of 120 s", "not run: lqg"]
+    assert "40 s to 90 s" in str(motion_table(shortened).caption)
+    as_told = as_json(shortened, {})
+    assert (as_told["interrupted"], as_told["not_run"]) == (True, ["lqg"])
+    assert (as_told["duration_s"], as_told["end_s"]) == (DURATION_S, pytest.approx(90.0))
+
+
+@pytest.mark.parametrize(
+    ("rows", "why"),
+    [
+        (slice(200), "ended at 10 s with 0 of the 1600 rows from 40 s to 120 s"),
+        (slice(None, None, 2), "ended at 119.95 s with 800 of the 1600 rows from 40 s to 120 s"),
+        (slice(1000, None), "ended at 120 s with 1400 of the 1600 rows from 40 s to 120 s"),
+    ],
+)
+def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why: str) -> None:
+    result, _ = storm
+    *whole, last = result.runs
+    runs = (*whole, cut(last, rows))
+    assert window_s(runs, SETTLE_S) == pytest.approx((SETTLE_S, DURATION_S), abs=RECORD_S)
+    some = dataclasses.replace(result, runs=runs)
+    assert [run.name for run in figures(some)[1]] == [run.name for run in whole]
+    said = endings(some)
+    assert len(said) == 1
+    assert said[0].startswith(f"{last.name}: not compared, ")
+    assert why in said[0]
+    told = as_json(some, {})["runs"][-1]
+    assert (told["name"], told["compared"]) == (last.name, False)
+    assert "roll" not in told
+    # without the passive run, nothing is said to be below it
+    lone = dataclasses.replace(result, runs=(cut(whole[0], rows), *whole[1:], last))
+    assert all(run.roll_below_passive is None for run in figures(lone)[1])
+    assert all(run.roll_below_no_tank is not None for run in figures(lone)[1])
+
+
+def test_one_run_that_is_ended_early_does_not_leave_too_little_of_the_others(storm) -> None:
+    result, _ = storm
+    for reach_s, end_s in ((59.0, DURATION_S), (61.0, 61.0)):
+        runs = (*result.runs[:-1], cut(result.runs[-1], slice(round(reach_s / RECORD_S))))
+        assert window_s(runs, 10.0) == pytest.approx((10.0, end_s))
+    assert window_s(result.runs, 500.0) == pytest.approx((DURATION_S / 2, DURATION_S))
+
+
+def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
+    result, _ = storm
+    count = 40  # two seconds hold no cycle of the roll
+    short = dataclasses.replace(
+        result,
+        runs=tuple(cut(run, slice(count)) for run in result.runs),
+        settle_s=1.0,
+        end_s=2.0,
+        without_tank_rad=result.without_tank_rad[:count],
+    )
+    significant = list(motion_table(short).columns[2].cells)
+    assert significant == [""] * (1 + len(result.runs))
+    told = json.loads(json.dumps(as_json(short, {}), allow_nan=False))
+    assert told["no_tank"]["significant_rad"] is None
+
+
+def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
+    first = next(iter(STORM.controllers.values()))
+    passive = first.model_copy(update={"law": PassiveLaw(kind="passive")})
+    change_s = 8.0
+    changing = STORM.model_copy(
+        update={
+            "controllers": {"none": passive},
+            "actual_ship": {"inertia_kg_m2": 1.2e9, "stiffness_nm_rad": 6.7e8},
+            "actual_from_s": change_s,
+        }
+    )
+    result = run_bench(changing, BenchOptions(duration_s=20.0), lambda _name, _done: None)
+    bare = result.without_tank_rad
+    ship, moment = STORM.vessel.ship, STORM.wave_moment(STORM.seed)
+    before = RECORD_S * np.arange(len(bare)) <= change_s
+    alone = roll_without_tank(ship, moment, RECORD_S, len(bare))
+    np.testing.assert_allclose(bare[before], alone[before], rtol=0, atol=1e-9)
+    # after it, the equation of motion holds with the other ship: inertia times acceleration
+    step_s = 0.001
+    fine = roll_without_tank(
+        ship, moment, step_s, 20_000,
+        later_ship=changing.sailing_ship, later_from_s=change_s,
+    )  # fmt: skip
+    np.testing.assert_allclose(fine[:: round(RECORD_S / step_s)], bare, rtol=0, atol=1e-9)
+    for at in (8500, 15_000):
+        rate = (fine[at + 1] - fine[at - 1]) / (2 * step_s)
+        acceleration = (fine[at + 1] - 2 * fine[at] + fine[at - 1]) / step_s**2
+        left = 1.2e9 * acceleration + ship.damping_nms_rad * rate + 6.7e8 * fine[at]
+        assert left == pytest.approx(float(moment.at(at * step_s)), rel=1e-3)
+
+
+def test_an_interface_that_is_not_there_ends_the_bench_with_its_name() -> None:
+    options = BenchOptions(real_time=True, channel="nowhere0", duration_s=60.0)
+    with pytest.raises(OSError, match="nowhere0"):
+        run_bench(STORM, options, lambda _name, _done: None)

@@ -1,0 +1,96 @@
+"""``utank-hil design``: one JSON object, a picture, a table, and errors that name their place."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.analysis.loop import trade
+from utank_hil.cli import app
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+GPC = CONFIGS / "controllers" / "gpc.yaml"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["design", *map(str, arguments)])
+
+
+@pytest.fixture
+def two_factors(monkeypatch):
+    monkeypatch.setattr(trade, "WEIGHT_FACTORS", (1.0, 10.0))
+
+
+def test_json_is_one_object_and_the_same_as_the_file(two_factors, tmp_path: Path):
+    result = run("controller", GPC, "--out", tmp_path, "--json")
+    assert result.exit_code == 0
+    found = json.loads(result.stdout)
+    assert found == json.loads((tmp_path / "design.json").read_text())
+    design, hard = found["points"]
+    assert (design["factor"], design["refused"], hard["refused"]) == (1.0, False, True)
+    assert design["roll_below_passive"] == pytest.approx(0.37, abs=0.01)
+    assert any("peak sensitivity" in failure for failure in hard["failures"])
+    assert Path(found["files"]["picture"]).stat().st_size > 20_000
+
+
+def test_table_marks_the_design_and_what_is_refused(two_factors, tmp_path: Path):
+    result = run("controller", GPC, "--out", tmp_path)
+    assert result.exit_code == 0
+    rows = {line.split()[1]: line for line in result.stdout.splitlines() if line.startswith("│")}
+    assert "ok" in rows["design"]
+    assert "refused" in rows["×10"]
+    assert "…" not in result.stdout
+
+
+def test_a_law_without_weights_is_refused_by_name(tmp_path: Path):
+    path = tmp_path / "passive.yaml"
+    vessel = CONFIGS / "ships" / "thesis_first.yaml"
+    path.write_text(f"name: none\nvessel: {vessel}\nlaw: {{kind: passive}}\n")
+    result = run("controller", path, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "a passive law has no weight to trade" in result.stderr
+
+
+def test_tank_command_says_how_far_the_tank_is_from_the_best():
+    result = run("tank", CONFIGS / "ships" / "thesis_first.yaml", "--json")
+    found = json.loads(result.stdout)
+    assert found["best"]["peak"] < found["present"]["peak"]
+    assert found["best"]["frequency_ratio"] == pytest.approx(1.0, abs=0.01)
+    table = run("tank", CONFIGS / "ships" / "thesis_first.yaml").stdout
+    assert f"{found['best']['duct_area_m2']:.2f}" in table
+
+
+def test_a_calm_sea_is_refused_with_the_scenario_s_name(two_factors, tmp_path: Path):
+    still = CONFIGS / "scenarios" / "still_water.yaml"
+    result = run("controller", GPC, "--scenario", still, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    for word in ("still_water.yaml", "does not roll the ship", "--scenario"):
+        assert word in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "sea"),
+    [
+        ("gpc", "Storm of 10 February 2019"),
+        ("patti_b_constrained_gpc", "Patti-B in a beam sea"),
+        ("naval_constrained_gpc", "Naval vessel in a beam sea"),
+    ],
+)
+def test_a_law_is_traded_in_the_sea_of_its_own_vessel(name: str, sea: str, monkeypatch, tmp_path):
+    monkeypatch.setattr(trade, "WEIGHT_FACTORS", (1.0,))
+    path = CONFIGS / "controllers" / f"{name}.yaml"
+    found = json.loads(run("controller", path, "--out", tmp_path, "--json").stdout)
+    assert found["scenario"] == sea
+
+
+def test_a_vessel_without_a_scenario_needs_one_to_be_named(tmp_path: Path):
+    ship = CONFIGS / "ships" / "thesis_first.yaml"
+    path = tmp_path / "own.yaml"
+    path.write_text(GPC.read_text().replace("../ships/thesis_first.yaml", str(tmp_path / "s.yaml")))
+    (tmp_path / "s.yaml").write_text(ship.read_text().replace("1.9275e+9", "1.93e+9"))
+    result = run("controller", path, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "no shipped scenario is for" in result.stderr
+    assert "--scenario" in result.stderr

@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.identification.logged_samples import logged_samples
+
+STEP_S = 0.05
+COUNT = 400
+
+
+def _columns(start_s: float = 0.0) -> dict[str, np.ndarray]:
+    time_s = start_s + STEP_S * np.arange(COUNT)
+    rng = np.random.default_rng(1)
+    return {
+        "time_s": time_s,
+        "roll_rad": rng.standard_normal(COUNT),
+        "port_level_m": -np.arange(COUNT) * 0.1,
+        "starboard_level_m": np.arange(COUNT) * 0.1,
+        "pressure_command_pa": rng.standard_normal(COUNT),
+    }
+
+
+def test_sample_is_the_output_then_and_the_mean_command_since_the_one_before() -> None:
+    columns = _columns()
+    record = logged_samples(columns, ("roll_rad", "level_m"), 0.2)
+    assert record.shape == (100, 3)
+    for k in range(1, 100):
+        mean = np.mean(columns["pressure_command_pa"][4 * (k - 1) : 4 * k])
+        assert record[k] == pytest.approx([mean, columns["roll_rad"][4 * k], 0.4 * k])
+    assert np.isnan(record[0, 0])
+
+
+@given(st.floats(0.0, 19.0), st.floats(0.0, 25.0))
+def test_part_of_a_recording_is_that_part_of_the_whole(from_s: float, length_s: float) -> None:
+    whole = logged_samples(_columns(), ("roll_rad",), 0.2)
+    try:
+        part = logged_samples(_columns(), ("roll_rad",), 0.2, from_s, from_s + length_s)
+    except ValueError:
+        assert length_s < 0.2
+        return
+    first = int(np.ceil(from_s / 0.2 - 1e-6))
+    same = np.nan_to_num(part[1:]) == np.nan_to_num(whole[first + 1 : first + len(part)])
+    assert same.all()
+
+
+def test_rows_that_were_lost_are_gaps() -> None:
+    columns = _columns()
+    kept = np.ones(COUNT, dtype=bool)
+    kept[100:141] = False
+    record = logged_samples(
+        {name: value[kept] for name, value in columns.items()}, ("roll_rad",), 0.2
+    )
+    assert np.isnan(record[25:36, 1]).all()
+    assert np.isfinite(record[1:25, 1]).all()
+    assert np.isfinite(record[36:, 1]).all()
+
+
+@pytest.mark.parametrize(
+    ("measured", "part", "word"),
+    [
+        (("level_rate_m_s",), (None, None), "level_rate_m_s"),
+        (("roll_rad",), (30.0, None), "nothing between"),
+        (("roll_rad",), (5.0, 4.0), "nothing between"),
+    ],
+)
+def test_what_is_not_in_the_recording_is_named(measured, part, word: str) -> None:
+    with pytest.raises(ValueError, match=word):
+        logged_samples(_columns(), measured, 0.2, *part)

@@ -1,0 +1,97 @@
+"""The picture of a bench, read back pixel by pixel, and what loading it must not load."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from utank_hil.pictures import BenchCurve, draw_bench
+from utank_hil.pictures.style import COLORS
+
+BLUE = np.array([0x00, 0x72, 0xB2]) / 255
+YELLOW_BAND = np.array([0xF0, 0xE4, 0x42]) / 255 * 0.35 + 0.65
+
+
+def curve(name: str, seconds: float, amplitude_rad: float, peak_s: float) -> BenchCurve:
+    """A roll with one sample twice as high as the others."""
+    time_s = np.arange(0.0, seconds, 0.2)
+    roll = amplitude_rad * np.sin(0.5 * time_s)
+    roll[np.argmin(np.abs(time_s - peak_s))] = 2 * amplitude_rad
+    return BenchCurve(name, time_s, roll, 10 * roll, 1e5 * roll)
+
+
+def pixels(image: np.ndarray, color: np.ndarray) -> np.ndarray:
+    close: np.ndarray = np.abs(image[..., :3] - color).max(axis=-1) < 0.02
+    return close
+
+
+def read(path: Path) -> np.ndarray:
+    return np.asarray(matplotlib.image.imread(path))
+
+
+def test_the_zoom_is_around_the_largest_roll_of_the_first_run(tmp_path: Path) -> None:
+    centres = []
+    for peak_s in (300.0, 1500.0):
+        curves = [curve("passive", 1800.0, 0.1, peak_s), curve("active", 1800.0, 0.05, 700.0)]
+        assert draw_bench(curves, tmp_path / "a.png", "A storm") == tmp_path / "a.png"
+        image = read(tmp_path / "a.png")
+        centres.append(np.flatnonzero(pixels(image, YELLOW_BAND).any(axis=0)).mean())
+        assert pixels(image, BLUE)[:, image.shape[1] // 2 :].sum() > 1000
+    panel = 0.46 * image.shape[1]  # what half the picture leaves of itself to the plot
+    assert centres[1] - centres[0] == pytest.approx(1200 / 1800 * panel, rel=0.05)
+
+
+def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
+    long, short = (
+        read(draw_bench([curve("passive", seconds, 0.1, 50.0)], tmp_path / "a.png", "A run"))
+        for seconds in (400.0, 100.0)
+    )
+    assert pixels(long, YELLOW_BAND).any()
+    assert not pixels(short, YELLOW_BAND).any()
+    assert short.shape[1] < long.shape[1]
+
+
+def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path: Path) -> None:
+    curves = [curve("passive", 1800.0, 0.1, 300.0), curve("active", 1800.0, 0.05, 700.0)]
+    plain = read(draw_bench(curves, tmp_path / "a.png", "A storm"))
+    centres = []
+    for trial_s in (600.0, 900.0):
+        state = np.zeros(len(curves[1].time_s))
+        for since_s, entered in ((-300.0, 1), (0.0, 3), (300.0, 4), (600.0, 0)):
+            state[curves[1].time_s >= trial_s + since_s] = entered
+        active = replace(curves[1], retuning=state)
+        image = read(draw_bench([curves[0], active], tmp_path / "a.png", "A storm"))
+        panel = image.shape[1] // 2
+        assert image.shape[0] > plain.shape[0]
+        band = np.flatnonzero(pixels(image, YELLOW_BAND)[:, :panel].any(axis=0))
+        a_second = (band[-1] - band[0]) / 180.0  # what the zoom is wide
+        centres.append(band.mean())
+        # the lane lies below the plots: of each strength a stretch as long as the state lasted
+        lane = image[int(0.85 * image.shape[0]) : int(0.93 * image.shape[0]), :panel]
+        for strength in (0.25, 0.55, 1.0):
+            columns = np.flatnonzero(pixels(lane, 1 - strength * (1 - BLUE)).sum(axis=0) > 5)
+            assert columns[-1] - columns[0] == pytest.approx(300.0 * a_second, rel=0.05)
+    assert centres[1] - centres[0] == pytest.approx(300.0 * a_second, rel=0.05)
+
+
+def test_more_runs_than_colours_are_refused(tmp_path: Path) -> None:
+    for number in (0, len(COLORS) + 1):
+        with pytest.raises(ValueError, match=f"got {number}"):
+            draw_bench([curve("a", 10.0, 0.1, 5.0)] * number, tmp_path / "a.png", "None")
+
+
+def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib() -> None:
+    code = """
+import sys
+import utank_hil.telemetry
+utank_hil.telemetry.RingWriter, utank_hil.telemetry.RecorderProcess, utank_hil.telemetry.open_viewer
+heavy = {"rerun", "matplotlib", "numba", "control", "scipy", "pyarrow"} & set(sys.modules)
+assert not heavy, heavy
+import utank_hil.pictures
+assert "matplotlib" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)

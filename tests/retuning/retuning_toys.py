@@ -1,0 +1,123 @@
+"""Laws, candidates and retuners for the tests of this folder and of faults."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Mode, OperatorCommand, RetuningState
+from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.retuning import (
+    AdaptiveController,
+    Answer,
+    Candidate,
+    ModelSummary,
+    RetuningSettings,
+)
+
+SAMPLE_TIME_S = 0.2
+SAMPLE_NS = 200_000_000
+QUIET = OperatorCommand(Mode.ACTIVE, True, False, False, False)
+SETTINGS = RetuningSettings(
+    (6.0, 20.0), identification_s=10.0, trial_s=40.0, answer_within_s=4.0, alone=True
+)
+SUMMARY = ModelSummary(8.0, 0.01, 2e9, 1e9, 5e7, 0.1, 0.99, 1.2, 0.3)
+
+
+def law_of(gain: float, order: int = 3, outputs: int = 1) -> PredictiveLaw:
+    """u(k) = gain (y(k-1) + y(k-2) / 2 + ...), with a little memory of u."""
+    output_gains = np.zeros((order, 1, outputs))
+    output_gains[:, 0, 0] = gain * 0.5 ** np.arange(order)
+    input_gains = np.full((order, 1, 1), 0.1)
+    return PredictiveLaw(input_gains, output_gains, np.zeros((5, 1, outputs)), SAMPLE_TIME_S)
+
+
+def model_of(outputs: int = 1) -> ARX:
+    """Predicts that nothing changes."""
+    return ARX(np.eye(outputs)[None], np.zeros((2, outputs, 1)), SAMPLE_TIME_S)
+
+
+def candidate_of(gain: float, washout_rad_s: float = 0.0, **sizes: int) -> Candidate:
+    return Candidate(
+        law_of(gain, **sizes), washout_rad_s, model_of(sizes.get("outputs", 1)), SUMMARY
+    )
+
+
+@dataclass
+class ToyRetuner:
+    """Answers what it is told to, after so many looks; None never answers."""
+
+    reply: Answer | None = None
+    looks: int = 0
+    alive: bool = True
+    records: list[FloatArray] = field(default_factory=list)
+
+    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+        self.number = number
+        self.records.append(record)
+
+    def answer(self, number: int, now_ns: int) -> Answer | None:
+        assert number == self.number
+        self.looks -= 1
+        return self.reply if self.looks < 0 else None
+
+
+class Rig:
+    """An adaptive controller stepped as the node does it; the pump follows at once.
+
+    `roll` is a function of the sample's number and of the command.
+    """
+
+    def __init__(
+        self,
+        retuner: ToyRetuner,
+        settings: RetuningSettings = SETTINGS,
+        roll: Callable[[int, float], float] = lambda k, u: 0.02 * np.sin(0.1 * k),
+    ) -> None:
+        count = round(settings.identification_s / SAMPLE_TIME_S)
+        self.pulses_pa = 1e3 * np.where(np.arange(count) % 7 < 3, 1.0, -1.0)
+        self.controller = AdaptiveController(
+            law_of(1e5), model_of(), 0, settings, self.pulses_pa, retuner
+        )
+        self.roll = roll
+        self.samples = 0
+        self.command_pa = 0.0
+        self.commands: list[float] = []
+        self.order = QUIET
+        self.engaged = self.fresh = True
+
+    def run(self, samples: int) -> None:
+        for _ in range(samples):
+            controller = self.controller
+            if self.samples:
+                controller.applied(np.array([self.command_pa]))
+            controller.update(
+                self.samples * SAMPLE_NS, self.order, engaged=self.engaged, fresh=self.fresh
+            )
+            y = np.array([self.roll(self.samples, self.command_pa)])
+            self.command_pa = float(controller.step(y)[0])
+            self.commands.append(self.command_pa)
+            self.samples += 1
+
+    def press(self, **buttons: bool) -> None:
+        """Press and hold buttons from the next sample on, for three samples, and let them go."""
+        if self.samples == 0:  # what is pressed before the first look is no press
+            self.run(1)
+        self.order = QUIET._replace(**buttons)  # type: ignore[arg-type]
+        self.run(3)
+        self.order = QUIET
+
+    def run_until(self, state: object, most: int = 3000) -> None:
+        while self.controller.state is not state:
+            assert most > 0, f"still {self.controller.state.name}"
+            self.run(1)
+            most -= 1
+
+    @property
+    def reasons(self) -> str:
+        return "; ".join(self.controller.events[-1].reasons)
+
+
+def states(rig: Rig) -> list[RetuningState]:
+    return [event.state for event in rig.controller.events]

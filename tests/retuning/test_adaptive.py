@@ -1,0 +1,201 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from retuning_toys import (
+    SAMPLE_TIME_S,
+    SETTINGS,
+    Rig,
+    ToyRetuner,
+    candidate_of,
+    law_of,
+    model_of,
+    states,
+)
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import RetuningState
+from utank_hil.control import ARX
+from utank_hil.retuning import Candidate, Refusal
+from utank_hil.retuning.incoming import FILL_AT_ONCE, FILL_SAMPLES
+from utank_hil.retuning.law_succession import FADE_SAMPLES
+
+IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
+
+
+KEPT = FILL_SAMPLES + FILL_AT_ONCE
+
+
+def candidate_with(**gains: FloatArray) -> Candidate:
+    """A candidate with other gains than it should have."""
+    candidate = candidate_of(1e5)
+    return replace(candidate, law=replace(candidate.law, **gains))
+
+
+def long_model(order: int) -> ARX:
+    return ARX(np.zeros((order, 1, 1)), np.zeros((order + 1, 1, 1)), SAMPLE_TIME_S)
+
+
+def test_without_an_order_it_is_the_law_it_was_given() -> None:
+    rig, alone = Rig(ToyRetuner()), law_of(1e5).controller()
+    rig.run(200)
+    expected, applied = [], 0.0
+    for k in range(200):
+        if k:
+            alone.applied(np.array([applied]))
+        applied = float(alone.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
+        expected.append(applied)
+    assert rig.commands == expected
+    assert states(rig) == []
+
+
+def test_ordered_identified_designed_tried_and_kept() -> None:
+    rig = Rig(ToyRetuner(candidate_of(9e4), looks=3))
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run_until(RETUNED)
+    assert states(rig) == [IDENTIFY, DESIGN, TRIAL, RETUNED]
+    rig.run(50)
+    assert states(rig)[-1] is RETUNED
+
+
+def test_pulses_go_out_alone_and_their_record_holds_what_left_and_what_was_seen() -> None:
+    retuner = ToyRetuner()
+    rig = Rig(retuner)
+    begin = 300
+    rig.run(begin)
+    rig.press(retune=True)
+    rig.run_until(DESIGN)
+    count = len(rig.pulses_pa)
+    (record,) = retuner.records
+    assert rig.commands[begin : begin + count] == list(rig.pulses_pa)
+    # row k: what left since the sample before, and the outputs of that sample
+    assert record.shape == (count, 2)
+    assert record[:, 0] == pytest.approx(rig.commands[begin - 1 : begin + count - 1])
+    seen = [0.02 * np.sin(0.1 * k) for k in range(begin, begin + count)]
+    assert record[:, 1] == pytest.approx(seen)
+
+
+def test_pulses_can_be_added_to_the_law() -> None:
+    rig = Rig(ToyRetuner(), replace(SETTINGS, alone=False), roll=lambda k, u: 0.01)
+    rig.run(300)
+    steady = rig.commands[-1]
+    rig.press(retune=True)
+    assert rig.commands[300] == pytest.approx(steady + rig.pulses_pa[0], rel=1e-6)
+
+
+def test_samples_that_were_not_measured_are_gaps_in_the_record() -> None:
+    retuner = ToyRetuner()
+    rig = Rig(retuner)
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run(10)
+    rig.fresh = False
+    rig.run(5)
+    rig.fresh = True
+    rig.run_until(DESIGN)
+    (record,) = retuner.records
+    assert np.flatnonzero(np.isnan(record[:, 1])).tolist() == list(range(13, 18))
+    assert np.isfinite(record[:, 0]).all()
+
+
+def test_new_law_takes_over_without_a_bump_from_a_memory_filled_with_the_past() -> None:
+    # the candidate is the law in charge itself: nobody may notice that it was exchanged
+    rig = Rig(ToyRetuner(candidate_of(1e5)))
+    rig.run(1200)
+    rig.press(retune=True)
+    rig.run_until(TRIAL)
+    at = rig.samples
+    rig.run(100)
+    untouched = law_of(1e5).controller()
+    expected = []
+    for k in range(rig.samples):
+        if k:
+            untouched.applied(np.array([rig.commands[k - 1]]))
+        expected.append(float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0]))
+    assert rig.commands[at:] == pytest.approx(expected[at:], rel=1e-9)
+
+
+def test_memory_is_filled_a_piece_at_a_sample_and_the_answers_are_faded_over() -> None:
+    rig = Rig(ToyRetuner(candidate_of(2e5)), roll=lambda k, u: 0.01)
+    rig.run(2 * FILL_SAMPLES)
+    steady = rig.commands[-1]
+    rig.press(retune=True)
+    rig.run_until(DESIGN)
+    begin = rig.samples
+    rig.run_until(TRIAL)
+    assert rig.samples - begin == pytest.approx(FILL_SAMPLES / FILL_AT_ONCE, rel=0.1)
+    at = rig.samples - 1
+    rig.run(4 * FADE_SAMPLES)
+    steps = np.abs(np.diff(rig.commands[at - 1 : at + 4 * FADE_SAMPLES]))
+    change = abs(rig.commands[-1] - steady)
+    assert change > 0.5 * abs(steady)
+    assert steps.max() < 4 * change / FADE_SAMPLES
+
+
+def test_refusal_is_passed_on_and_changes_nothing() -> None:
+    rig = Rig(ToyRetuner(Refusal(("roll period 2.00 s is outside",))))
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run_until(REFUSED)
+    rig.run(30)
+    assert rig.reasons == "roll period 2.00 s is outside"
+    untouched = law_of(1e5).controller()
+    for k in range(rig.samples):
+        if k:
+            untouched.applied(np.array([rig.commands[k - 1]]))
+        answer = float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
+    assert rig.commands[-1] == answer
+
+
+def test_no_answer_in_time_is_a_refusal() -> None:
+    rig = Rig(ToyRetuner(None))
+    rig.press(retune=True)
+    rig.run_until(DESIGN)
+    begin = rig.samples
+    rig.run_until(REFUSED)
+    assert (rig.samples - begin) * SAMPLE_TIME_S == pytest.approx(4.0, abs=0.5)
+    assert "hangs or is dead" in rig.reasons
+
+
+@pytest.mark.parametrize(
+    ("candidate", "word"),
+    [
+        (candidate_of(1e8), "gains"),
+        (candidate_of(1e5, outputs=2), "signals"),
+        (
+            replace(candidate_of(1e5), law=replace(law_of(1e5), sample_time_s=0.1)),
+            "sample time",
+        ),
+        (candidate_with(input_gains=np.full((3, 1, 1), 1e200)), "gains"),
+        (candidate_with(input_gains=np.full((3, 1, 1), 1.7e308)), "gains"),
+        (candidate_with(input_gains=np.full((3, 1, 1), np.nan)), "gains"),
+        (candidate_with(output_gains=np.full((3, 1, 1), np.inf)), "gains"),
+        (replace(candidate_of(1e5), model=long_model(KEPT + 1)), "looks back"),
+        (replace(candidate_of(1e5), model=model_of(2)), "model is for other signals"),
+        (candidate_of(1e5, float("inf")), "washout"),
+    ],
+)
+def test_candidate_is_looked_at_once_more_before_it_is_taken(candidate, word: str) -> None:
+    rig = Rig(ToyRetuner(candidate))
+    rig.press(retune=True)
+    rig.run_until(REFUSED)
+    assert word in rig.reasons
+
+
+def test_identification_is_given_up_when_the_roll_is_above_its_limit() -> None:
+    rig = Rig(ToyRetuner(), roll=lambda k, u: 0.4 if k == 320 else 0.01)
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run_until(REFUSED)
+    assert "roll is above" in rig.reasons
+    assert rig.samples < 325
+
+
+def test_model_as_long_as_what_is_kept_is_taken_and_watched() -> None:
+    rig = Rig(ToyRetuner(replace(candidate_of(9e4), model=long_model(KEPT))))
+    rig.run(2 * KEPT)
+    rig.press(retune=True)
+    rig.run_until(RETUNED)
+    rig.run(3 * KEPT)
+    assert rig.controller.laws.accepted.monitor.change >= 1.0

@@ -1,0 +1,257 @@
+"""What one step of each controller costs, beside the interpreter's floor.
+
+    python -m tools.benchmarks.controllers --steps 5000      # --json
+
+Every controller runs in a closed loop on the linear ship in a storm (JONSWAP, 4.7 m, 10 s), with
+sensor noise, limiter and drive, as in the campaigns; only its own step is timed. The process is
+scheduled as the deployed loop is, as far as the system permits. The floor is the passive
+controller, which does nothing. Memory: the most bytes that a step holds at once beyond
+what was there before, and the bytes that it leaves behind (both mean of 200 steps). How the solver
+of the constrained law compares with others says tools/peers.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from tools.studies.trial_setup import shipped
+from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
+from utank_hil.arrays import FloatArray
+from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.laws import build_law
+from utank_hil.control import (
+    ClippedValve,
+    Controller,
+    ErrorDynamics,
+    IndirectFuzzy,
+    OnOffValve,
+    PassiveController,
+    PumpLimits,
+    SmallGainFuzzy,
+    ValveRange,
+    design_lqr,
+    level_brake,
+    pump_model,
+)
+from utank_hil.dynamics import RollModel
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.sampling import sample
+from utank_hil.runtime.process_priority import real_time_scheduling
+from utank_hil.sea import EffectiveSlope, Sea, jonswap
+
+WARM_UP = 200
+TRACED = 200
+FLOOR = "passive (floor)"
+# of configs/controllers, the linear laws first
+SHIPPED = (
+    "pd",
+    "lqg",
+    "dpc",
+    "gpc",
+    "constrained_gpc",
+    "stimulate",
+    "feedback_linearization",
+    "fuzzy_robust",
+)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A controller to be timed.
+
+    Attributes
+    ----------
+    controller : Controller
+    measured : tuple of str
+    limits : PumpLimits
+    pumps : bool
+        Whether its answer is a pressure; a valve's is not.
+    """
+
+    controller: Controller
+    measured: tuple[str, ...]
+    limits: PumpLimits
+    pumps: bool = True
+
+
+class Timed:
+    """A controller whose steps are timed, and what it saw.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    """
+
+    def __init__(self, candidate: Candidate) -> None:
+        self.sample_time_s = candidate.controller.sample_time_s
+        self.took_ns: list[int] = []
+        self.seen: list[FloatArray] = []
+        self._controller, self._pumps = candidate.controller, candidate.pumps
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Step, and note how long it took."""
+        step = self._controller.step
+        begin = time.perf_counter_ns()
+        u = step(y, reference)
+        self.took_ns.append(time.perf_counter_ns() - begin)
+        self.seen.append(y)
+        return u if self._pumps else np.zeros(1)
+
+    def applied(self, u: FloatArray) -> None:
+        """Pass on."""
+        self._controller.applied(u)
+
+    def reset(self) -> None:
+        """Pass on."""
+        self._controller.reset()
+
+
+def candidates() -> dict[str, Callable[[], Candidate]]:
+    """Everything that is timed, by name, the floor first."""
+    config = shipped("gpc")
+    ship, tank, limits = config.vessel.ship, config.vessel.tank, config.limits
+    model = RollModel(ship, tank)
+    coefficients = model.coefficients
+    lqr = design_lqr(sample(pump_model(ship, tank, STATES), 0.2, 0.0, 0.0), 1e11)
+    error, ranges = ErrorDynamics(1.5, 0.7, 2.5), (0.524, 0.524, 4.0, 4.0)
+    gain = (
+        -coefficients.coupling
+        * coefficients.area
+        / (coefficients.inertia * coefficients.level_inertia - coefficients.coupling**2)
+    )
+    small_gain = SmallGainFuzzy(error, ranges, gain, 0.9, 1.0, adaptation=0.1, leakage=20.0)
+    indirect = IndirectFuzzy(
+        error,
+        ranges,
+        gain,
+        adaptation_f=0.02,
+        adaptation_g=0.02,
+        leakage=0.02,
+        brake_pa_s_m=level_brake(model, 0.5),
+    )
+    valve = ValveRange(0.0, 3e5)
+
+    def pump(build: Callable[[], Controller]) -> Callable[[], Candidate]:
+        return lambda: Candidate(build(), STATES, limits)
+
+    def throttle(build: Callable[[], Controller]) -> Callable[[], Candidate]:
+        return lambda: Candidate(build(), STATES, limits, pumps=False)
+
+    return {
+        FLOOR: pump(PassiveController),
+        "lqr": pump(lqr.controller),
+        **{name: _of_file(shipped(name)) for name in SHIPPED},
+        "fuzzy_small_gain": pump(small_gain.controller),
+        "fuzzy_indirect": pump(indirect.controller),
+        "on-off valve": throttle(lambda: OnOffValve(valve)),
+        "clipped valve": throttle(lambda: ClippedValve(valve, lqr.controller())),
+    }
+
+
+def _of_file(config: ControllerConfig) -> Callable[[], Candidate]:
+    def build() -> Candidate:
+        built = build_law(config.law, config.vessel, config.delay_s, config.limits)
+        return Candidate(built.controller, built.measured, config.limits)
+
+    return build
+
+
+def costs(candidate: Candidate, waves: FloatArray) -> dict[str, float]:
+    """Cost of each step in a closed loop, and its memory."""
+    vessel = shipped("gpc").vessel
+    timed = Timed(candidate)
+    with real_time_scheduling():
+        simulate_loop(vessel.ship, vessel.tank, waves, timed, candidate.measured, candidate.limits)
+    took_us = np.array(timed.took_ns[WARM_UP:]) / 1e3
+    return {
+        "p50_us": float(np.percentile(took_us, 50)),
+        "p99_us": float(np.percentile(took_us, 99)),
+        "max_us": float(took_us.max()),
+        **memory(candidate.controller, timed.seen[-TRACED:]),
+    }
+
+
+def memory(controller: Controller, seen: list[FloatArray]) -> dict[str, float]:
+    """Bytes that a step holds at most, and those that it leaves behind."""
+    peaks = []
+    tracemalloc.start()
+    begin = tracemalloc.get_traced_memory()[0]
+    for y in seen:
+        before = tracemalloc.get_traced_memory()[0]
+        tracemalloc.reset_peak()
+        controller.step(y)
+        peaks.append(tracemalloc.get_traced_memory()[1] - before)
+    left = tracemalloc.get_traced_memory()[0] - begin - sys.getsizeof(peaks)
+    tracemalloc.stop()
+    return {
+        "held_bytes": float(np.mean(peaks)),
+        "kept_bytes": max(left, 0) / len(seen),
+    }
+
+
+def measure(steps: int) -> dict[str, dict[str, float]]:
+    """Costs by controller, the floor first."""
+    vessel = shipped("gpc").vessel
+    sea = Sea.irregular(jonswap(4.7, 10.0), seed=1)
+    moment = sea.roll_moment(vessel.ship.stiffness_nm_rad, EffectiveSlope(0.5))
+    results = {}
+    for name, build in candidates().items():
+        candidate = build()
+        ticks = (steps + WARM_UP) * math.ceil(candidate.controller.sample_time_s / TICK_S - 1e-9)
+        waves = passive_motion(vessel.ship, vessel.tank, moment, TICK_S, ticks)
+        results[name] = costs(candidate, waves)
+    return results
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--steps", type=int, default=5000, help="of each controller (%(default)s)")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
+    arguments = parser.parse_args()
+    if arguments.steps < 100:
+        parser.error("--steps must be 100 or more: fewer have no 99th percentile")
+    results = measure(arguments.steps)
+    if arguments.json:
+        sys.stdout.write(json.dumps(results) + "\n")
+        return
+    table = Table(title=f"One step of each controller, {arguments.steps} steps")
+    for heading in (
+        "",
+        "p50\nµs",
+        "p99\nµs",
+        "max\nµs",
+        "p50 over\nfloor µs",
+        "bytes\nheld",
+        "bytes\nkept",
+    ):
+        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
+    floor = results[FLOOR]["p50_us"]
+    for name, cost in results.items():
+        table.add_row(
+            name,
+            *(f"{cost[key]:.1f}" for key in ("p50_us", "p99_us", "max_us")),
+            f"{cost['p50_us'] - floor:.1f}",
+            *(f"{cost[key]:.0f}" for key in ("held_bytes", "kept_bytes")),
+        )
+    console = Console(width=100)
+    console.print(table)
+    with real_time_scheduling() as report:
+        refused = [each for each in report.measures if not each.granted]
+    for each in refused:
+        console.print(f"measured without {each.name}: {each.detail}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,212 @@
+"""Identification on its own: speed beside `numpy.linalg.lstsq`, memory, growth, recursive update.
+
+Times are the least of several interleaved runs. tools/peers/compare_identification.py has the
+accuracy, beside published packages.
+
+Example: OPENBLAS_NUM_THREADS=1 .venv/bin/python -m tools.benchmarks.identification --quick
+"""
+
+import argparse
+import json
+import time
+import tracemalloc
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from tools.peers.identification_records import (
+    SAMPLE_TIME_S,
+    SEAS,
+    SHIP,
+    SLOW,
+    TANK,
+    record,
+    respond,
+    response,
+    sampled_plant,
+)
+from utank_hil.arrays import FloatArray
+from utank_hil.identification import RecursiveArx, okid
+from utank_hil.identification.lag_regression import LagRegression
+from utank_hil.identification.least_squares import fit
+
+__all__ = [
+    "SAMPLE_TIME_S",
+    "SEAS",
+    "SHIP",
+    "TANK",
+    "record",
+    "respond",
+    "response",
+    "sampled_plant",
+]
+
+
+def best_of(repeats: int, *tasks: Callable[[], object]) -> list[float]:
+    """Least time of each task in milliseconds, run in turns."""
+    times = np.full(len(tasks), np.inf)
+    for _ in range(repeats):
+        for i, task in enumerate(tasks):
+            start = time.perf_counter()
+            task()
+            times[i] = min(times[i], time.perf_counter() - start)
+    return [float(t * 1e3) for t in times]
+
+
+def peak_mb(task: Callable[[], object]) -> float:
+    """Most memory allocated at a time, in MB."""
+    tracemalloc.start()
+    task()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 1e6
+
+
+def regression_of(u: FloatArray, y: FloatArray, order: int) -> LagRegression:
+    """The regression that `okid` solves, scaled as there."""
+    z = np.column_stack([y, u])
+    z = z / np.sqrt(np.mean(z**2, axis=0))
+    return LagRegression(z, y.shape[1], order, np.empty((0, len(z))))
+
+
+def reference(matrix: FloatArray, targets: FloatArray) -> FloatArray:
+    """Least-squares solution, refined with residuals in extended precision."""
+    triangle = np.linalg.qr(matrix)[1]
+    wide, wanted = matrix.astype(np.longdouble), targets.astype(np.longdouble)
+    solution = np.zeros((matrix.shape[1], targets.shape[1]), dtype=np.longdouble)
+    for _ in range(4):
+        gradient = (wide.T @ (wanted - wide @ solution)).astype(np.float64)
+        solution += np.linalg.solve(triangle, np.linalg.solve(triangle.T, gradient))
+    return solution.astype(np.float64)
+
+
+def normal_equations(matrix: FloatArray, targets: FloatArray) -> FloatArray:
+    """Plain normal equations by Cholesky."""
+    return np.asarray(cho_solve(cho_factor(matrix.T @ matrix), matrix.T @ targets))
+
+
+def speed(quick: bool) -> dict[str, Any]:
+    """Order 200, 2,500 samples, two outputs, against the same regression written out."""
+    repeats = 5 if quick else 25
+    u, y = record()
+    slow_u, slow_y = record(limits=SLOW)
+    regression = regression_of(u, y, 200)
+    matrix, targets = regression.matrix()
+    names = ("okid", "okid, slow pump", "build matrix", "lstsq", "normal equations")
+    times = dict(
+        zip(
+            names,
+            best_of(
+                repeats,
+                lambda: okid(u, y, 200),
+                lambda: okid(slow_u, slow_y, 200),
+                regression.matrix,
+                lambda: np.linalg.lstsq(matrix, targets, rcond=None),
+                lambda: normal_equations(matrix, targets),
+            ),
+            strict=True,
+        )
+    )
+    right = reference(matrix, targets)
+    size = np.linalg.norm(right)
+    errors = {
+        "okid": fit(regression).coefficients,
+        "lstsq": np.linalg.lstsq(matrix, targets, rcond=None)[0],
+        "normal equations": normal_equations(matrix, targets),
+    }
+    return {
+        "time_ms": times,
+        "lstsq_over_okid": times["lstsq"] / times["okid"],
+        "lstsq_over_okid_slow_pump": times["lstsq"] / times["okid, slow pump"],
+        "relative_error": {k: float(np.linalg.norm(v - right) / size) for k, v in errors.items()},
+        "memory_mb": {
+            "okid": peak_mb(lambda: okid(u, y, 200)),
+            "lstsq": peak_mb(lambda: np.linalg.lstsq(*regression.matrix(), rcond=None)),
+        },
+    }
+
+
+def growth(quick: bool) -> list[dict[str, Any]]:
+    """Time and memory with order and length; lstsq where its matrix stays below 200 MB."""
+    cases = [(30, 2500), (60, 2500), (120, 2500), (200, 2500), (300, 2500), (120, 10_000)]
+    if not quick:
+        cases += [(200, 10_000), (120, 100_000), (200, 100_000)]
+    rows = []
+    for order, samples in cases:
+        u, y = record(samples)
+        task = partial(okid, u, y, order)
+        row = {
+            "order": order,
+            "samples": samples,
+            "okid_ms": best_of(3, task)[0],
+            "okid_mb": peak_mb(task),
+        }
+        regression = regression_of(u, y, order)
+        row["matrix_mb"] = regression.rows * regression.columns * 8 / 1e6
+        if row["matrix_mb"] < 200:
+            solve = partial(np.linalg.lstsq, *regression.matrix(), rcond=None)
+            row["lstsq_ms"] = best_of(2, solve)[0]
+        rows.append(row)
+    return rows
+
+
+def recursive() -> list[dict[str, Any]]:
+    """Time of one update."""
+    u, y = record()
+    rows = []
+    for order in (4, 20, 60, 120):
+        model = RecursiveArx(order, np.std(y, axis=0), np.std(u, keepdims=True))
+        count = 500
+        for k in range(order + 1):
+            model.update(u[k : k + 1], y[k])
+        start = time.perf_counter()
+        for k in range(order + 1, order + 1 + count):
+            model.update(u[k : k + 1], y[k])
+        rows.append({"order": order, "update_us": (time.perf_counter() - start) / count * 1e6})
+    return rows
+
+
+def table(rows: list[dict[str, Any]]) -> None:
+    """Print rows under the first one's keys."""
+    keys = list(rows[0])
+    cells = [
+        [f"{r[k]:.3g}" if isinstance(r.get(k), float) else str(r.get(k, "-")) for k in keys]
+        for r in rows
+    ]
+    widths = [max(map(len, column), default=0) for column in zip(keys, *cells, strict=True)]
+    for line in [keys, *cells]:
+        print("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)))
+    print()
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--quick", action="store_true", help="fewer and shorter measurements")
+    arguments = parser.parse_args()
+    first = speed(arguments.quick)
+    rows = {"growth": growth(arguments.quick), "recursive": recursive()}
+    if arguments.json:
+        print(json.dumps({"speed": first, **rows}))
+        return
+    print("OKID, order 200, 2,500 samples, two outputs")
+    table([{"": name, "time ms": t} for name, t in first["time_ms"].items()])
+    print(
+        f"lstsq / okid {first['lstsq_over_okid']:.1f}, with a slow pump "
+        f"{first['lstsq_over_okid_slow_pump']:.1f}"
+    )
+    print("relative error", {k: f"{v:.1e}" for k, v in first["relative_error"].items()})
+    print("memory MB", {k: round(v, 1) for k, v in first["memory_mb"].items()}, "\n")
+    for name, measured in rows.items():
+        print(name)
+        table(measured)
+
+
+if __name__ == "__main__":
+    main()

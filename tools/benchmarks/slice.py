@@ -1,0 +1,122 @@
+"""The whole slice in lockstep: ship seconds per second, what a controller's tick and frame cost.
+
+Every node, the whole catalogue, codec and protection at both ends, the controller armed. Processor
+time of this process, so that other work on the machine counts less.
+
+Example: .venv/bin/python -m tools.benchmarks.slice --seconds 120
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from statistics import median
+
+from rich.console import Console
+from rich.table import Table
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Frame
+from utank_hil.configuration import load_config
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.controller_node import ControllerNode
+
+STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
+WARM_UP_S = 10
+
+
+class Timed:
+    """The controller node with its work measured."""
+
+    def __init__(self, node: ControllerNode) -> None:
+        self.name, self.period_ns = node.name, node.period_ns
+        self._node = node
+        self._heard_ns = 0
+        self.ticks_ns: list[int] = []
+        self.frames_ns: list[int] = []
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame, on the next tick's account."""
+        begin = time.perf_counter_ns()
+        self._node.receive(frame, now_ns)
+        self.frames_ns.append(time.perf_counter_ns() - begin)
+        self._heard_ns += self.frames_ns[-1]
+
+    def tick(self, now_ns: int) -> list[Frame]:
+        """Tick and note what this and the frames before it cost."""
+        begin = time.perf_counter_ns()
+        frames = list(self._node.tick(now_ns))
+        self.ticks_ns.append(time.perf_counter_ns() - begin + self._heard_ns)
+        self._heard_ns = 0
+        return frames
+
+
+def slice_speed(scenario: Scenario, seconds: int) -> float:
+    """Ship seconds per processor second of the whole slice."""
+    ship = build_ship_side(scenario, scenario.seed, scenario.operator)
+    controller = build_controller_node(next(iter(scenario.controllers.values())))
+    lockstep = Lockstep([*ship.nodes, controller])
+    lockstep.run_until(WARM_UP_S * 10**9)
+    begin = time.process_time()
+    lockstep.run_until((WARM_UP_S + seconds) * 10**9)
+    return seconds / (time.process_time() - begin)
+
+
+def controller_costs_us(scenario: Scenario, seconds: int) -> tuple[list[float], list[float]]:
+    """Cost of each controller tick, the frames it heard before included, and of each frame."""
+    ship = build_ship_side(scenario, scenario.seed, scenario.operator)
+    timed = Timed(build_controller_node(next(iter(scenario.controllers.values()))))
+    lockstep = Lockstep([*ship.nodes, timed])
+    lockstep.run_until(WARM_UP_S * 10**9)
+    timed.ticks_ns.clear()
+    timed.frames_ns.clear()
+    lockstep.run_until((WARM_UP_S + seconds) * 10**9)
+    return _in_order_us(timed.ticks_ns), _in_order_us(timed.frames_ns)
+
+
+def _in_order_us(costs_ns: list[int]) -> list[float]:
+    return sorted(cost_ns / 1e3 for cost_ns in costs_ns)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--seconds", type=int, default=120, help="of ship time in each round")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    scenario = load_config(STORM, Scenario)
+    speeds = [slice_speed(scenario, arguments.seconds) for _ in range(arguments.rounds)]
+    ticks, frames = controller_costs_us(scenario, arguments.seconds)
+    result = {
+        "ship_seconds_per_cpu_second": median(speeds),
+        "fastest_ship_seconds_per_cpu_second": max(speeds),
+        "frame_p50_us": frames[len(frames) // 2],
+        "tick_p50_us": ticks[len(ticks) // 2],
+        "tick_p99_us": ticks[len(ticks) * 99 // 100],
+        "tick_p99_share_of_period": ticks[len(ticks) * 99 // 100] / 10e3,
+    }
+    if arguments.json:
+        sys.stdout.write(json.dumps(result) + "\n")
+        return
+    table = Table(title="The whole slice in lockstep")
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_row("ship seconds per processor second (aim 300)", f"{median(speeds):.0f}")
+    table.add_row(f"  the fastest of {len(speeds)} rounds", f"{max(speeds):.0f}")
+    table.add_row("controller, one frame heard, p50", f"{result['frame_p50_us']:.1f} µs")
+    table.add_row("controller tick and its frames, p50", f"{result['tick_p50_us']:.0f} µs")
+    table.add_row("controller tick and its frames, p99", f"{result['tick_p99_us']:.0f} µs")
+    table.add_row(
+        "  p99 as a share of the 10 ms period", f"{result['tick_p99_share_of_period']:.2%}"
+    )
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+"""Write docs/can-catalogue.md from the DBC; with --check, fail if it is stale."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from cantools.database.can import Database, Message, Signal
+
+from utank_hil.canbus import load_catalogue
+from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
+from utank_hil.canbus.exchange import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "can-catalogue.md"
+
+INTRODUCTION = """\
+# CAN catalogue
+
+<!-- Written by tools/documents/catalogue.py from utank_hil/canbus/utank.dbc; do not edit. -->
+
+{comment}
+
+Catalogue version: {version} (12-bit hash of the DBC). HEARTBEAT and CTRL_STATUS carry it; nodes
+whose versions differ keep the controller from arming.
+
+Identifiers are 29 bits in the manner of SAE J1939: priority, parameter group, and in the low byte
+the sender's source address. Frames have 8 bytes, signals are unsigned and little endian; physical
+value = raw * scale + offset, so that all ones can mean "not available" for signed quantities too.
+Encoding saturates at the range; what is out of range, not available or not in a value table decodes
+to NaN or None and counts as missing.
+
+## Protection
+
+All messages but ADDRESS_CLAIM are protected in the style of AUTOSAR E2E Profile 2:
+
+* Byte 0 is a CRC-8 (polynomial 0x2F, start value and final exclusive-or 0xFF) over bytes 1 to 7
+  and one byte that is not sent: the data ID, which the counter picks from the message's list of
+  sixteen (attribute `DataIDs`). A frame of another message fails this check.
+* The low nibble of byte 1 is a counter that steps by one with every frame, 15 followed by 0; the
+  first frame after a start has 1.
+* The lists: message number n = 1, 2, ... as the eight bits `2 n + parity(n)`, exclusive-or 0x06,
+  0x03, 0x0A, 0x11 for the counter's bits 0 to 3. With them any three flipped bits of a frame are
+  found (Hamming distance 4), flips in the counter included, and no message passes for another,
+  not even with one flipped bit.
+
+A receiver accepts the first good frame, then every frame whose counter follows, up to {lost}
+missing ones forgiven and counted. Anything else (wrong length, wrong CRC or data ID, counter
+repeated or out of sequence) is discarded and changes nothing: no value, no trusted counter. After a
+longer gap or a restart of the sender, the last of {resync} frames in a row that follow one another
+is trusted again. A leaky bucket judges the stream: a discarded frame +1, an accepted one -1,
+invalid from {bucket} until it is empty.
+
+What four bits can't show: a gap of 16 frames looks like a repetition and one of 17 like none, and a
+frame delayed by 12 to 15 places looks like the next one. Receivers therefore judge age with their
+own clock too. The CRC is for safety, not security: whoever may send on the bus can compute it.
+
+## Messages
+
+| message | identifier | cycle | from | to | carries |
+|---|---|---|---|---|---|
+"""
+
+
+def signals_of(message: Message) -> list[Signal]:
+    """All signals but CRC and counter."""
+    return [signal for signal in message.signals if signal.name not in ("crc", "counter")]
+
+
+def cycle(message: Message) -> str:
+    """Cycle time for the table."""
+    return f"{message.cycle_time} ms" if message.cycle_time else "at boot"
+
+
+def overview_row(message: Message) -> str:
+    """One message's row in the list of messages."""
+    names = ", ".join(f"`{signal.name}`" for signal in signals_of(message))
+    receivers = ", ".join(sorted(message.receivers))
+    return (
+        f"| [{message.name}](#{message.name.lower()}) | 0x{message.frame_id:08X} "
+        f"| {cycle(message)} | {message.senders[0]} | {receivers} | {names} |"
+    )
+
+
+def signal_row(signal: Signal) -> str:
+    """One signal's row in the table of its message."""
+    place = f"{signal.start // 8}.{signal.start % 8}"
+    scaled = signal.choices is None and signal.length > 1
+    scale = f"{signal.scale}" if scaled else ""
+    offset = f"{signal.offset}" if scaled and signal.offset else ""
+    limits = f"{signal.minimum} to {signal.maximum}" if scaled else ""
+    meaning = str(signal.comment)
+    if signal.choices:
+        width = (signal.length + 3) // 4
+        table = ", ".join(f"0x{value:0{width}X} {name}" for value, name in signal.choices.items())
+        meaning += f": {table}"
+    return (
+        f"| `{signal.name}` | {place} | {signal.length} | {scale} | {offset} | {limits} "
+        f"| {signal.unit or ''} | {meaning} |"
+    )
+
+
+def section(message: Message) -> str:
+    """The description of one message."""
+    data_ids = read_data_ids(message)
+    lines = [f"### {message.name}", "", str(message.comment), ""]
+    if data_ids is not None:
+        lines += [f"Data IDs: `{data_ids.hex(' ').upper()}`", ""]
+    lines += [
+        "| signal | byte.bit | bits | scale | offset | range | unit | meaning |",
+        "|---|---|---|---|---|---|---|---|",
+        *(signal_row(signal) for signal in signals_of(message)),
+    ]
+    return "\n".join(lines)
+
+
+def page() -> str:
+    """Render the whole page."""
+    database = Database()
+    database.add_dbc_file(DBC_PATH)
+    head = INTRODUCTION.format(
+        comment=database.buses[0].comment,
+        version=load_catalogue().version,
+        lost=MAX_LOST,
+        resync=RESYNC_FRAMES,
+        bucket=BUCKET_LIMIT,
+    )
+    rows = "\n".join(overview_row(message) for message in database.messages)
+    sections = "\n\n".join(section(message) for message in database.messages)
+    return f"{head}{rows}\n\n{sections}\n"
+
+
+def main() -> int:
+    """Write the page, or compare with it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="write nothing; fail if stale")
+    arguments = parser.parse_args()
+    content = page()
+    if not arguments.check:
+        PAGE.write_text(content)
+    elif not PAGE.exists() or PAGE.read_text() != content:
+        print(f"{PAGE} is stale: run tools/documents/catalogue.py", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

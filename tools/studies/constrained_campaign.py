@@ -1,0 +1,328 @@
+"""Does planning within the limits pay? Constrained GPC against clipped GPC, sea by sea.
+
+    python -m tools.studies.constrained_campaign --seeds 8 --out out/campaign    # --seconds, --json
+
+The first ship in measured and formula seas and with weaker pumps, the same realisations for all:
+
+* constrained: plans within pressure, rate, level and power; expects the sea there is;
+* clipped: the very same law without its plan, cut by the limiter with its usual level barrier;
+* clipped late: the same, cut by the limiter that stands behind the constrained law;
+* GPC_ROLL: the shipped law that sees the roll alone and knows the sea by its peak.
+
+Differences are paired, seed by seed, with the 95 % confidence interval of their mean. "Held back"
+is the share of time in which the limiter gives the clipped law less than it asks for. Takes about
+15 minutes on two cores. With --horizon-s the plans reach further (and hold more knots):
+
+    python -m tools.studies.constrained_campaign --only "roll period" --horizon-s 30
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+
+from tools.studies.trial_setup import (
+    STORM_HOUR,
+    entrant,
+    expecting,
+    limited,
+    measured_hour,
+    parsed,
+    parser,
+    run_shown,
+    seeds_of,
+    shipped,
+    table_console,
+    trial_ship,
+)
+from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures
+from utank_hil.analysis.motion.confidence import Interval, mean_interval
+from utank_hil.arrays import FloatArray
+from utank_hil.configuration import ControllerConfig
+from utank_hil.control import ConstrainedDesign, PumpLimits
+from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.pictures.style import COLORS, picture
+from utank_hil.sea import Spectrum, jonswap
+
+CONSTRAINED, CLIPPED, CLIPPED_LATE, GPC = "constrained", "clipped", "clipped late", "GPC_ROLL"
+RIVALS = (CLIPPED, GPC)
+KNOT_GROWTH = 0.15  # beyond the shipped knots, the distance between two is this share of the time
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sea and a pump.
+
+    Attributes
+    ----------
+    name : str
+    sea : Spectrum
+    pressure_pa, power_w : float
+        Limits of the pump.
+    """
+
+    name: str
+    sea: Spectrum
+    pressure_pa: float = 50e3
+    power_w: float = math.inf
+
+
+def cases() -> list[Case]:
+    """Seas from where the pump is never at a limit to where it mostly is."""
+    storm = measured_hour(STORM_HOUR)
+    return [
+        Case("swell, 9 Feb 12:40", measured_hour("2019-02-09T12:40")),
+        Case("short sea, 10 Feb 00:40", measured_hour("2019-02-10T00:40")),
+        Case("short sea, JONSWAP", jonswap(5.0, 8.0)),
+        Case("long swell, JONSWAP", jonswap(4.0, 16.0)),
+        Case("at the roll period, JONSWAP", jonswap(4.0, 12.5)),
+        Case("storm hour, 10 Feb 05:40", storm),
+        Case("storm hour, pump of 25 kPa", storm, pressure_pa=25e3),
+        Case("storm hour, pump of 1 MW", storm, power_w=1e6),
+        Case("greater storm, JONSWAP", jonswap(6.5, 11.5)),
+    ]
+
+
+def chosen(text: str) -> list[Case]:
+    """The cases whose names hold a text."""
+    found = [case for case in cases() if text in case.name]
+    if not found:
+        raise ValueError(
+            f"--only {text!r} is in no case's name; there are "
+            + "; ".join(case.name for case in cases())
+        )
+    return found
+
+
+def entrants(case: Case, horizon_s: float | None) -> tuple[Entrant, ...]:
+    """The four laws, each with the limits that stand behind it."""
+
+    def of_pump(limits: PumpLimits) -> PumpLimits:
+        return dataclasses.replace(limits, pressure_pa=case.pressure_pa, power_w=case.power_w)
+
+    planned, gpc = shipped("constrained_gpc"), shipped("gpc")
+    planned = limited(expecting(planned, case.sea), of_pump(planned.limits))
+    if horizon_s is not None:
+        planned = reaching(planned, horizon_s)
+    usual = of_pump(gpc.limits)
+    constrained = entrant(CONSTRAINED, planned)
+    assert isinstance(constrained.law, ConstrainedLaw)
+    plain = constrained.law.unlimited()
+    return (
+        constrained,
+        Entrant(CLIPPED, plain, constrained.measured, usual),
+        Entrant(CLIPPED_LATE, plain, constrained.measured, constrained.limits),
+        entrant(GPC, limited(gpc, usual)),
+    )
+
+
+def reaching(config: ControllerConfig, horizon_s: float) -> ControllerConfig:
+    """A constrained law with a longer horizon; its knots grow apart beyond the shipped ones."""
+    design = config.law
+    assert isinstance(design, ConstrainedDesign)
+    samples = round(horizon_s / design.sample_time_s)
+    if samples < design.horizon:
+        raise ValueError(
+            f"--horizon-s must be {design.horizon * design.sample_time_s:g} or more, "
+            f"got {horizon_s:g}"
+        )
+    knots = list(design.knots)
+    while (following := knots[-1] + round(KNOT_GROWTH * knots[-1])) < samples - 1:
+        knots.append(following)
+    longer = dataclasses.replace(design, knots=tuple(knots), horizon=samples)
+    return config.model_copy(update={"law": longer})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All realisations of a case.
+
+    Attributes
+    ----------
+    case : Case
+    runs : dict
+        Figures by name, one for each seed.
+    """
+
+    case: Case
+    runs: dict[str, list[TrialFigures]]
+
+    def figures(self, name: str, field: str) -> FloatArray:
+        """One figure of one entrant, seed by seed."""
+        return np.array([getattr(run, field) for run in self.runs[name]])
+
+    def below(self, rival: str) -> FloatArray:
+        """Share by which the constrained law's roll RMS is less than a rival's, seed by seed."""
+        shares: FloatArray = 1 - self.figures(CONSTRAINED, "roll_rms_rad") / self.figures(
+            rival, "roll_rms_rad"
+        )
+        return shares
+
+
+def run(arguments: argparse.Namespace) -> list[Outcome]:
+    """Run every case with every seed."""
+    vessel = trial_ship(shipped("constrained_gpc").vessel)
+    wanted, seeds = chosen(arguments.only), seeds_of(arguments)
+    trials = []
+    for case in wanted:
+        laws = entrants(case, arguments.horizon_s)
+        trials += [Trial(case.sea, seed, vessel, laws, arguments.seconds) for seed in seeds]
+    results = iter(run_shown(trials))
+    outcomes = []
+    for case in wanted:
+        of_case = [next(results) for _ in seeds]
+        outcomes.append(
+            Outcome(case, {name: [one[name] for one in of_case] for name in of_case[0]})
+        )
+    return outcomes
+
+
+def as_json(outcome: Outcome) -> dict[str, object]:
+    """Everything of a case, seed by seed, and the paired differences."""
+    sea = outcome.case.sea
+    return {
+        "name": outcome.case.name,
+        "hs_m": sea.hs_m,
+        "tp_s": sea.tp_s,
+        "pressure_pa": outcome.case.pressure_pa,
+        "power_w": outcome.case.power_w if math.isfinite(outcome.case.power_w) else None,
+        "runs": {
+            name: [dataclasses.asdict(run) for run in runs] for name, runs in outcome.runs.items()
+        },
+        "below": {rival: mean_interval(outcome.below(rival))._asdict() for rival in RIVALS},
+    }
+
+
+def percent(interval: Interval) -> str:
+    """A share with its interval."""
+    mean = round(100 * interval.mean, 1) + 0.0  # no "-0.0"
+    return f"{mean:.1f} ± {100 * interval.half_width:.1f}"
+
+
+def roll_table(outcomes: list[Outcome], title: str) -> Table:
+    """How much each rolls, and what planning is worth."""
+    table = Table(title=title)
+    headings = (
+        "sea and pump",
+        "Hs m",
+        "Tp s",
+        "passive\n°",
+        "GPC_ROLL\n°",
+        "clipped\n°",
+        "constrained\n°",
+        "below\nclipped %",
+        "below\nGPC_ROLL %",
+    )
+    for heading in headings:
+        first = heading == headings[0]
+        table.add_column(heading, justify="left" if first else "right", no_wrap=True)
+    for outcome in outcomes:
+        rolls = {
+            name: math.degrees(outcome.figures(name, "roll_rms_rad").mean())
+            for name in (PASSIVE, GPC, CLIPPED, CONSTRAINED)
+        }
+        table.add_row(
+            outcome.case.name,
+            f"{outcome.case.sea.hs_m:.2f}",
+            f"{outcome.case.sea.tp_s:.1f}",
+            *(f"{roll:.3f}" for roll in rolls.values()),
+            percent(mean_interval(outcome.below(CLIPPED))),
+            percent(mean_interval(outcome.below(GPC))),
+        )
+    return table
+
+
+def limit_table(outcomes: list[Outcome]) -> Table:
+    """Where the pump and the level are at their limits."""
+    table = Table(title="Limits: means over the seeds, highest level of all")
+    headings = (
+        "sea and pump",
+        "clipped\nheld\nback %",
+        "level\npeak m\nGPC",
+        "\n\nclipped",
+        "\nclipped\nlate",
+        "\nconst-\nrained",
+        "pressure\nRMS kPa\nGPC",
+        "\n\nclipped",
+        "\nconst-\nrained",
+        "roll\nclipped\nlate °",
+    )
+    for heading in headings:
+        first = heading == headings[0]
+        table.add_column(heading, justify="left" if first else "right", no_wrap=True)
+    for outcome in outcomes:
+        table.add_row(
+            outcome.case.name,
+            f"{100 * outcome.figures(CLIPPED, 'held_back').mean():.1f}",
+            *(
+                f"{outcome.figures(name, 'level_peak_m').max():.2f}"
+                for name in (GPC, CLIPPED, CLIPPED_LATE, CONSTRAINED)
+            ),
+            *(
+                f"{outcome.figures(name, 'pressure_rms_pa').mean() / 1e3:.1f}"
+                for name in (GPC, CLIPPED, CONSTRAINED)
+            ),
+            f"{math.degrees(outcome.figures(CLIPPED_LATE, 'roll_rms_rad').mean()):.3f}",
+        )
+    return table
+
+
+def draw(outcomes: list[Outcome], path: Path, title: str) -> Path:
+    """Paired differences with their intervals, case below case."""
+    with picture(path, title, (9.0, 1.6 + 0.45 * len(outcomes))) as figure:
+        axes = figure.add_subplot()
+        places = np.arange(len(outcomes))[::-1]
+        for rival, color, shift in ((CLIPPED, COLORS[1], 0.12), (GPC, COLORS[2], -0.12)):
+            intervals = [mean_interval(outcome.below(rival)) for outcome in outcomes]
+            axes.errorbar(
+                [100 * one.mean for one in intervals],
+                places + shift,
+                xerr=[100 * one.half_width for one in intervals],
+                fmt="o",
+                color=color,
+                capsize=3,
+                label=f"below {rival}",
+            )
+        axes.axvline(0.0, color=COLORS[0], linewidth=1.0)
+        axes.set_yticks(places, [outcome.case.name for outcome in outcomes])
+        axes.set_xlabel("Roll RMS of the constrained law below its rival's (%), 95 % interval")
+        figure.legend(loc="outside lower left", ncols=2, frameon=False)
+    return path
+
+
+def main() -> None:
+    """Run the campaign, print the tables, draw the picture."""
+    made = parser(__doc__, seeds=8, first_seed=301)
+    made.add_argument("--out", type=Path, help="folder for the picture campaign.png")
+    made.add_argument("--only", default="", help="run the cases whose names hold this text")
+    made.add_argument("--horizon-s", type=float, help="length of the plans (12 as shipped)")
+    arguments = parsed(made)
+    try:
+        outcomes = run(arguments)
+    except ValueError as error:
+        made.error(str(error))
+    title = f"{arguments.seeds} seeds of {arguments.seconds:g} s"
+    say: Callable[..., None] = table_console().print
+    if arguments.json:
+        sys.stdout.write(json.dumps({"cases": [as_json(outcome) for outcome in outcomes]}) + "\n")
+    else:
+        say(roll_table(outcomes, f"Constrained against clipped GPC, {title}"))
+        say(limit_table(outcomes))
+    if arguments.out is not None:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        path = draw(
+            outcomes, arguments.out / "campaign.png", "What planning within limits is worth"
+        )
+        if not arguments.json:
+            say(f"picture: {path}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,193 @@
+"""How far from the possible: roll in the storm hour beside the clairvoyant bound, over many seeds.
+
+    python -m tools.studies.share_of_possible --seeds 8
+
+The first ship, linear, in the storm hour; sensors, delay, lag and limiter as on the bus. Share is
+the part of the way from the passive tank to the best pressure history known in advance, within the
+same limits on pressure, rate, level (4 m) and power; with it the 95 % confidence interval of its
+mean. Constrained laws differ in the sea they expect: the hour's own spectrum, one of hours before,
+a JONSWAP spectrum of the hour's height and period, or none (white wave slope). What a step of each
+costs says tools/benchmarks/controllers.py. Takes about 6 minutes on two cores.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import sys
+
+import numpy as np
+from rich.table import Table
+
+from tools.studies.trial_setup import (
+    STORM_HOUR,
+    entrant,
+    expecting,
+    limited,
+    measured_hour,
+    parsed,
+    parser,
+    run_shown,
+    seeds_of,
+    shipped,
+    table_console,
+    trial_ship,
+)
+from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.sea_trial import (
+    CLAIRVOYANT,
+    NO_TANK,
+    PASSIVE,
+    Entrant,
+    Trial,
+    TrialFigures,
+)
+from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.arrays import FloatArray
+from utank_hil.configuration import ControllerConfig
+from utank_hil.control import ConstrainedDesign, PumpLimits
+from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.sea import jonswap
+
+BEFORE, LONG_BEFORE = "2019-02-10T04:40", "2019-02-10T02:40"
+WHITE_FLOOR = 100.0  # of the spectrum's maximum: the slope expected is white
+
+
+def entrants(pump: PumpLimits) -> list[Entrant]:
+    """All laws, each with the limits that stand behind it, pressure and power those of `pump`."""
+
+    def config(name: str) -> ControllerConfig:
+        found = shipped(name)
+        limits = dataclasses.replace(
+            found.limits, pressure_pa=pump.pressure_pa, power_w=pump.power_w
+        )
+        return limited(found, limits)
+
+    hour, planned = measured_hour(STORM_HOUR), config("constrained_gpc")
+    found = [
+        entrant("GPC, roll", config("gpc")),
+        entrant("DPC, roll and level", config("dpc")),
+        entrant("LQG", config("lqg")),
+        entrant("constrained, white slope", _white(expecting(planned, hour))),
+    ]
+    for name, sea in (
+        ("constrained, 3 h before", measured_hour(LONG_BEFORE)),
+        ("constrained, JONSWAP", jonswap(hour.hs_m, hour.tp_s)),
+        ("constrained, 1 h before", measured_hour(BEFORE)),
+        ("constrained, the hour", hour),
+    ):
+        found.append(entrant(name, expecting(planned, sea)))
+    whole = found[-1]
+    assert isinstance(whole.law, ConstrainedLaw)
+    unplanned = Entrant(
+        "the same, clipped", whole.law.unlimited(), whole.measured, config("gpc").limits
+    )
+    return [*found, unplanned]
+
+
+def _white(config: ControllerConfig) -> ControllerConfig:
+    design = config.law
+    assert isinstance(design, ConstrainedDesign)
+    sea = dataclasses.replace(design.sea, floor=WHITE_FLOOR)
+    return config.model_copy(update={"law": dataclasses.replace(design, sea=sea)})
+
+
+def rows(
+    laws: list[Entrant], results: list[dict[str, TrialFigures]]
+) -> dict[str, dict[str, float]]:
+    """Figures of each law by name, the ends of the scale with them."""
+    vessel = shipped("gpc").vessel
+
+    def figures(name: str, field: str) -> FloatArray:
+        return np.array([getattr(result[name], field) for result in results])
+
+    passive, best = (figures(name, "roll_rms_rad") for name in (PASSIVE, CLAIRVOYANT))
+    found = {
+        name: {"roll_rms_deg": math.degrees(figures(name, "roll_rms_rad").mean())}
+        for name in (NO_TANK, PASSIVE)
+    }
+    for law in laws:
+        roll = figures(law.name, "roll_rms_rad")
+        share = mean_interval((passive - roll) / (passive - best))
+        report = robustness(law.law, vessel.ship, vessel.tank, law.measured)
+        found[law.name] = {
+            "roll_rms_deg": math.degrees(roll.mean()),
+            "share": share.mean,
+            "share_half_width": share.half_width,
+            "level_peak_m": float(figures(law.name, "level_peak_m").max()),
+            "pressure_rms_pa": float(figures(law.name, "pressure_rms_pa").mean()),
+            "power_peak_w": float(figures(law.name, "power_peak_w").max()),
+            "peak_sensitivity": report.nominal.peak_sensitivity,
+            "worst_radius": report.worst_radius,
+        }
+    found[CLAIRVOYANT] = {
+        "roll_rms_deg": math.degrees(best.mean()),
+        "level_peak_m": float(figures(CLAIRVOYANT, "level_peak_m").max()),
+    }
+    return found
+
+
+def table_of(found: dict[str, dict[str, float]], title: str) -> Table:
+    """The rows for a terminal."""
+    table = Table(title=title)
+    for heading in (
+        "",
+        "roll RMS °",
+        "share %",
+        "level\npeak m",
+        "pressure\nRMS kPa",
+        "power\npeak MW",
+        "peak sen-\nsitivity",
+    ):
+        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
+    for name, row in found.items():
+        cells = [name, f"{row['roll_rms_deg']:.3f}", "", "", "", "", ""]
+        if "share" in row:
+            cells[2] = f"{100 * row['share']:.1f} ± {100 * row['share_half_width']:.1f}"
+            cells[4] = f"{row['pressure_rms_pa'] / 1e3:.1f}"
+            cells[5] = f"{row['power_peak_w'] / 1e6:.2f}"
+            cells[6] = f"{row['peak_sensitivity']:.2f}"
+        if "level_peak_m" in row:
+            cells[3] = f"{row['level_peak_m']:.2f}"
+        table.add_row(*cells)
+    return table
+
+
+def arguments_of_command_line() -> argparse.Namespace:
+    """Read and check them."""
+    made = parser(__doc__, seeds=8, first_seed=1)
+    made.add_argument("--power-w", type=float, default=math.inf, help="limit on the water's power")
+    made.add_argument("--pressure-pa", type=float, default=50e3, help="of the pump (%(default)g)")
+    arguments = parsed(made)
+    for name in ("power_w", "pressure_pa"):
+        if not getattr(arguments, name) > 0:
+            made.error(f"--{name.replace('_', '-')} must be positive")
+    return arguments
+
+
+def main() -> None:
+    """Run all seeds and print the table."""
+    arguments = arguments_of_command_line()
+    planned = shipped("constrained_gpc")
+    bound = PumpLimits(
+        arguments.pressure_pa, level_m=planned.limits.level_m, power_w=arguments.power_w
+    )
+    laws = entrants(bound)
+    hour, vessel = measured_hour(STORM_HOUR), trial_ship(planned.vessel)
+    results = run_shown(
+        [
+            Trial(hour, seed, vessel, tuple(laws), arguments.seconds, bound)
+            for seed in seeds_of(arguments)
+        ]
+    )
+    found = rows(laws, results)
+    if arguments.json:
+        summary = {"seeds": arguments.seeds, "seconds": arguments.seconds, "rows": found}
+        sys.stdout.write(json.dumps(summary) + "\n")
+    else:
+        title = f"Share of the possible, {arguments.seeds} seeds of {arguments.seconds:g} s"
+        table_console().print(table_of(found, title))
+
+
+if __name__ == "__main__":
+    main()

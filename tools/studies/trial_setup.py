@@ -1,0 +1,115 @@
+"""What the tools share that try laws in seas: the shipped laws, measured hours, arguments.
+
+No command of its own.
+"""
+
+import argparse
+import dataclasses
+import math
+import sys
+from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip, run_trials
+from utank_hil.configuration import ControllerConfig, Vessel, load_config
+from utank_hil.configuration.laws import build_law
+from utank_hil.control import ConstrainedDesign, PumpLimits
+from utank_hil.sea import Spectrum, load_ndbc
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+STORM_HOUR = "2019-02-10T05:40"
+TABLE_WIDTH = 118
+
+
+def shipped(name: str) -> ControllerConfig:
+    """A configuration of ``configs/controllers``."""
+    return load_config(CONFIGS / "controllers" / f"{name}.yaml", ControllerConfig)
+
+
+def entrant(name: str, config: ControllerConfig) -> Entrant:
+    """A configured law with the limiter behind it."""
+    built = build_law(config.law, config.vessel, config.delay_s, config.limits)
+    if built.linear is None:
+        raise ValueError(f"{name} is no linear law: only these are tried in seas here")
+    return Entrant(name, built.linear, built.measured, config.limits)
+
+
+def trial_ship(vessel: Vessel) -> TrialShip:
+    """The configured ship as the laws were designed for her."""
+    return TrialShip(vessel.ship, vessel.tank, lag_s=vessel.pump.lag_s)
+
+
+def measured_hour(time: str) -> Spectrum:
+    """Spectrum of an hour of NDBC 41010, February 2019."""
+    return load_ndbc(CONFIGS / "seas" / "ndbc_41010_2019-02_spectral_density.txt").at(time)
+
+
+def expecting(config: ControllerConfig, sea: Spectrum) -> ControllerConfig:
+    """A constrained law that expects a sea other than its own."""
+    if not isinstance(config.law, ConstrainedDesign):
+        raise ValueError(f"{config.name} expects no sea")
+    model = dataclasses.replace(
+        config.law.sea,
+        frequency_hz=tuple(sea.frequency_hz.tolist()),
+        density_m2_hz=tuple(sea.density.tolist()),
+    )
+    return config.model_copy(update={"law": dataclasses.replace(config.law, sea=model)})
+
+
+def limited(config: ControllerConfig, limits: PumpLimits) -> ControllerConfig:
+    """The same law within other limits."""
+    return config.model_copy(update={"limits": limits})
+
+
+def parser(text: str | None, *, seeds: int, first_seed: int) -> argparse.ArgumentParser:
+    """Command line with the arguments that all such tools take."""
+    made = argparse.ArgumentParser(
+        description=text, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    made.add_argument(
+        "--seeds", type=int, default=seeds, help="realisations of each sea, 2 or more (%(default)s)"
+    )
+    made.add_argument(
+        "--first-seed", type=int, default=first_seed, help="the first of them (%(default)s)"
+    )
+    made.add_argument(
+        "--seconds", type=float, default=3600.0, help="length of each run (%(default)s)"
+    )
+    made.add_argument("--json", action="store_true", help="one JSON object instead of tables")
+    return made
+
+
+def parsed(made: argparse.ArgumentParser) -> argparse.Namespace:
+    """The arguments, checked."""
+    arguments = made.parse_args()
+    if arguments.seeds < 2:
+        made.error("--seeds must be 2 or more: one value has no confidence interval")
+    if not (math.isfinite(arguments.seconds) and arguments.seconds >= 60):
+        made.error("--seconds must be 60 or more")
+    return arguments
+
+
+def seeds_of(arguments: argparse.Namespace) -> range:
+    """The seeds that were asked for."""
+    return range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+
+
+def run_shown(trials: Sequence[Trial]) -> list[dict[str, TrialFigures]]:
+    """Run trials with a progress bar on standard error; ends the program on Ctrl-C."""
+    with Progress(console=Console(stderr=True)) as bar:
+        task = bar.add_task(f"{len(trials)} trials", total=1.0)
+        try:
+            return run_trials(trials, lambda done: bar.update(task, completed=done))
+        except KeyboardInterrupt:
+            sys.exit("interrupted")
+        except BrokenProcessPool:
+            sys.exit("a process of the trials was ended from outside: run the command again")
+
+
+def table_console() -> Console:
+    """Console for tables, wide enough for them wherever they go."""
+    return Console(width=TABLE_WIDTH)

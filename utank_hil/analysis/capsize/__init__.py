@@ -1,0 +1,1 @@
+"""Capsizing: thresholds, probability, maps, and what a law changes."""

@@ -1,0 +1,158 @@
+"""Where a ship survives: her phase plane in calm water, her safe basin and how waves erode it."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.analysis.capsize.threshold import Equilibrium, equilibria, erosion, safe_basin
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics import RollModel, WaveMoment, simulate
+
+NEAR = 0.02  # trajectories start this share of the saddle's heel to either side of it
+CYCLES = 5  # and last that many roll periods
+COARSE = 4  # erosion is found on every so many points of the basin's grid
+
+
+class CapsizeMap(NamedTuple):
+    """A ship's phase plane; starts in it have the water flat and at rest relative to her.
+
+    Attributes
+    ----------
+    name : str
+        What the ship is called in a picture.
+    equilibria : tuple of Equilibrium
+    trajectories : tuple of ndarray, shape (k, 2)
+        Roll and roll rate in calm water, from either side of each saddle.
+    roll_rad : ndarray, shape (a,)
+    roll_rate_rad_s : ndarray, shape (b,)
+        Grid of starts.
+    calm, in_waves : ndarray of bool, shape (b, a)
+        Which of them survive.
+    wave_nm : float
+        Wave moment of `in_waves`.
+    amplitude_nm, area : ndarray, shape (n,)
+        Area of the safe basin over the amplitude of the wave moment, relative to calm water.
+    """
+
+    name: str
+    equilibria: tuple[Equilibrium, ...]
+    trajectories: tuple[FloatArray, ...]
+    roll_rad: FloatArray
+    roll_rate_rad_s: FloatArray
+    calm: npt.NDArray[np.bool_]
+    in_waves: npt.NDArray[np.bool_]
+    wave_nm: float
+    amplitude_nm: FloatArray
+    area: FloatArray
+
+
+def phase_grid(model: RollModel, points: int) -> tuple[FloatArray, FloatArray]:
+    """Rolls and roll rates that hold a ship's safe basin in calm water.
+
+    Parameters
+    ----------
+    model : RollModel
+    points : int
+        In either direction.
+
+    Returns
+    -------
+    roll_rad, roll_rate_rad_s : ndarray, shape (points,)
+
+    Raises
+    ------
+    ValueError
+        If the ship has no saddle.
+    """
+    saddle = max((abs(e.roll_rad) for e in equilibria(model) if not e.stable), default=0.0)
+    if saddle == 0:
+        raise ValueError(
+            "the ship has no angle of vanishing stability below 89 degrees, so that nothing bounds "
+            "her safe basin: give her righting levers that end (restoring_odd_nm or a GZ table)"
+        )
+    roll, rate = 1.4 * saddle, model.ship.natural_frequency_rad_s * saddle
+    return np.linspace(-roll, roll, points), np.linspace(-rate, rate, points)
+
+
+def capsize_map(
+    name: str,
+    model: RollModel,
+    frequency_rad_s: float,
+    wave_nm: float,
+    amplitude_nm: FloatArray,
+    roll_rad: FloatArray,
+    roll_rate_rad_s: FloatArray,
+    duration_s: float,
+    *,
+    progress: Callable[[float], None] | None = None,
+) -> CapsizeMap:
+    """Find equilibria, trajectories, safe basins and erosion of one ship.
+
+    Parameters
+    ----------
+    name : str
+    model : RollModel
+    frequency_rad_s : float
+        Of the wave moment, a cosine from the start on.
+    wave_nm : float
+        Amplitude for which the whole basin is kept.
+    amplitude_nm : ndarray, shape (n,)
+        Those for which its area is.
+    roll_rad, roll_rate_rad_s : ndarray, shape (a,), (b,)
+        Grid of starts; for the areas every fourth of them counts.
+    duration_s : float
+        How long a ship must survive.
+    progress : callable, optional
+        Told the finished fraction of the erosion, which takes most of the time.
+
+    Returns
+    -------
+    CapsizeMap
+
+    Raises
+    ------
+    ValueError
+        If no start of the grid survives in calm water.
+    """
+    grid = (roll_rad, roll_rate_rad_s, duration_s)
+    still = equilibria(model)
+    wave = WaveMoment([wave_nm], [frequency_rad_s], [0.0])
+    return CapsizeMap(
+        name,
+        still,
+        tuple(
+            _trajectory(model, saddle, side)
+            for saddle in still
+            if not saddle.stable
+            for side in (1 - NEAR, 1 + NEAR)
+        ),
+        roll_rad,
+        roll_rate_rad_s,
+        safe_basin(model, *grid),
+        safe_basin(model, *grid, wave=wave),
+        wave_nm,
+        amplitude_nm,
+        erosion(
+            model,
+            amplitude_nm,
+            frequency_rad_s,
+            roll_rad[::COARSE],
+            roll_rate_rad_s[::COARSE],
+            duration_s,
+            progress=progress,
+        ),
+    )
+
+
+def _trajectory(model: RollModel, saddle: Equilibrium, side: float) -> FloatArray:
+    """Roll and roll rate in calm water, from beside a saddle until she capsizes or settles."""
+    limit = model.coefficients.level_limit
+    roll = side * saddle.roll_rad
+    level = float(np.clip(math.tan(roll) * model.tank.width_m / 2, -limit, limit))
+    step_s = 0.02
+    steps = round(CYCLES * math.tau / model.ship.natural_frequency_rad_s / step_s)
+    run = simulate(model, steps * step_s, (roll, 0.0, level, 0.0), step_s=step_s)
+    return run.state[:, :2]

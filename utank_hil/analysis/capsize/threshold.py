@@ -1,0 +1,307 @@
+"""Capsizing of the nonlinear coupled model: equilibria, threshold, safe basin, probability.
+
+All of it runs on `simulate_batch`, which uses every core. A ship counts as capsized when its roll
+angle passes a given angle beyond the saddle.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.analysis.capsize.sea_stack import stacked_seas
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
+from utank_hil.dynamics.simulate import WaveComponents
+
+SCAN = 64  # amplitudes tried at once in the search for a threshold
+
+
+class Equilibrium(NamedTuple):
+    """Ship and water at rest.
+
+    Attributes
+    ----------
+    roll_rad, level_m : float
+    stable : bool
+        A minimum of the potential energy; otherwise a saddle.
+    """
+
+    roll_rad: float
+    level_m: float
+    stable: bool
+
+
+class Threshold(NamedTuple):
+    """Least amplitude of a regular wave moment that capsizes a ship.
+
+    Attributes
+    ----------
+    safe_nm, capsizing_nm : float
+        The amplitude lies between; infinite if no amplitude tried capsized her.
+    """
+
+    safe_nm: float
+    capsizing_nm: float
+
+
+class Probability(NamedTuple):
+    """Estimated probability of capsizing, with an exact (Clopper-Pearson) confidence interval.
+
+    Attributes
+    ----------
+    estimate, low, high : float
+    capsized, ships : int
+    """
+
+    estimate: float
+    low: float
+    high: float
+    capsized: int
+    ships: int
+
+
+def without_tank(model: RollModel) -> RollModel:
+    """The same ship with a billionth of the water, held back by friction.
+
+    Parameters
+    ----------
+    model : RollModel
+
+    Returns
+    -------
+    RollModel
+    """
+    tank = model.tank
+    return RollModel(
+        model.ship,
+        replace(
+            tank,
+            reservoir_area_m2=1e-9 * tank.reservoir_area_m2,
+            duct_area_m2=1e-9 * tank.duct_area_m2,
+            damping_ratio=1.0,
+        ),
+    )
+
+
+def equilibria(model: RollModel, limit_rad: float = math.radians(89)) -> tuple[Equilibrium, ...]:
+    """Where ship and water can stand still, unpumped and without waves.
+
+    Parameters
+    ----------
+    model : RollModel
+    limit_rad : float
+        Heel up to which to look, on either side; below 90 degrees.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        From port to starboard. A level at its limit is pressed against it.
+    """
+    from scipy.optimize import brentq
+
+    half, limit = model.tank.width_m / 2, model.coefficients.level_limit
+
+    def level(roll: float) -> float:  # the water lies flat, tan(roll) half, as far as it can
+        return float(np.clip(math.tan(roll) * half, -limit, limit))
+
+    def moment(roll: float) -> float:
+        state = np.array([roll, 0.0, level(roll), 0.0])
+        return float(model.derivative(state, stopped=True)[1])
+
+    grid = np.linspace(-limit_rad, limit_rad, 2001)
+    values = np.array([moment(roll) for roll in grid])
+    found = []
+    for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
+        roll = brentq(moment, grid[i], grid[i + 1], xtol=1e-14)
+        found.append(Equilibrium(roll, level(roll), bool(values[i] > 0)))
+    found += [
+        Equilibrium(float(grid[i]), level(grid[i]), bool(values[i - 1] > values[i + 1]))
+        for i in np.flatnonzero(values == 0)
+    ]
+    return tuple(sorted(found))
+
+
+def capsize_threshold(
+    model: RollModel,
+    frequency_rad_s: float,
+    highest_nm: float,
+    *,
+    duration_s: float = 300.0,
+    phase_rad: float = 0.0,
+    tolerance: float = 1e-3,
+    capsize_rad: float = math.pi / 2,
+) -> Threshold:
+    """Least amplitude of a regular wave moment, started on the ship at rest, that capsizes her.
+
+    The safe amplitudes need not form one interval (their border is fractal beyond a certain
+    forcing), so an even scan finds the first capsize, and each finer scan looks below it.
+
+    Parameters
+    ----------
+    model : RollModel
+    frequency_rad_s : float
+    highest_nm : float
+        Greatest amplitude to try.
+    duration_s : float
+    phase_rad : float
+        Of ``amplitude cos(frequency t + phase)`` at the start.
+    tolerance : float
+        Width of the bracket over the amplitude.
+    capsize_rad : float
+
+    Returns
+    -------
+    Threshold
+    """
+    low, high = 0.0, highest_nm
+    while True:
+        amplitude = np.linspace(low, high, SCAN + 1)[1:]
+        wave = WaveMoment(amplitude[:, None], [[frequency_rad_s]], [[phase_rad]])
+        result = simulate_batch(model, duration_s, wave=wave, capsize_rad=capsize_rad)
+        over = np.flatnonzero(np.isfinite(result.capsized_s))
+        if not over.size:
+            return Threshold(highest_nm, math.inf)
+        first = int(over[0])
+        high = float(amplitude[first])
+        low = float(amplitude[first - 1]) if first else low
+        if high - low <= tolerance * high:
+            return Threshold(low, high)
+
+
+def safe_basin(
+    model: RollModel,
+    roll_rad: FloatArray,
+    roll_rate_rad_s: FloatArray,
+    duration_s: float,
+    *,
+    wave: WaveComponents | None = None,
+    capsize_rad: float = math.pi / 2,
+) -> npt.NDArray[np.bool_]:
+    """Which starts survive; the water starts flat and at rest relative to the ship.
+
+    Parameters
+    ----------
+    model : RollModel
+    roll_rad : ndarray, shape (a,)
+    roll_rate_rad_s : ndarray, shape (b,)
+    duration_s : float
+    wave : WaveMoment, optional
+        One sea for all; calm if not given.
+    capsize_rad : float
+
+    Returns
+    -------
+    ndarray of bool, shape (b, a)
+    """
+    limit = model.coefficients.level_limit
+    roll, rate = np.meshgrid(roll_rad, roll_rate_rad_s)
+    level = np.clip(np.tan(roll) * model.tank.width_m / 2, -limit, limit)
+    initial = np.stack([roll, rate, level, np.zeros_like(roll)], axis=-1).reshape(-1, 4)
+    result = simulate_batch(
+        model,
+        duration_s,
+        initial,
+        wave=WaveMoment([], [], []) if wave is None else wave,
+        capsize_rad=capsize_rad,
+    )
+    return np.asarray(np.isinf(result.capsized_s).reshape(roll.shape))
+
+
+def erosion(
+    model: RollModel,
+    amplitude_nm: FloatArray,
+    frequency_rad_s: float,
+    roll_rad: FloatArray,
+    roll_rate_rad_s: FloatArray,
+    duration_s: float,
+    *,
+    capsize_rad: float = math.pi / 2,
+    progress: Callable[[float], None] | None = None,
+) -> FloatArray:
+    """Area of the safe basin under a regular wave moment, relative to that in calm water.
+
+    Parameters
+    ----------
+    model : RollModel
+    amplitude_nm : ndarray, shape (n,)
+    frequency_rad_s : float
+    roll_rad, roll_rate_rad_s : ndarray
+        Grid of starts, as for `safe_basin`.
+    duration_s : float
+    capsize_rad : float
+    progress : callable, optional
+        Told the finished fraction.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        If no start survives even in calm water.
+    """
+    grid = (roll_rad, roll_rate_rad_s, duration_s)
+    calm = int(np.count_nonzero(safe_basin(model, *grid, capsize_rad=capsize_rad)))
+    if not calm:
+        raise ValueError("no start of the grid survives in calm water: narrow it")
+    area = np.empty(len(amplitude_nm))
+    for n, amplitude in enumerate(amplitude_nm):
+        wave = WaveMoment([amplitude], [frequency_rad_s], [0.0])
+        basin = safe_basin(model, *grid, wave=wave, capsize_rad=capsize_rad)
+        area[n] = np.count_nonzero(basin) / calm
+        if progress is not None:
+            progress((n + 1) / len(amplitude_nm))
+    return area
+
+
+def capsize_probability(
+    model: RollModel,
+    seas: WaveMoment | Iterable[WaveComponents],
+    duration_s: float,
+    *,
+    confidence: float = 0.95,
+    capsize_rad: float = math.pi / 2,
+    progress: Callable[[float], None] | None = None,
+) -> Probability:
+    """Probability of capsizing within a time, by Monte Carlo over irregular seas.
+
+    Parameters
+    ----------
+    model : RollModel
+    seas : WaveMoment or iterable of utank_hil.sea.Harmonics
+        Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
+        as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for a number of seeds.
+    duration_s : float
+    confidence : float
+        Of the interval, between 0 and 1.
+    capsize_rad : float
+    progress : callable, optional
+        Told the finished fraction.
+
+    Returns
+    -------
+    Probability
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `stacked_seas`.
+    """
+    from scipy.stats import beta
+
+    stack = seas if isinstance(seas, WaveMoment) else stacked_seas(seas)
+    result = simulate_batch(
+        model, duration_s, wave=stack, capsize_rad=capsize_rad, progress=progress
+    )
+    ships = len(result.capsized_s)
+    capsized = int(np.count_nonzero(np.isfinite(result.capsized_s)))
+    tail = (1 - confidence) / 2
+    low = float(beta.ppf(tail, capsized, ships - capsized + 1)) if capsized else 0.0
+    safe = ships - capsized
+    high = float(beta.ppf(1 - tail, capsized + 1, safe)) if safe else 1.0
+    return Probability(capsized / ships, low, high, capsized, ships)

@@ -1,0 +1,180 @@
+"""Stability margins of a sampled law on the continuous plant behind delay and lag."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.interface import LinearLaw
+from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.transfer import state_space_response
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+DELAY_SAMPLES = 25
+"""Samples up to which a delay that destabilizes is looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """How far a loop is from instability, the loop broken at the pump.
+
+    Attributes
+    ----------
+    radius : float
+        Greatest eigenvalue magnitude of the closed loop; stable below one. When it is not, the
+        margins are zero (gains one) and say nothing else.
+    peak_sensitivity : float
+        Greatest abs(S) = abs(1 / (1 - L)); 1 / it is the distance of L from the critical point.
+    peak_frequency_rad_s : float
+        Where that is.
+    gain_low, gain_high : float
+        The loop is stable for any gain factor between these.
+    phase_margin_rad : float
+        Least lag or lead, taken alone, that destabilizes; inf if none does.
+    delay_margin_s : float
+        Least extra delay that destabilizes; inf if none up to `DELAY_SAMPLES` samples does.
+    disk_margin : float
+        Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex
+        abs(d) < 1, is harmless (symmetric disk); 2 is the most there is.
+    peak_loop_gain : float
+        Greatest abs(L); far below one the law does nothing for the roll, however robust.
+    """
+
+    radius: float
+    peak_sensitivity: float
+    peak_frequency_rad_s: float
+    gain_low: float
+    gain_high: float
+    phase_margin_rad: float
+    delay_margin_s: float
+    disk_margin: float
+    peak_loop_gain: float
+
+
+def margins(
+    law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float = 0.0, lag_s: float = 0.0
+) -> Margins:
+    """Margins of the loop that `law` closes around `system`.
+
+    Parameters
+    ----------
+    law : LinearLaw
+        One input.
+    system : control.StateSpace or LinearModel
+        Continuous, from the pump pressure to the outputs that the law sees, in its order.
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Raises
+    ------
+    ValueError
+        If the system has more than one input.
+    """
+    if system.B.shape[1] != 1:
+        raise ValueError(f"margins are those of one pump, the model has {system.B.shape[1]} inputs")
+    plant = sample(system, law.sample_time_s, delay_s, lag_s)
+    radius = closed_loop_radius(law, plant)
+    peak, peak_frequency_rad_s = peak_sensitivity(law, plant)
+    loop = loop_response(law, plant, _frequencies(law, plant))
+    peak_gain = float(np.abs(loop).max())
+    if radius >= 1:
+        return Margins(radius, peak, peak_frequency_rad_s, 1, 1, 0, 0, 0, peak_gain)
+    low, high = _gain_margins(loop)
+    return Margins(
+        radius=radius,
+        peak_sensitivity=peak,
+        peak_frequency_rad_s=peak_frequency_rad_s,
+        gain_low=low,
+        gain_high=high,
+        phase_margin_rad=_phase_margin(loop),
+        delay_margin_s=_delay_margin(law, system, delay_s, lag_s),
+        disk_margin=float(1 / np.abs(1 / (1 - loop) - 0.5).max()),
+        peak_loop_gain=peak_gain,
+    )
+
+
+def stability_grid(
+    law: LinearLaw,
+    systems: Iterable["StateSpace | LinearModel"],
+    gains: Iterable[float],
+    delay_s: float = 0.0,
+    lag_s: float = 0.0,
+) -> FloatArray:
+    """Closed-loop radius for each of `systems` (rows, continuous) at each plant gain (columns)."""
+    plants = [sample(system, law.sample_time_s, delay_s, lag_s) for system in systems]
+    gains = list(gains)
+    return np.array([[closed_loop_radius(law, plant, gain) for gain in gains] for plant in plants])
+
+
+def peak_sensitivity(law: LinearLaw, plant: "StateSpace | LinearModel") -> tuple[float, float]:
+    """Greatest abs(1 / (1 - L)) with a sampled plant, and its frequency in rad/s."""
+    w = _frequencies(law, plant)
+    size = np.abs(1 / (1 - loop_response(law, plant, w)))
+    return float(size.max()), float(w[size.argmax()])
+
+
+def loop_response(
+    law: LinearLaw, plant: "StateSpace | LinearModel", frequency_rad_s: FloatArray
+) -> ComplexArray:
+    """Loop transfer L(exp(j w Ts)) of one pump, sampled plant; shape (N,)."""
+    z = np.exp(1j * frequency_rad_s * law.sample_time_s)
+    loop: ComplexArray = (law.response(z) @ state_space_response(plant, z))[:, 0, 0]
+    return loop
+
+
+def _frequencies(law: LinearLaw, plant: "StateSpace | LinearModel") -> FloatArray:
+    """Up to the Nyquist frequency, dense around lightly damped modes of plant and closed loop."""
+    nyquist = np.pi / law.sample_time_s
+    grids = [np.geomspace(1e-3, nyquist, 1500), np.array([nyquist])]
+    modes = np.concatenate([np.linalg.eigvals(plant.A), closed_loop_eigenvalues(law, plant)])
+    for mode in np.log(modes[(modes.imag > 0) & (np.abs(modes) > 0.8)]) / law.sample_time_s:
+        width = max(abs(mode.real), 1e-6 * mode.imag)
+        grids.append(mode.imag + width * np.linspace(-4, 4, 101))
+    w: FloatArray = np.unique(np.concatenate(grids))
+    return w[(w > 0) & (w <= nyquist)]
+
+
+def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
+    """Gain factors nearest to one, below and above, that put L on the critical point 1."""
+    ends = loop[[0, -1]].real  # L is real at zero and at the Nyquist frequency
+    turn = np.flatnonzero(loop.imag[:-1] * loop.imag[1:] < 0)
+    share = loop.imag[turn] / (loop.imag[turn] - loop.imag[turn + 1])
+    real = np.concatenate([loop.real[turn] + share * (loop.real[turn + 1] - loop.real[turn]), ends])
+    critical = 1 / real[real > 0]
+    low = critical[critical < 1].max(initial=0.0)
+    return float(low), float(critical[critical > 1].min(initial=np.inf))
+
+
+def _phase_margin(loop: ComplexArray) -> float:
+    """Least angle of L from the positive real axis where its magnitude crosses one."""
+    size = np.abs(loop)
+    turn = np.flatnonzero((size[:-1] < 1) != (size[1:] < 1))
+    share = (1 - size[turn]) / (size[turn + 1] - size[turn])
+    angle = np.angle(loop[turn] + share * (loop[turn + 1] - loop[turn]))
+    return float(np.abs(angle).min(initial=np.inf))
+
+
+def _delay_margin(
+    law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float, lag_s: float
+) -> float:
+    """Search by eigenvalues: by quarters of a sample, then by bisection to 0.1 ms."""
+
+    def stable(extra_s: float) -> bool:
+        plant = sample(system, law.sample_time_s, delay_s + extra_s, lag_s)
+        return closed_loop_radius(law, plant) < 1
+
+    grid = law.sample_time_s * np.arange(1, 4 * DELAY_SAMPLES + 1) / 4
+    first = next((i for i, extra_s in enumerate(grid) if not stable(extra_s)), None)
+    if first is None:
+        return float("inf")
+    bad = float(grid[first])
+    good = bad - law.sample_time_s / 4
+    while bad - good > 1e-4:
+        middle = (good + bad) / 2
+        good, bad = (middle, bad) if stable(middle) else (good, middle)
+    return good

@@ -1,0 +1,129 @@
+"""The robustness that a law must have before it may be armed."""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.analysis.loop.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.margins import Margins, margins, peak_sensitivity, stability_grid
+from utank_hil.control.interface import LinearLaw
+from utank_hil.control.predictive.design import pump_model
+from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+PEAK_SENSITIVITY = 2.0
+EXTRA_DELAY_S = 0.020  # two base ticks
+PERIOD_SCALES = (0.7, 0.85, 1.0, 1.15, 1.3)
+INERTIA_SCALES = (0.8, 1.25)  # a load spread inwards, and outwards
+GAINS = (0.8, 1.0, 1.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Robustness:
+    """What a law's loop stands.
+
+    Attributes
+    ----------
+    nominal : Margins
+        On the ship it was designed for.
+    late_radius, late_peak_sensitivity : float
+        Closed-loop radius and peak sensitivity with `EXTRA_DELAY_S` more delay.
+    worst_radius : float
+        Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by her
+        stiffness) and `INERTIA_SCALES` of her inertia, `GAINS` of the pump, and `EXTRA_DELAY_S`
+        more delay or none.
+    worst_period_scale, worst_inertia_scale, worst_gain, worst_extra_delay_s : float
+        Where that is; of the first two one is 1.
+    """
+
+    nominal: Margins
+    late_radius: float
+    late_peak_sensitivity: float
+    worst_radius: float
+    worst_period_scale: float
+    worst_inertia_scale: float
+    worst_gain: float
+    worst_extra_delay_s: float
+
+    def failures(self) -> tuple[str, ...]:
+        """What is missing, in words; empty for a law that may be armed.
+
+        What is not a number is missing, too.
+        """
+        found = []
+        if not self.nominal.radius < 1:
+            found.append(f"unstable on its own ship (eigenvalue {self.nominal.radius:.4f})")
+        if not self.nominal.peak_sensitivity <= PEAK_SENSITIVITY:
+            found.append(
+                f"peak sensitivity {self.nominal.peak_sensitivity:.2f} is above "
+                f"{PEAK_SENSITIVITY:g}"
+            )
+        if not self.late_radius < 1:
+            found.append(f"unstable with {1e3 * EXTRA_DELAY_S:g} ms more delay")
+        if not self.worst_radius < 1:
+            ship = f"at {self.worst_period_scale:g} of the ship's roll period"
+            if self.worst_inertia_scale != 1:
+                ship = f"at {self.worst_inertia_scale:g} of the ship's inertia"
+            late = ""
+            if self.worst_extra_delay_s:
+                late = f" and {1e3 * self.worst_extra_delay_s:g} ms more delay"
+            found.append(f"unstable {ship} with {self.worst_gain:g} of the pump's gain{late}")
+        return tuple(found)
+
+
+def robustness(
+    law: LinearLaw,
+    ship: RollShip,
+    tank: Tank,
+    measured: tuple[str, ...],
+    delay_s: float = 0.05,
+    lag_s: float = 0.1,
+) -> Robustness:
+    """Judge a law on its ship, late, and on a grid of ships, pump gains and delays.
+
+    Parameters
+    ----------
+    law : LinearLaw
+    ship : RollShip
+    tank : Tank
+    measured : tuple of str
+        Outputs the law sees.
+    delay_s, lag_s : float
+        As in `sampled_model`.
+    """
+    model = pump_model(ship, tank, measured)
+    late = sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
+    variants = list(_variants(ship))
+    systems = [pump_model(variant, tank, measured) for _, _, variant in variants]
+    extra_s = (0.0, EXTRA_DELAY_S)
+    radii = np.array(
+        [stability_grid(law, systems, GAINS, delay_s + extra, lag_s) for extra in extra_s]
+    )
+    when, which, gain = np.unravel_index(int(radii.argmax()), radii.shape)
+    period_scale, inertia_scale, _ = variants[which]
+    return Robustness(
+        nominal=margins(law, model, delay_s, lag_s),
+        late_radius=closed_loop_radius(law, late),
+        late_peak_sensitivity=peak_sensitivity(law, late)[0],
+        worst_radius=float(radii[when, which, gain]),
+        worst_period_scale=period_scale,
+        worst_inertia_scale=inertia_scale,
+        worst_gain=GAINS[gain],
+        worst_extra_delay_s=extra_s[when],
+    )
+
+
+def _variants(ship: RollShip) -> Iterator[tuple[float, float, RollShip]]:
+    """Scales of period and of inertia, and the ship that has them.
+
+    Stability changes the stiffness and with it the period; the load's spread the inertia.
+    """
+    for scale in PERIOD_SCALES:
+        stiffness = ship.stiffness_nm_rad / scale**2
+        yield scale, 1.0, dataclasses.replace(ship, stiffness_nm_rad=stiffness)
+    for scale in INERTIA_SCALES:
+        inertia = ship.inertia_kg_m2 * scale
+        yield 1.0, scale, dataclasses.replace(ship, inertia_kg_m2=inertia)

@@ -1,0 +1,167 @@
+"""What a law trades: less roll against robustness and pressure, as its effort is scaled."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.sea_response import MotionInSea, motion_in_sea, require_roll
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.interface import LinearLaw
+from utank_hil.control.limits import PumpLimits
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.predictive.design import PredictiveDesign
+from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.sea import Harmonics
+
+Design = PredictiveDesign | ConstrainedDesign | LQGDesign
+
+WEIGHT_FACTORS: Final = tuple(float(factor) for factor in np.geomspace(1e-2, 1e2, 17))
+HORIZON_FACTORS: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TradePoint:
+    """One law of a trade.
+
+    Attributes
+    ----------
+    factor : float
+        Of the weight or horizon; 1 is the design as it stands.
+    motion : MotionInSea or None
+        Linear prediction; None if the loop is unstable on its own ship.
+    roll_below_passive : float or None
+        Share by which the roll RMS is less than with the passive tank.
+    robustness : Robustness
+    """
+
+    factor: float
+    motion: MotionInSea | None
+    roll_below_passive: float | None
+    robustness: Robustness
+
+    @property
+    def refused(self) -> bool:
+        """Whether the law misses a required margin."""
+        return bool(self.robustness.failures())
+
+
+@dataclass(frozen=True, slots=True)
+class Trade:
+    """A trade, from the gentlest law to the hardest.
+
+    Attributes
+    ----------
+    varied : str
+        What is scaled, in words.
+    passive : MotionInSea
+        With the tank alone.
+    points : tuple of TradePoint
+    """
+
+    varied: str
+    passive: MotionInSea
+    points: tuple[TradePoint, ...]
+
+
+def varied(design: Design) -> str:
+    """What `scaled` scales: the output weight, or the control horizon of an exact deadbeat."""
+    if isinstance(design, LQGDesign):
+        return "state weight"
+    if isinstance(design, PredictiveDesign) and design.output_weight is None:
+        return "control horizon"
+    return "output weight"
+
+
+def scaled(design: Design, factor: float) -> Design:
+    """The same design with its `varied` parameter multiplied.
+
+    A horizon is rounded to whole samples and its window of targets keeps its length. A constrained
+    design has its pressure weight divided, which comes to the same.
+    """
+    if isinstance(design, ConstrainedDesign):
+        return replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / factor)
+    if isinstance(design, LQGDesign):
+        return replace(design, state_weight=tuple(factor * w for w in design.state_weight))
+    if design.output_weight is not None:
+        return replace(design, output_weight=tuple(factor * w for w in design.output_weight))
+    horizon = max(1, round(factor * design.control_horizon))
+    window = design.prediction_horizon - design.control_horizon
+    return replace(design, control_horizon=horizon, prediction_horizon=horizon + window)
+
+
+def trade(
+    design: Design,
+    ship: RollShip,
+    tank: Tank,
+    wave_moment: Harmonics,
+    delay_s: float = 0.05,
+    lag_s: float = 0.1,
+    *,
+    limits: PumpLimits | None = None,
+    factors: Sequence[float] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trade:
+    """Design, judge and predict a law for each factor; about half a second each.
+
+    Parameters
+    ----------
+    design : PredictiveDesign, ConstrainedDesign or LQGDesign
+    ship : RollShip
+    tank : Tank
+    wave_moment : Harmonics
+        The sea's roll moment in N m.
+    delay_s, lag_s : float
+        As in `sampled_model`.
+    limits : PumpLimits, optional
+        For a constrained design; its loop is judged and predicted within them, where it is linear.
+    factors : sequence of float, optional
+        Positive; `WEIGHT_FACTORS` or `HORIZON_FACTORS` when left out.
+    progress : callable, optional
+        Told the finished fraction.
+
+    Raises
+    ------
+    CalmSeaError
+        If the sea does not roll the ship: there is no roll to trade.
+    """
+    horizon = varied(design) == "control horizon"
+    if factors is None:
+        factors = HORIZON_FACTORS if horizon else WEIGHT_FACTORS
+    # a longer horizon asks for less
+    factors = sorted(factors, reverse=horizon)
+    system = coupled_model(ship, tank)
+    measured = (
+        design.measured if isinstance(design, ConstrainedDesign) else design.predictor.measured
+    )
+    passive = motion_in_sea(None, system, measured, wave_moment)
+    require_roll(passive)
+    points = []
+    for number, factor in enumerate(factors, 1):
+        law = _law(scaled(design, factor), ship, tank, delay_s, lag_s, limits)
+        judged = robustness(law, ship, tank, measured, delay_s, lag_s)
+        motion = less = None
+        if judged.nominal.radius < 1:
+            motion = motion_in_sea(law, system, measured, wave_moment, delay_s, lag_s)
+            less = 1 - motion.roll_rms_rad / passive.roll_rms_rad
+        points.append(TradePoint(factor, motion, less, judged))
+        if progress is not None:
+            progress(number / len(factors))
+    return Trade(varied(design), passive, tuple(points))
+
+
+def _law(
+    design: Design,
+    ship: RollShip,
+    tank: Tank,
+    delay_s: float,
+    lag_s: float,
+    limits: PumpLimits | None,
+) -> LinearLaw:
+    if isinstance(design, ConstrainedDesign):
+        return design.law(ship, tank, delay_s, lag_s, limits)
+    return design.law(ship, tank, delay_s, lag_s)

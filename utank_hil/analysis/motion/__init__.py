@@ -1,0 +1,1 @@
+"""A record of motion: statistics, decay, exceedance, and what people on board have of it."""

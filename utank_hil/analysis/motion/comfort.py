@@ -1,0 +1,202 @@
+"""What roll means for people on board: apparent gravity, stumbling, work limits, sickness.
+
+A place on board at a height Z above and a distance y to starboard of the centre of gravity, the
+ship rolling about the latter with nothing else moving, feels in body axes::
+
+    lateral  = g sin(phi) - Z phi'' + y phi'^2       to starboard
+    vertical = g cos(phi) - y phi'' - Z phi'^2       towards the deck
+
+The lateral one is the lateral force estimator of Baitis, Woolaver and Beck (1983) for roll alone.
+Sway, heave, yaw and pitch add to both on a real ship and are not in it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from utank_hil.analysis.motion.motion_sickness import (
+    motion_sickness_dose,
+    motion_sickness_incidence,
+)
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+STANDING: Final = 0.25
+"""Tipping coefficient of a person who stands facing forward or aft, Graham (1990)."""
+EXPOSURE_S: Final = 7200.0
+"""Two hours, as in the experiments behind the motion sickness incidence."""
+
+
+class WorkLimit(NamedTuple):
+    """Root mean squares up to which people can do something on board.
+
+    Attributes
+    ----------
+    work : str
+    roll_rad : float
+    lateral_m_s2, vertical_m_s2 : float
+    """
+
+    work: str
+    roll_rad: float
+    lateral_m_s2: float
+    vertical_m_s2: float
+
+
+def _limit(work: str, roll_deg: float, lateral_g: float, vertical_g: float) -> WorkLimit:
+    return WorkLimit(
+        work, math.radians(roll_deg), lateral_g * GRAVITY_M_S2, vertical_g * GRAVITY_M_S2
+    )
+
+
+NORDFORSK_1987: Final = (
+    _limit("light manual work", 6.0, 0.10, 0.20),
+    _limit("heavy manual work", 4.0, 0.07, 0.15),
+    _limit("intellectual work", 3.0, 0.05, 0.10),
+    _limit("transit passengers", 2.5, 0.04, 0.05),
+    _limit("cruise liner", 2.0, 0.03, 0.02),
+)
+"""NORDFORSK (1987), "Assessment of ship performance in a seaway": criteria for accelerations and
+roll."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comfort:
+    """What a roll record means at a place on board.
+
+    Attributes
+    ----------
+    lateral_rms_m_s2 : float
+        Lateral force estimator; it contains gravity.
+    vertical_rms_m_s2 : float
+        Vertical acceleration, without gravity's mean.
+    gravity_angle_rms_rad : float
+        Effective gravity angle: between apparent gravity and the normal of the deck.
+    interruptions_per_min : float
+        `motion_induced_interruptions` of a standing person.
+    sickness_percent : float
+        `motion_sickness_incidence` over `EXPOSURE_S` of motion like this.
+    sickness_dose_m_s15 : float
+        `motion_sickness_dose` over the same time.
+    allowed_work : tuple of str
+        What NORDFORSK (1987) allows here.
+    """
+
+    lateral_rms_m_s2: float
+    vertical_rms_m_s2: float
+    gravity_angle_rms_rad: float
+    interruptions_per_min: float
+    sickness_percent: float
+    sickness_dose_m_s15: float
+    allowed_work: tuple[str, ...]
+
+
+def comfort(
+    roll_rad: FloatArray,
+    roll_rate_rad_s: FloatArray,
+    step_s: float,
+    height_m: float,
+    starboard_m: float = 0.0,
+) -> Comfort:
+    """Judge a roll record at a place on board.
+
+    Parameters
+    ----------
+    roll_rad, roll_rate_rad_s : ndarray, shape (n,)
+        Evenly sampled, ten samples a second or more.
+    step_s : float
+    height_m, starboard_m : float
+        Of the place above, and to starboard of, the ship's centre of gravity.
+    """
+    lateral, vertical = apparent_gravity(roll_rad, roll_rate_rad_s, step_s, height_m, starboard_m)
+    heave = vertical - vertical.mean()
+    roll_rms, lateral_rms, vertical_rms = _rms(roll_rad), _rms(lateral), _rms(heave)
+    ups = _up_crossings(heave)
+    duration_s = step_s * len(heave)
+    sickness = motion_sickness_incidence(vertical_rms, ups / duration_s, EXPOSURE_S) if ups else 0.0
+    return Comfort(
+        lateral_rms_m_s2=lateral_rms,
+        vertical_rms_m_s2=vertical_rms,
+        gravity_angle_rms_rad=_rms(np.arctan2(lateral, vertical)),
+        interruptions_per_min=motion_induced_interruptions(lateral, vertical, step_s),
+        sickness_percent=sickness,
+        sickness_dose_m_s15=motion_sickness_dose(heave, step_s)
+        * math.sqrt(EXPOSURE_S / duration_s),
+        allowed_work=allowed_work(roll_rms, lateral_rms, vertical_rms),
+    )
+
+
+def apparent_gravity(
+    roll_rad: FloatArray,
+    roll_rate_rad_s: FloatArray,
+    step_s: float,
+    height_m: float,
+    starboard_m: float = 0.0,
+) -> tuple[FloatArray, FloatArray]:
+    """Lateral and vertical part of gravity minus acceleration, the module's equation.
+
+    Parameters
+    ----------
+    roll_rad, roll_rate_rad_s : ndarray, shape (n,)
+    step_s : float
+    height_m, starboard_m : float
+        As for `comfort`.
+
+    Returns
+    -------
+    lateral_m_s2, vertical_m_s2 : ndarray, shape (n,)
+    """
+    acceleration = np.gradient(roll_rate_rad_s, step_s)
+    square = np.square(roll_rate_rad_s)
+    lateral = GRAVITY_M_S2 * np.sin(roll_rad) - height_m * acceleration + starboard_m * square
+    vertical = GRAVITY_M_S2 * np.cos(roll_rad) - starboard_m * acceleration - height_m * square
+    return lateral, vertical
+
+
+def motion_induced_interruptions(
+    lateral_m_s2: FloatArray,
+    vertical_m_s2: FloatArray,
+    step_s: float,
+    tipping_coefficient: float = STANDING,
+) -> float:
+    """How often a minute a standing person must stop working to keep balance.
+
+    Counts the tips: lateral above `tipping_coefficient` times vertical apparent gravity, to either
+    side. Graham (1990), "Motion-induced interruptions as ship operability criteria", Naval
+    Engineers Journal 102(2), calls 0.1 a minute possible, 0.5 probable, 1.5 serious, 3 severe and 5
+    extreme.
+
+    Parameters
+    ----------
+    lateral_m_s2, vertical_m_s2 : ndarray, shape (n,)
+        From `apparent_gravity`.
+    step_s : float
+    tipping_coefficient : float
+        Half the stance over the height of the centre of gravity.
+    """
+    limit = tipping_coefficient * vertical_m_s2
+    tips = _up_crossings(lateral_m_s2 - limit) + _up_crossings(-lateral_m_s2 - limit)
+    return float(60 * tips / (step_s * len(lateral_m_s2)))
+
+
+def allowed_work(
+    roll_rms_rad: float, lateral_rms_m_s2: float, vertical_rms_m_s2: float
+) -> tuple[str, ...]:
+    """What people may do within all three limits of `NORDFORSK_1987`."""
+    return tuple(
+        limit.work
+        for limit in NORDFORSK_1987
+        if roll_rms_rad <= limit.roll_rad
+        and lateral_rms_m_s2 <= limit.lateral_m_s2
+        and vertical_rms_m_s2 <= limit.vertical_m_s2
+    )
+
+
+def _rms(signal: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(signal))))
+
+
+def _up_crossings(signal: FloatArray) -> int:
+    return int(np.count_nonzero((signal[:-1] < 0) & (signal[1:] >= 0)))

@@ -1,0 +1,113 @@
+"""Motion sickness from vertical acceleration: McCauley et al. (1976) and ISO 2631-1:1997.
+
+Both know vertical acceleration alone. Roll makes some, away from the centre line
+(`utank_hil.analysis.motion.comfort`); heave and pitch, which are not modelled here, usually make
+more.
+"""
+
+import math
+from statistics import NormalDist
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+MIXED_POPULATION: Final = 1 / 3  # % per m/s^1.5: unadapted men and women, ISO 2631-1 annex D
+
+
+def motion_sickness_incidence(
+    acceleration_rms_m_s2: float, frequency_hz: float, exposure_s: float
+) -> float:
+    """Share of people, in percent, who vomit within an exposure to vertical oscillation.
+
+    ::
+
+        MSI = 100 Phi(z_a) Phi(z_t)
+        z_a = 2.128 log10(a) - 9.277 log10(f) - 5.809 log10(f)^2 - 1.851
+        z_t = 1.134 z_a + 1.989 log10(t) - 2.904
+
+    a RMS in g, f in Hz, t in minutes, Phi the normal distribution. McCauley, Royal, Wylie, O'Hanlon
+    and Mackie (1976), "Motion sickness incidence: exploratory studies of habituation, pitch and
+    roll, and the refinement of a mathematical model", Human Factors Research, AD-A024 709;
+    unadapted young men, single frequencies. For irregular motion f is its mean frequency.
+
+    Parameters
+    ----------
+    acceleration_rms_m_s2 : float
+    frequency_hz : float
+    exposure_s : float
+
+    Returns
+    -------
+    float
+        0 to 100.
+
+    Raises
+    ------
+    ValueError
+        If an argument is negative, or frequency or exposure is zero.
+    """
+    if not (acceleration_rms_m_s2 >= 0 and frequency_hz > 0 and exposure_s > 0):
+        raise ValueError(
+            "motion sickness needs an acceleration of zero or more and a positive frequency and "
+            f"exposure, got {acceleration_rms_m_s2}, {frequency_hz} and {exposure_s}"
+        )
+    if acceleration_rms_m_s2 == 0:
+        return 0.0
+    f = math.log10(frequency_hz)
+    z_a = 2.128 * math.log10(acceleration_rms_m_s2 / GRAVITY_M_S2) - 9.277 * f - 5.809 * f**2
+    z_a -= 1.851
+    z_t = 1.134 * z_a + 1.989 * math.log10(exposure_s / 60) - 2.904
+    normal = NormalDist()
+    return 100 * normal.cdf(z_a) * normal.cdf(z_t)
+
+
+def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
+    """Motion sickness dose value MSDV_z, ISO 2631-1:1997 D.1, in m/s^1.5.
+
+    The root of the time integral of the squared vertical acceleration after the weighting W_f. The
+    weighting is applied to the record's Fourier transform, as if the record went on periodically.
+
+    Parameters
+    ----------
+    acceleration_m_s2 : ndarray, shape (n,)
+        Evenly sampled, several samples a second; its mean is taken out.
+    step_s : float
+
+    Returns
+    -------
+    float
+    """
+    spectrum = np.fft.rfft(acceleration_m_s2 - np.mean(acceleration_m_s2))
+    frequency_hz = np.arange(len(spectrum)) / (step_s * len(acceleration_m_s2))
+    weight = vertical_weighting(frequency_hz)
+    weighted = np.fft.irfft(np.abs(weight) * spectrum, len(acceleration_m_s2))
+    return float(np.sqrt(np.sum(np.square(weighted)) * step_s))
+
+
+def vomiting_incidence(dose_m_s15: float) -> float:
+    """Percentage who may vomit after a dose, ISO 2631-1:1997 annex D: a third of the dose."""
+    return MIXED_POPULATION * dose_m_s15
+
+
+def vertical_weighting(frequency_hz: FloatArray) -> ComplexArray:
+    """Frequency weighting W_f of ISO 2631-1:1997 annex A, shape of `frequency_hz`.
+
+    Band limits 0.08 and 0.63 Hz (Butterworth), transition at 0.25 Hz (Q 0.86), upward step from
+    0.0625 Hz (Q 0.80) to 0.1 Hz (Q 0.80).
+    """
+    # in Hz throughout: only ratios count
+    s = np.asarray(1j * frequency_hz, dtype=np.complex128)
+    high_pass = s**2 / _second_order(s, 0.08, math.sqrt(0.5)) / 0.08**2
+    low_pass = 1 / _second_order(s, 0.63, math.sqrt(0.5))
+    transition = 1 / _second_order(s, 0.25, 0.86)
+    step = _second_order(s, 0.0625, 0.80) / _second_order(s, 0.1, 0.80) * (0.0625 / 0.1) ** 2
+    weighting: ComplexArray = high_pass * low_pass * transition * step
+    return weighting
+
+
+def _second_order(s: ComplexArray, corner: float, quality: float) -> ComplexArray:
+    polynomial: ComplexArray = 1 + s / (quality * corner) + (s / corner) ** 2
+    return polynomial

@@ -1,0 +1,159 @@
+"""What the configuration files hold.
+
+Sections that stand for a model or a node are the dataclasses of the code itself, so a key in a file
+is the parameter of the same name.
+"""
+
+import math
+import warnings
+from typing import Annotated, Any, Final
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from utank_hil.configuration.files import Section
+from utank_hil.configuration.laws import Law, build_law, sample_time
+from utank_hil.configuration.vessel import Vessel
+from utank_hil.control import PredictiveDesign, PumpLimits
+from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
+from utank_hil.identification.record_length import record_problems
+from utank_hil.parameters import ParameterError, Problem, refuse
+from utank_hil.retuning.settings import RetuningSettings
+from utank_hil.runtime.bus_model import SimulatedBus
+from utank_hil.runtime.supervisor import SafetyLimits
+
+TICK_S: Final = 0.01
+"""Of the controller's loop; a law's sample time is a whole number of them."""
+
+MOST_PULSES_S: Final = 3600.0
+"""Longest identification: the pulses and the record are kept in memory."""
+
+
+class ControllerConfig(Section):
+    """The controller's side, ``configs/controllers``: what ``utank-hil run`` takes."""
+
+    name: str
+    vessel: Vessel
+    law: Law
+    delay_s: Annotated[float, Field(ge=0, le=1)] = 0.05
+    """From the sampling of a measurement to the drive's answer to the command made of it."""
+    accept_low_margins: bool = False
+    """Use the law even if it misses the required margins."""
+    limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
+    """Those not given are the vessel's (`Vessel.default_limits`)."""
+    safety: SafetyLimits = SafetyLimits()
+    command_timeout_ms: Annotated[float, Field(ge=20, le=100)] = 50.0
+    bit_rate: Annotated[int, Field(ge=10_000, le=1_000_000)] = 250_000
+    retuning: RetuningSettings | None = None
+    """How the controller may retune itself; without it, it never does."""
+
+    @field_validator("limits", mode="before")
+    @classmethod
+    def _as_the_vessel_allows(cls, limits: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        if vessel is None or not isinstance(limits, dict):
+            return limits
+        return {**vessel.default_limits, **limits}
+
+    @field_validator("bit_rate")
+    @classmethod
+    def _bits_of_whole_nanoseconds(cls, bit_rate: int) -> int:
+        try:
+            SimulatedBus(bit_rate)
+        except ValueError as error:
+            raise ValueError(str(error).partition(": ")[2]) from error
+        return bit_rate
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "ControllerConfig":
+        problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
+        refuse("", problems)
+        return self
+
+    def _limit_problems(self) -> list[Problem]:
+        pressure_pa = self.vessel.pump.max_pressure_pa
+        level_m = self.vessel.tank.level_limit_m
+        return [
+            (
+                f"limits.{name}",
+                f"is {value:g}, but the vessel's {why}: set it to {most:g} or less, or leave it "
+                "out",
+            )
+            for name, value, most, why in (
+                (
+                    "pressure_pa",
+                    self.limits.pressure_pa,
+                    pressure_pa,
+                    f"pump gives {pressure_pa:g} at most",
+                ),
+                (
+                    "level_m",
+                    self.limits.level_m,
+                    level_m,
+                    f"tank is full or empty at {level_m:g}",
+                ),
+            )
+            if value > most
+        ]
+
+    def _retuning_problems(self) -> list[Problem]:
+        settings, law = self.retuning, self.law
+        if settings is None:
+            return []
+        if not isinstance(law, PredictiveDesign) or "roll_rad" not in law.predictor.measured:
+            return [("retuning", "is for predictive laws (gpc, dpc) that measure roll_rad")]
+        problems = []
+        period_s = law.predictor.sample_time_s
+        if settings.order > MOST_ORDER:
+            problems.append(("order", f"must be {MOST_ORDER} at most, got {settings.order}"))
+        shortest_s, longest_s = settings.pulse_hold_s
+        if not period_s / 2 < shortest_s <= longest_s <= settings.identification_s:
+            problems.append(
+                (
+                    "pulse_hold_s",
+                    f"must rise from the law's sample time, {period_s:g} s, to identification_s at "
+                    f"most, got {shortest_s:g} and {longest_s:g}",
+                )
+            )
+        if settings.identification_s > MOST_PULSES_S:
+            reason = f"must be {MOST_PULSES_S:g} at most, got {settings.identification_s:g}"
+            problems.append(("identification_s", reason))
+        longest_roll_s = settings.roll_period_range_s[1]
+        most_rad_s = WASHOUT_SHARE * 2 * math.pi / longest_roll_s
+        if law.washout_rad_s > most_rad_s:
+            reason = (
+                f"must leave {most_rad_s:.4g} or more for the law's washout_rad_s, "
+                f"{law.washout_rad_s:g}: lower one of the two"
+            )
+            problems.append(("roll_period_range_s", reason))
+        problems += record_problems(
+            settings.order,
+            round(settings.identification_s / period_s),
+            len(law.predictor.measured),
+            period_s,
+            settings.roll_period_range_s[0],
+        )
+        return [(f"retuning.{name}", reason) for name, reason in problems]
+
+    def _law_problems(self) -> list[Problem]:
+        """What keeps the law from being designed for this vessel."""
+        name, period_s = sample_time(self.law)
+        ticks = period_s / TICK_S
+        if round(ticks) < 1 or abs(ticks - round(ticks)) > 1e-6:
+            reason = f"must be a whole number of ticks of {TICK_S:g} s, got {period_s:g}"
+            return [(f"law.{name}", reason)]
+        try:
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                # an equation that was solved for another matrix than the one given
+                warnings.simplefilter("error", RuntimeWarning)
+                linear = build_law(self.law, self.vessel, self.delay_s, self.limits).linear
+                sound = linear is None or all(
+                    np.isfinite(matrix).all() for matrix in linear.matrices()[:4]
+                )
+        except ParameterError as error:
+            return [(f"law.{name}", reason) for name, reason in error.problems]
+        except (ValueError, ArithmeticError, RuntimeWarning) as error:
+            return [("law", f"can't be designed for this vessel: {error}")]
+        if not sound:
+            return [("law", "gives no finite law: its weights or noises are beyond all scale")]
+        return []

@@ -1,0 +1,272 @@
+"""Reading configuration files: YAML that may name other YAML files, and errors that name the place.
+
+A value that is the name of a ``.yaml`` file stands for that file's content, and one that begins
+with ``./`` or ``../`` is the path of a data file; both are relative to the file they stand in.
+Every error carries the file and key where the wrong value was written.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from utank_hil.configuration.known_keys import instead_of
+from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
+from utank_hil.parameters import ParameterError
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+class Section(BaseModel):
+    """One mapping of a configuration file: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigProblem:
+    """One thing wrong in a configuration.
+
+    Attributes
+    ----------
+    file : Path
+        File in which the value stands.
+    key : str
+        Dotted key within that file; empty for the file as a whole.
+    reason : str
+        What is wrong with it and what is expected.
+    """
+
+    file: Path
+    key: str
+    reason: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}: {self.key}" if self.key else str(self.file)
+        return f"{place}: {self.reason}"
+
+
+class ConfigError(ValueError):
+    """A configuration can't be used; `problems` lists everything found, not just the first."""
+
+    def __init__(self, problems: list[ConfigProblem]) -> None:
+        super().__init__("\n".join(str(problem) for problem in problems))
+        self.problems = problems
+
+
+def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
+    """Read and validate a configuration file with all the files it names.
+
+    Parameters
+    ----------
+    path : Path or str
+        The YAML file.
+    model : type of pydantic.BaseModel
+        What the file must hold.
+
+    Raises
+    ------
+    ConfigError
+        With every problem found: unreadable files, YAML errors, keys written twice, unknown or
+        missing keys and values out of range. What an unreadable file was to hold is not missed.
+    """
+    reader = _Reader()
+    content = reader.read(Path(path))
+    if () in reader.unread:
+        raise ConfigError(reader.problems)
+    problems = list(reader.problems)
+    try:
+        loaded = model.model_validate(content)
+    except ValidationError as error:
+        for item in error.errors():
+            problems += reader.located(item, content, model)
+    except (ArithmeticError, MemoryError, RecursionError) as error:
+        reason = f"holds a number beyond all scale, or too many of them: {error}"
+        problems.append(ConfigProblem(Path(path), "", reason))
+    if problems:
+        raise ConfigError(problems)
+    return loaded
+
+
+def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
+    """Which of several models a file is written for, by its keys.
+
+    Parameters
+    ----------
+    path : Path or str
+        The YAML file.
+    models : dict of str to type of pydantic.BaseModel
+        By the names of the kinds.
+
+    Returns
+    -------
+    str
+        Kind whose own keys, those of no other kind, occur most often.
+
+    Raises
+    ------
+    ConfigError
+        If the file can't be read, or its keys decide for none of the kinds.
+    """
+    reader = _Reader()
+    content = reader.read(Path(path))
+    if () in reader.unread:
+        raise ConfigError(reader.problems)
+    own = {
+        kind: set(model.model_fields).difference(
+            *(other.model_fields for name, other in models.items() if name != kind)
+        )
+        for kind, model in models.items()
+    }
+    found = {kind: len(keys.intersection(content)) for kind, keys in own.items()}
+    best = max(found.values())
+    kinds = [kind for kind, count in found.items() if count == best]
+    if best == 0 or len(kinds) > 1:
+        known = "; ".join(f"a {kind} has {', '.join(sorted(own[kind]))}" for kind in models)
+        reason = f"has the keys of no {', '.join(models)} alone: {known}"
+        raise ConfigError([ConfigProblem(Path(path), "", reason)])
+    return kinds[0]
+
+
+class _Reader:
+    """Puts the content of files together and remembers where each part of it was written.
+
+    Attributes
+    ----------
+    problems : list of ConfigProblem
+    unread : set of Key
+        Keys of the whole that stand for files which could not be read.
+    """
+
+    def __init__(self) -> None:
+        self.problems: list[ConfigProblem] = []
+        self.unread: set[Key] = set()
+        self._origins: dict[Key, Path] = {}
+
+    def read(
+        self, file: Path, key: Key = (), stack: tuple[Path, ...] = (), namer: Key | None = None
+    ) -> Any:
+        """Content of a file, with the files it names put in place.
+
+        Parameters
+        ----------
+        file : Path
+        key : tuple
+            Where it stands in the whole.
+        stack : tuple of Path
+            Files that this one is being read for.
+        namer : tuple, optional
+            Key of the value that names it.
+        """
+        try:
+            resolved = file.resolve()
+            text = file.read_text(encoding="utf-8")
+        except (OSError, RuntimeError, ValueError) as error:
+            reason = f"can't be read: {_why(error)}"
+            if namer is None:
+                return self._give_up(key, ConfigProblem(file, "", reason))
+            where, within = self._within(namer)
+            named = ConfigProblem(where, _dotted(within), f"names {file}, which {reason}")
+            return self._give_up(key, named)
+        if resolved in stack:
+            circle = ConfigProblem(file, "", "includes itself; break the circle")
+            return self._give_up(key, circle)
+        try:
+            content, findings = parse_yaml(text)
+        except YamlError as error:
+            return self._give_up(key, ConfigProblem(file, "", str(error)))
+        for at, reason in findings:
+            self.problems.append(ConfigProblem(file, _dotted(at), reason))
+        if not isinstance(content, dict):
+            reason = "must hold a mapping of keys to values"
+            return self._give_up(key, ConfigProblem(file, "", reason))
+        self._origins[key] = file
+        return self._resolve(content, key, file, (*stack, resolved))
+
+    def located(self, error: Any, content: Any, model: type[BaseModel]) -> list[ConfigProblem]:
+        """An error of validation as problems at the place where the value was written."""
+        at = _written(error, content)
+        if any(at[: len(key)] == key for key in self.unread):
+            return []
+        cause = error.get("ctx", {}).get("error")
+        if isinstance(cause, ParameterError):
+            found = [(at + _split(name), reason) for name, reason in cause.problems]
+        else:
+            found = [(at, _reason(error, model))]
+        problems = []
+        for key, reason in found:
+            file, within = self._within(key)
+            problems.append(ConfigProblem(file, _dotted(within), reason))
+        return problems
+
+    def _give_up(self, key: Key, problem: ConfigProblem) -> dict[str, Any]:
+        self.problems.append(problem)
+        self.unread.add(key)
+        self._origins.setdefault(key, problem.file)
+        return {}
+
+    def _resolve(self, value: Any, key: Key, file: Path, stack: tuple[Path, ...]) -> Any:
+        if isinstance(value, dict):
+            return {
+                name: self._resolve(item, (*key, name), file, stack)
+                for name, item in value.items()
+                if isinstance(name, str)  # another was a finding
+            }
+        if isinstance(value, list):
+            return [
+                self._resolve(item, (*key, index), file, stack) for index, item in enumerate(value)
+            ]
+        if isinstance(value, str) and value.endswith(".yaml"):
+            return self.read(file.parent / value, key, stack, key)
+        if isinstance(value, str) and value.startswith(("./", "../")):
+            return str(file.parent / value)
+        return value
+
+    def _within(self, key: Key) -> tuple[Path, Key]:
+        """File that holds `key`, and the rest of the key within that file."""
+        depth = max(n for n in range(len(key) + 1) if key[:n] in self._origins)
+        return self._origins[key[:depth]], key[depth:]
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return "is not UTF-8 text" if isinstance(error, UnicodeDecodeError) else str(error)
+
+
+def _dotted(key: Key) -> str:
+    return ".".join(str(part) for part in key)
+
+
+def _split(name: str) -> Key:
+    return tuple(name.split(".")) if name else ()
+
+
+def _written(error: Any, content: Any) -> Key:
+    """The key as it stands in the file: pydantic names the chosen kind of a section as well."""
+    location = error["loc"]
+    key: Key = ()
+    for index, part in enumerate(location):
+        if isinstance(content, dict):
+            absent = error["type"] == "missing" and index == len(location) - 1
+            if part not in content and not absent:
+                continue
+            content = content.get(part)
+        elif isinstance(content, list):
+            if not isinstance(part, int) or part >= len(content):
+                continue
+            content = content[part]
+        key = (*key, part)
+    return key
+
+
+def _reason(error: Any, model: type[BaseModel]) -> str:
+    reason = str(error["msg"]).removeprefix("Value error, ")
+    if error["type"] == "missing":
+        return "is required but missing"
+    if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        return "is not a known key" + instead_of(model, error["loc"])
+    if isinstance(error["input"], dict | list | tuple | BaseModel):
+        return reason
+    return f"{reason} (got {error['input']!r})"

@@ -1,0 +1,136 @@
+"""Seas in configuration files: the spectra that a scenario and a law can name alike.
+
+A scenario draws its waves from one; a law that foresees the waves is made for one.
+"""
+
+from dataclasses import fields
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_validator
+
+from utank_hil.configuration.files import Section
+from utank_hil.control.sea_model import SeaModel
+from utank_hil.parameters import ParameterError, Positive
+from utank_hil.sea import (
+    MeasuredSpectra,
+    Spectrum,
+    ittc,
+    jonswap,
+    load_ndbc,
+    pierson_moskowitz,
+)
+
+
+class JonswapSpectrum(Section):
+    """A growing sea."""
+
+    kind: Literal["jonswap"]
+    hs_m: Positive
+    tp_s: Positive
+    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
+
+    def spectrum(self) -> Spectrum:
+        """JONSWAP spectrum."""
+        return jonswap(self.hs_m, self.tp_s, self.gamma)
+
+
+class IttcSpectrum(Section):
+    """A sea of given height and period, Bretschneider's two-parameter spectrum."""
+
+    kind: Literal["ittc"]
+    hs_m: Positive
+    tp_s: Positive
+
+    def spectrum(self) -> Spectrum:
+        """ITTC spectrum."""
+        return ittc(self.hs_m, self.tp_s)
+
+
+class PiersonMoskowitzSpectrum(Section):
+    """A fully developed sea: the height settles the period."""
+
+    kind: Literal["pierson_moskowitz"]
+    hs_m: Positive
+
+    def spectrum(self) -> Spectrum:
+        """Pierson-Moskowitz spectrum."""
+        return pierson_moskowitz(self.hs_m)
+
+
+class MeasuredSpectrum(Section):
+    """One hour of a buoy's record."""
+
+    kind: Literal["measured"]
+    file: Path
+    """Spectral density, NDBC's yearly or 45-day layout."""
+    time: datetime
+    """Start of the record's hour as written in the file, UTC unless it names another zone."""
+
+    @field_validator("file")
+    @classmethod
+    def _readable(cls, file: Path) -> Path:
+        read_spectra(file)
+        return file
+
+    @field_validator("time")
+    @classmethod
+    def _hour_is_there(cls, time: datetime, info: ValidationInfo) -> datetime:
+        if time.tzinfo is not None:
+            time = time.astimezone(UTC).replace(tzinfo=None)
+        if "file" in info.data:
+            spectrum = read_spectra(info.data["file"]).at(time.isoformat())
+            if spectrum.moment(0) == 0:
+                raise ValueError("the spectrum holds no energy: choose another hour")
+        return time
+
+    def spectrum(self) -> Spectrum:
+        """The hour's spectrum."""
+        return read_spectra(self.file).at(self.time.isoformat())
+
+
+AnySpectrum = Annotated[
+    MeasuredSpectrum | JonswapSpectrum | IttcSpectrum | PiersonMoskowitzSpectrum,
+    Field(discriminator="kind"),
+]
+"""A spectrum by its kind."""
+
+_SPECTRUM: Final[TypeAdapter[Any]] = TypeAdapter(AnySpectrum)
+_BANDS: Final = ("frequency_hz", "density_m2_hz")
+
+
+def _bands_of(content: Any) -> Any:
+    """The section ``sea`` of a law with its spectrum as bands, if it names one by its kind."""
+    if not (isinstance(content, dict) and "kind" in content):
+        return content
+    told = [name for name in _BANDS if name in content]
+    if told:
+        reason = "and kind exclude each other: remove one"
+        raise ParameterError("sea", [(name, reason) for name in told])
+    model_keys = {each.name for each in fields(SeaModel)}
+    named = {name: value for name, value in content.items() if name not in model_keys}
+    spectrum = _SPECTRUM.validate_python(named).spectrum()
+    bands = zip(_BANDS, (spectrum.frequency_hz, spectrum.density), strict=True)
+    return {
+        **{name: value for name, value in content.items() if name in model_keys},
+        **{name: tuple(values.tolist()) for name, values in bands},
+    }
+
+
+LawSea = Annotated[SeaModel, BeforeValidator(_bands_of)]
+"""The section ``sea`` of a law: bands, or a spectrum by its kind, and the keys of `SeaModel`."""
+
+
+def read_spectra(file: Path, direction_file: Path | None = None) -> MeasuredSpectra:
+    """Spectra of a file; pydantic lists ValueErrors with their key, and no other errors.
+
+    Raises
+    ------
+    ValueError
+        If a file can't be read, or does not hold what it should.
+    """
+    try:
+        return load_ndbc(file, direction_file)
+    except OSError as error:
+        raise ValueError(f"{error.filename} can't be read: {error.strerror}") from error

@@ -1,0 +1,1 @@
+"""Predictive laws that plan within the limits of pump and tank."""

@@ -1,0 +1,224 @@
+"""From a ship, a tank and the sea that is expected to a constrained predictive law.
+
+A Kalman filter on the model of ship, tank, drive, waves and heel (`sea_plant`) tells the state;
+what it foresees of the waves is in every prediction. The cost is roll, level and pressure over the
+horizon, and roll and level for ever after it with the tank passive: a plan that leaves the ship
+swinging is not cheap. What a steady heel explains of the motion is taken off first.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Final, Literal
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.constrained.horizon import condense
+from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.constrained.sea_plant import sea_plant
+from utank_hil.control.limits import PumpLimits
+from utank_hil.control.lqg import kalman_predictor
+from utank_hil.control.predictive.design import measured_problems, per_output
+from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import (
+    NotNegative,
+    Positive,
+    Range,
+    SampleTime,
+    Share,
+    range_problems,
+    refuse,
+)
+
+# A step must end well inside its tick, whatever is measured. With each of these at its most, a sea
+# model of the greatest order, and random measurements of up to 100 times any motion, which use up
+# the iterations, the slowest of 1200 steps took 1.5 to 2.5 ms of one thread's time on a shared
+# server (AMD EPYC); with 40 knots 0.9 ms, the median 0.24 ms. The default has 19.
+MOST_KNOTS: Final = 60
+MOST_HORIZON: Final = 400
+MOST_ITERATIONS: Final = 200
+# a metre above the level limit costs as much as this roll over the whole horizon
+_PENALTY_ROLL_RAD = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class ConstrainedDesign:
+    """A constrained predictive law in parameters: what a configuration file holds.
+
+    Parameters
+    ----------
+    kind : {"constrained_gpc"}
+    sea : SeaModel
+        The sea it expects.
+    measured : tuple of str
+        Outputs, in order, the level among them; names of `STATES`.
+    measurement_std : tuple of float
+        Standard deviation of the white noise on each, in its unit.
+    pressure_noise_pa_rt_s : float
+        Root of the two-sided density of a white pressure disturbance: what the model ignores.
+    slope_noise_rad_rt_s : float
+        The same of a white roll moment, per roll stiffness.
+    knots : tuple of int
+        Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
+    horizon : int
+        Samples N that are planned, 400 at most. After them the tank is taken to be passive for
+        ever.
+    pressure_weight_rad2 : float
+        Greatest pressure throughout costs as much as this square of a roll angle.
+    level_weight_rad2_m2 : float
+        A level of one metre costs as much as this square of a roll angle.
+    level_margin_m : float
+        Kept from the limit on the level.
+    heel_std_rad, heel_time_s : float
+        Standard deviation and time constant of a slowly varying heel that is told from the waves.
+    heel_share : float
+        Part of that heel which the tank takes out, 0 to 1. With 0 the pump holds no steady pressure
+        and the roll about the heel is controlled; the level that the heel brings is known to the
+        level limit all the same.
+    iteration_limit : int
+        Budget of a quadratic programme, 200 at most.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    kind: Literal["constrained_gpc"]
+    sea: SeaModel
+    measured: tuple[str, ...] = ("roll_rad", "roll_rate_rad_s", "level_m")
+    measurement_std: tuple[Positive, ...] = (2e-4, 5e-4, 3.5e-3)
+    pressure_noise_pa_rt_s: NotNegative = 10e3
+    slope_noise_rad_rt_s: NotNegative = 2.5e-3
+    knots: tuple[int, ...] = (0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56)
+    horizon: Annotated[int, Range(least=1, most=MOST_HORIZON)] = 60
+    pressure_weight_rad2: Positive = 2.6e-4
+    level_weight_rad2_m2: NotNegative = 3e-5
+    level_margin_m: NotNegative = 0.2
+    heel_std_rad: NotNegative = 0.01
+    heel_time_s: Positive = 50e3
+    heel_share: Share = 0.0
+    iteration_limit: Annotated[int, Range(least=1, most=MOST_ITERATIONS)] = 60
+    sample_time_s: SampleTime = 0.2
+
+    def __post_init__(self) -> None:
+        problems = [
+            *measured_problems(self.measured, "roll_rad", "level_m"),
+            *range_problems(self),
+        ]
+        if len(self.measurement_std) != len(self.measured):
+            problems.append(per_output("measurement_std", self.measurement_std, self.measured))
+        if len(self.knots) > MOST_KNOTS:
+            reason = f"must be {MOST_KNOTS} at most, or a step may outlast its tick"
+            problems.append(("knots", f"{reason}, got {len(self.knots)}"))
+        rising = all(early < late for early, late in pairwise(self.knots))
+        if not (self.knots and self.knots[0] == 0 and rising and self.knots[-1] < self.horizon):
+            problems.append(
+                (
+                    "knots",
+                    f"must increase from 0 and stay below the horizon of {self.horizon} samples, "
+                    f"got {self.knots}",
+                )
+            )
+        refuse("constrained design", problems)
+
+    def law(
+        self,
+        ship: RollShip,
+        tank: Tank,
+        delay_s: float = 0.05,
+        lag_s: float = 0.1,
+        limits: PumpLimits | None = None,
+    ) -> ConstrainedLaw:
+        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of its range.
+        """
+        limits = limits or PumpLimits()
+        if not self.level_margin_m < limits.level_m:
+            reason = (
+                f"{self.level_margin_m} leaves nothing of the level limit {limits.level_m} m: "
+                "lower it, or raise the limit"
+            )
+            refuse("constrained design", [("level_margin_m", reason)])
+        plant, covariance = sea_plant(
+            self.sea,
+            ship,
+            tank,
+            pressure_noise_pa_rt_s=self.pressure_noise_pa_rt_s,
+            slope_noise_rad_rt_s=self.slope_noise_rad_rt_s,
+            heel_std_rad=self.heel_std_rad,
+            heel_time_s=self.heel_time_s,
+            sample_time_s=self.sample_time_s,
+            delay_s=delay_s,
+            lag_s=lag_s,
+        )
+        rows = [STATES.index(name) for name in self.measured]
+        model = plant._replace(C=plant.C[rows], D=plant.D[rows])
+        observer_gain, _ = kalman_predictor(
+            model, covariance, np.diag(np.square(self.measurement_std))
+        )
+        weights = {"roll_rad": 1.0, "level_m": self.level_weight_rad2_m2}
+        weight = np.array([weights.get(name, 0.0) for name in self.measured])
+        horizon = condense(
+            model,
+            self.knots,
+            self.horizon,
+            weight,
+            self.pressure_weight_rad2 / limits.pressure_pa**2,
+            terminal=_passive_cost(model, weight),
+        )
+        steady_state, steady_command = _steady(plant, self.heel_share)
+        return ConstrainedLaw(
+            model=model,
+            observer_gain=observer_gain,
+            horizon=horizon,
+            limits=PumpLimits(
+                limits.pressure_pa,
+                limits.rate_pa_s,
+                limits.level_m - self.level_margin_m,
+                limits.power_w,
+            ),
+            level_output=self.measured.index("level_m"),
+            level_penalty=_PENALTY_ROLL_RAD**2 * self.horizon,
+            reservoir_area_m2=tank.reservoir_area_m2,
+            steady_state=steady_state,
+            steady_command=steady_command,
+            iteration_limit=self.iteration_limit,
+        )
+
+
+def _passive_cost(model: LinearModel, weight: FloatArray) -> FloatArray:
+    """L with |L x|^2 the weighed squares of all outputs from the state x on, the pump at zero."""
+    from scipy.linalg import solve_discrete_lyapunov
+
+    cost = solve_discrete_lyapunov(model.A.T, model.C.T @ (weight[:, None] * model.C))
+    values, vectors = np.linalg.eigh((cost + cost.T) / 2)
+    root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return root
+
+
+def _steady(plant: LinearModel, share: float) -> tuple[FloatArray, FloatArray]:
+    """Equilibrium under the heel, the last state, with that share of it taken out by the pump."""
+    n = len(plant.A)
+    motion = slice(0, n - 1)
+    rest = np.eye(n - 1) - plant.A[motion, motion]
+    by_heel = np.linalg.solve(rest, plant.A[motion, -1])
+    by_pump = np.linalg.solve(rest, plant.B[motion, 0])
+    roll = STATES.index("roll_rad")
+    roll_by_heel = plant.C[roll, motion] @ by_heel
+    roll_by_pump = plant.C[roll, motion] @ by_pump + plant.D[roll, 0]
+    command = -share * roll_by_heel / roll_by_pump
+    state, steady_command = np.zeros((n, n)), np.zeros(n)
+    state[motion, -1] = by_heel + by_pump * command
+    state[-1, -1] = 1.0
+    steady_command[-1] = command
+    return state, steady_command

@@ -1,0 +1,251 @@
+"""Predictive control that plans within the limits of pump and tank.
+
+Every sample it looks for the plan of least cost (`utank_hil.control.constrained.horizon`) with::
+
+    |P| <= pressure limit          at every knot
+    P At h' <= power limit         at every knot, with the water's speed h' of the last plan
+    |P(q+1) - P(q)| <= rate Ts     along the plan, and from the command that left last
+    |h| <= level limit + s         s >= 0 as small as its cost makes it
+
+The pressure can always be brought to zero at its rate limit and s can be anything, so there is
+always a plan, whatever the waves do to the level. As long as the analytic optimum, linear in the
+state, touches no limit, it is the plan; else a quadratic programme is solved
+(`utank_hil.control.constrained.plan_programme`). When that takes more than its budget of
+iterations, the last plan goes on; a plan ends in the steady command, zero if no heel is to be
+corrected, so if that lasts, the tank is passive.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.constrained.horizon import Horizon
+from utank_hil.control.constrained.plan_programme import PlanProgramme
+from utank_hil.control.limits import PumpLimits
+from utank_hil.control.lqg import LQGLaw
+from utank_hil.dynamics.sampling import LinearModel
+from utank_hil.parameters import Positive, Range, range_problems, refuse
+
+_FOLLOWED = 0.02  # of the greatest pressure: a mean command this near to the plan's counts as it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstrainedLaw:
+    """What a `ConstrainedController` is made from; without its limits, a linear law.
+
+    Attributes
+    ----------
+    model : LinearModel
+        Discrete, from the pump's command to the m measured outputs.
+    observer_gain : ndarray, shape (n, m)
+        L of ``x(k+1) = A x(k) + B u(k) + L (y(k) - C x(k) - D u(k))``.
+    horizon : Horizon
+        Cost and predictions of `model`.
+    limits : PumpLimits
+        Of which pressure, rate, level and power count.
+    level_output : int or None
+        Which output is the level; None leaves level and power without limit.
+    level_penalty : float
+        Cost of a metre above the level limit, in the unit of the horizon's cost.
+    reservoir_area_m2 : float
+        At, for the power.
+    steady_state : ndarray, shape (n, n)
+        From the state to the part of it that a steady heel explains: the cost is that of the rest.
+    steady_command : ndarray, shape (n,)
+        From the state to the command that belongs to that part.
+    iteration_limit : int
+        Budget of a programme.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, or the power is limited without a level to tell it from.
+    """
+
+    model: LinearModel
+    observer_gain: FloatArray
+    horizon: Horizon
+    limits: PumpLimits
+    level_output: int | None
+    level_penalty: Positive
+    reservoir_area_m2: Positive
+    steady_state: FloatArray
+    steady_command: FloatArray
+    iteration_limit: Annotated[int, Range(least=1)] = 60
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        outputs = len(self.model.C)
+        if self.level_output is not None and not 0 <= self.level_output < outputs:
+            reason = f"must be one of the {outputs} outputs, 0 to {outputs - 1}"
+            problems.append(("level_output", f"{reason}, got {self.level_output}"))
+        if self.level_output is None and self.limits.power_w < math.inf:
+            reason = (
+                f"{self.limits.power_w:g} can't be kept without the water's speed: name the "
+                "level_output, or set power_w to infinity"
+            )
+            problems.append(("limits.power_w", reason))
+        refuse("constrained law", problems)
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between two steps."""
+        return self.model.dt
+
+    def controller(self) -> "ConstrainedController":
+        """A new steppable controller, at rest."""
+        return ConstrainedController(self)
+
+    def matrices(self) -> LinearModel:
+        """The law from y to u while no limit is touched."""
+        return self.unlimited().matrices()
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """Its transfer matrix at the points `z`, shape (N,); shape (N, 1, m)."""
+        return self.unlimited().response(z)
+
+    def unlimited(self) -> LQGLaw:
+        """The law as it is while no limit is touched: one that knows of none."""
+        rest = np.eye(len(self.steady_state)) - self.steady_state
+        gain = -(self.horizon.unlimited_state[:1] @ rest + self.steady_command)
+        return LQGLaw(self.model, gain, self.observer_gain)
+
+
+class ConstrainedController:
+    """Steps a `ConstrainedLaw`.
+
+    Parameters
+    ----------
+    law : ConstrainedLaw
+
+    Attributes
+    ----------
+    limited : bool
+        Whether a limit bent the last plan.
+    fallbacks : int
+        How often a programme was not solved within its budget.
+    """
+
+    def __init__(self, law: ConstrainedLaw) -> None:
+        model, horizon, limits = law.model, law.horizon, law.limits
+        self.sample_time_s = model.dt
+        self._a, self._b, self._c, self._d = model.A, model.B[:, 0], model.C, model.D[:, 0]
+        self._observer_gain = law.observer_gain
+        self._plan_gain = horizon.unlimited_state @ (np.eye(len(model.A)) - law.steady_state)
+        self._target_gains = horizon.unlimited_target
+        self._constant_target_gain: FloatArray = horizon.unlimited_target.sum(axis=0)
+        self._hessian = horizon.hessian
+        self._steady_command = law.steady_command
+        self._interpolation = horizon.interpolation
+        self._programme = PlanProgramme(
+            horizon,
+            limits,
+            model.dt,
+            law.level_output,
+            law.level_penalty,
+            law.iteration_limit,
+        )
+        output = law.level_output or 0
+        self._levels_state = horizon.outputs_state[:, output] + np.outer(
+            horizon.outputs_held[:, output], law.steady_command
+        )
+        self._levels_plan = horizon.outputs_plan[:, output]
+        self._held_state = self._levels_state[self._programme.held]
+        self._pressure_pa = limits.pressure_pa
+        self._step_pa = limits.rate_pa_s * model.dt
+        self._reach_pa = self._step_pa * (horizon.knots + 1.0)
+        samples = len(horizon.interpolation)
+        self._next = np.minimum(horizon.knots + 1, samples - 1)
+        self._knots = np.minimum(horizon.knots, samples - 2)
+        power_pa_m_s = limits.power_w / law.reservoir_area_m2
+        self._power_pa_m_s = math.inf if law.level_output is None else power_pa_m_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past: state, plan and command zero."""
+        self._state = np.zeros(len(self._a))
+        self._plan_pa = np.zeros(len(self._interpolation))
+        self._command_pa = 0.0  # the last answer
+        self._before_pa = 0.0  # where the command stood before it
+        self._mean_pa = 0.0  # of the commands that left since then
+        self._mean_before_pa = 0.0
+        self._last_pa = 0.0  # the command that left last
+        self.limited = False
+        self.fallbacks = 0
+        self._programme.forget()
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Take the newest measurement, shape (m,), and return the command, shape (1,).
+
+        `reference`, shape (m,) or (N, m), is the target of the outputs: one for the whole horizon,
+        or one for each sample of it.
+        """
+        state, mean = self._state, self._mean_pa
+        surprise = y - self._c.dot(state) - self._d * mean
+        state = self._a.dot(state) + self._b * mean + self._observer_gain.dot(surprise)
+        self._state = state
+        best = self._plan_gain.dot(state)
+        if reference is not None:
+            if reference.ndim == 1:
+                best += self._constant_target_gain @ reference
+            else:
+                best += np.einsum("qjm,qm->j", self._target_gains, reference)
+        self._plan_pa = self._plan(best, float(self._steady_command.dot(state)))
+        # the solver keeps its bounds to a tolerance
+        low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
+        command = min(max(float(self._plan_pa[0]), low), high)
+        command = min(max(command, -self._pressure_pa), self._pressure_pa)
+        self._before_pa, self._mean_before_pa = self._last_pa, mean
+        self._command_pa = self._mean_pa = self._last_pa = command
+        return np.array([command])
+
+    def applied(self, u: FloatArray) -> None:
+        """Tell the mean of the commands that left since the last step, shape (1,).
+
+        Where the last one of them stood is told from it: where the answer would have brought it, at
+        once or at the rate limit, if the mean agrees with that, else straight on from the mean.
+        """
+        mean = float(u[0])
+        change = self._command_pa - self._before_pa
+        ramped = self._command_pa - change * abs(change) / (2 * self._step_pa)
+        near = _FOLLOWED * self._pressure_pa
+        if abs(mean - self._command_pa) < near or abs(mean - ramped) < near:
+            last = self._command_pa
+        else:
+            last = mean + (mean - self._mean_before_pa) / 2
+        self._mean_pa = mean
+        self._last_pa = min(max(last, -self._pressure_pa), self._pressure_pa)
+
+    def _plan(self, best: FloatArray, steady_pa: float) -> FloatArray:
+        """Commands at each sample of the horizon; `best` is the analytic plan."""
+        low, high = self._bounds(steady_pa)
+        last = self._last_pa - steady_pa
+        levels = self._held_state.dot(self._state)
+        plan: FloatArray | None = best
+        self.limited = not self._programme.respects(best, low, high, last, levels)
+        if self.limited:
+            plan = self._programme.solve(-self._hessian.dot(best), low, high, last, levels)
+        if plan is None:
+            self.fallbacks += 1
+            return np.append(self._plan_pa[1:], steady_pa)
+        commands: FloatArray = self._interpolation.dot(plan)
+        return commands + steady_pa
+
+    def _bounds(self, steady_pa: float) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest pressure at the knots, less the steady command."""
+        high = np.full(len(self._knots), self._pressure_pa)
+        low = -high
+        if self._power_pa_m_s < math.inf:
+            plan = self._plan_pa[self._next] - steady_pa
+            levels = self._levels_state.dot(self._state) + self._levels_plan.dot(plan)
+            speed = np.diff(levels)[self._knots] / self.sample_time_s
+            share = self._power_pa_m_s / np.maximum(np.abs(speed), 1e-9)
+            high = np.where(speed > 0, np.minimum(high, share), high)
+            low = np.where(speed < 0, np.maximum(low, -share), low)
+        # what the rate limit does not let it reach is no bound
+        high = np.maximum(high, self._last_pa - self._reach_pa)
+        low = np.minimum(low, self._last_pa + self._reach_pa)
+        return low - steady_pa, high - steady_pa

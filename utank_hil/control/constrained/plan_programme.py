@@ -1,0 +1,129 @@
+"""The quadratic programme behind a constrained plan, built once.
+
+The plan z is the command at the knots less a steady part c. In units of the greatest pressure, with
+a slack s that the level may exceed its limit by::
+
+    minimize    1/2 z'H z + f'z + penalty (s + s^2 / 2)
+    subject to  low <= c + z <= high,    |z_j - z_{j-1}| <= rate Ts (samples between),
+                -h_max - s <= level <= h_max + s,    s >= 0
+"""
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.constrained.active_set import ActiveSetSolver
+from utank_hil.control.constrained.horizon import Horizon
+from utank_hil.control.limits import PumpLimits
+
+LEVEL_SPACING = 3  # samples between two at which the level is held
+_FREE = 1e30
+
+
+class PlanProgramme:
+    """Programme of a horizon within limits.
+
+    Parameters
+    ----------
+    horizon : Horizon
+        In Pa; j knots.
+    limits : PumpLimits
+    sample_time_s : float
+    level_output : int or None
+        Which output is the level; None leaves the level free.
+    level_penalty : float
+        Cost of a metre above the limit, in the unit of the horizon's cost.
+    iteration_limit : int
+
+    Attributes
+    ----------
+    held : ndarray of int, shape (l,)
+        Samples of the horizon at which the level is held.
+    """
+
+    def __init__(
+        self,
+        horizon: Horizon,
+        limits: PumpLimits,
+        sample_time_s: float,
+        level_output: int | None,
+        level_penalty: float,
+        iteration_limit: int,
+    ) -> None:
+        knots, samples = len(horizon.knots), len(horizon.interpolation)
+        end = 0 if level_output is None else samples
+        self.held = np.arange(LEVEL_SPACING - 1, end, LEVEL_SPACING)
+        levels = len(self.held)
+        self._by_plan: FloatArray = horizon.outputs_plan[self.held, level_output or 0]
+        self._level_m = limits.level_m
+        self._rise_pa = limits.rate_pa_s * sample_time_s * np.diff(horizon.knots, prepend=-1)
+
+        unit = self._unit_pa = limits.pressure_pa
+        hessian = horizon.hessian * unit**2
+        cost = float(np.trace(hessian)) / knots
+        self._gradient_scale = unit / cost
+        penalty = level_penalty / cost
+        whole = np.zeros((knots + 1, knots + 1))
+        whole[:knots, :knots], whole[knots, knots] = hessian / cost, penalty
+        slack = np.ones((levels, 1))
+        by_plan = self._by_plan * unit
+        steps = np.eye(knots) - np.eye(knots, k=-1)
+        rows = np.block([[steps, np.zeros((knots, 1))], [by_plan, -slack], [by_plan, slack]])
+        self._solver = ActiveSetSolver(whole, rows, iteration_limit)
+
+        self._knots = knots
+        self._gradient = np.full(knots + 1, penalty)
+        self._lower = np.full(2 * knots + 1 + 2 * levels, -_FREE)
+        self._upper = np.full(len(self._lower), _FREE)
+        self._lower[knots] = 0.0
+        self._rates = slice(knots + 1, 2 * knots + 1)
+        self._low_side = slice(2 * knots + 1 + levels, None)
+        self._high_side = slice(2 * knots + 1, 2 * knots + 1 + levels)
+
+    def forget(self) -> None:
+        """Start the next solution from nothing: as newly built."""
+        self._solver.forget()
+
+    def respects(
+        self, plan: FloatArray, low: FloatArray, high: FloatArray, last: float, levels: FloatArray
+    ) -> bool:
+        """Whether a plan keeps all limits; arguments as for `solve`."""
+        if (plan < low).any() or (plan > high).any():
+            return False
+        steps = np.diff(plan, prepend=last)
+        if (np.abs(steps) > self._rise_pa).any():
+            return False
+        return bool((np.abs(levels + self._by_plan @ plan) <= self._level_m).all())
+
+    def solve(
+        self,
+        gradient: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        last: float,
+        levels: FloatArray,
+    ) -> FloatArray | None:
+        """The best plan in Pa, shape (j,), or None if the budget did not suffice.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (j,)
+            f, per Pa.
+        low, high : ndarray, shape (j,)
+            Bounds of the plan.
+        last : float
+            The command that left last, less the steady part.
+        levels : ndarray, shape (l,)
+            Levels at the samples `held` with the steady command alone.
+        """
+        unit, knots = self._unit_pa, self._knots
+        lower, upper = self._lower, self._upper
+        self._gradient[:knots] = gradient * self._gradient_scale
+        lower[:knots], upper[:knots] = low / unit, high / unit
+        rates = self._rise_pa / unit
+        lower[self._rates], upper[self._rates] = -rates, rates
+        lower[self._rates.start] += last / unit
+        upper[self._rates.start] += last / unit
+        upper[self._high_side] = self._level_m - levels
+        lower[self._low_side] = -self._level_m - levels
+        solution = self._solver.solve(self._gradient, lower, upper)
+        return None if solution is None else solution[:knots] * unit

@@ -1,0 +1,191 @@
+"""Direct adaptive fuzzy control of roll, thesis section 4.4.3: the law's own gains are adapted.
+
+For phi'' = f(x) + g(x) u + d with f, d unknown and only the sign and a least size of g known. No
+parameter of the fuzzy model of f is identified; its basis xi (`FuzzyBasis`) only says how strongly
+to act. With s = B' P e (`ErrorDynamics`) and psi = 1 + x'x + abs(xi):
+
+`SmallGainFuzzy`, (4.20)-(4.22), one parameter lambda::
+
+    u = -lambda theta s,    theta = xi xi' / (4 gamma^2) + psi^2 / (4 rho^2)
+    lambda' = Gamma (theta s^2 - sigma (lambda - lambda_0))
+
+`RobustFuzzy`, (4.23)-(4.24), two parameters lambda and theta::
+
+    u = -lambda xi xi' s / (2 gamma^2) - theta psi tanh(theta psi s / epsilon)
+    lambda' = Gamma_1 (xi xi' s^2 / (2 gamma^2) - sigma_1 (lambda - lambda_0))
+    theta' = Gamma_2 (psi abs(s) - sigma_2 (theta - theta_0))
+
+The acceleration u is turned into pressure by a nominal g. The leakage (sigma) is integrated exactly
+over a sample, so that the parameters stay bounded and positive at any sample time; what drives them
+rests while the command is cut short or another law is in charge.
+
+Derivation, and where the print differs: docs/controllers.md.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
+from utank_hil.parameters import NotNegative, Positive, Problem, Range
+
+_Gamma = Annotated[float, Range(above=0, below=1)]
+
+
+@dataclass(frozen=True, slots=True)
+class SmallGainFuzzy(FuzzyLaw):
+    """Law (4.20)-(4.22); q above 2.
+
+    Parameters
+    ----------
+    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
+        As in `FuzzyLaw`.
+    gamma : float
+        Below 1.
+    rho : float
+    adaptation, leakage : float
+        Gamma and sigma.
+    initial : float
+        lambda_0, zero or more.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range.
+    """
+
+    gamma: _Gamma
+    rho: Positive
+    adaptation: Positive
+    leakage: Positive
+    initial: NotNegative = 0.0
+
+    def _problems(self) -> list[Problem]:
+        return [*FuzzyLaw._problems(self), *_q_problems(self, above=2)]
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Parameters (lambda,) to start from and leak to."""
+        return (self.initial,)
+
+    def answer(
+        self, parameters: tuple[float, ...], s: float, square: float, psi: float
+    ) -> tuple[float, tuple[float, ...]]:
+        """Acceleration u, and what drives each parameter, before leakage."""
+        theta = square / (4 * self.gamma**2) + psi**2 / (4 * self.rho**2)
+        return -parameters[0] * theta * s, (theta * s * s,)
+
+    @property
+    def rates(self) -> tuple[tuple[float, float], ...]:
+        """Gamma and sigma of each parameter."""
+        return ((self.adaptation, self.leakage),)
+
+    def controller(self) -> "DirectFuzzyController":
+        """A new steppable controller."""
+        return DirectFuzzyController(self)
+
+
+@dataclass(frozen=True, slots=True)
+class RobustFuzzy(FuzzyLaw):
+    """Law (4.23)-(4.24); q above 1.
+
+    Parameters
+    ----------
+    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
+        As in `FuzzyLaw`.
+    gamma : float
+        Below 1.
+    epsilon : float
+        Softness of the switching term.
+    adaptation, leakage : tuple of float
+        Gamma_1, Gamma_2 and sigma_1, sigma_2.
+    initial : tuple of float
+        lambda_0, theta_0, zero or more.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range.
+    """
+
+    gamma: _Gamma
+    epsilon: Positive
+    adaptation: tuple[Positive, Positive]
+    leakage: tuple[Positive, Positive]
+    initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+
+    def _problems(self) -> list[Problem]:
+        return [*FuzzyLaw._problems(self), *_q_problems(self, above=1)]
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Parameters (lambda, theta) to start from and leak to."""
+        return self.initial
+
+    def answer(
+        self, parameters: tuple[float, ...], s: float, square: float, psi: float
+    ) -> tuple[float, tuple[float, ...]]:
+        """Acceleration u, and what drives each parameter, before leakage."""
+        gain, bound = parameters
+        share = square / (2 * self.gamma**2)
+        u = -gain * share * s - bound * psi * math.tanh(bound * psi * s / self.epsilon)
+        return u, (share * s * s, psi * abs(s))
+
+    @property
+    def rates(self) -> tuple[tuple[float, float], ...]:
+        """Gamma and sigma of each parameter."""
+        return tuple(zip(self.adaptation, self.leakage, strict=True))
+
+    def controller(self) -> "DirectFuzzyController":
+        """A new steppable controller."""
+        return DirectFuzzyController(self)
+
+
+def _q_problems(law: FuzzyLaw, above: float) -> list[Problem]:
+    """Too small an eigenvalue for the proof of a law."""
+    q = law.error.q
+    return [] if q > above else [("error.q", f"must be above {above:g} for this law, got {q}")]
+
+
+class DirectFuzzyController(FuzzyController):
+    """Steps a direct adaptive fuzzy law.
+
+    Parameters
+    ----------
+    law : SmallGainFuzzy or RobustFuzzy
+
+    Attributes
+    ----------
+    parameters : tuple of float
+        What is adapted: (lambda,) or (lambda, theta).
+    """
+
+    def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:
+        self._law = law
+        self._leak = [
+            (sigma, math.exp(-adaptation * sigma * law.sample_time_s))
+            for adaptation, sigma in law.rates
+        ]
+        super().__init__(law)
+
+    def _forget(self) -> None:
+        self.parameters = self._law.start
+
+    def _answer(self, now: FuzzyInputs) -> float:
+        square = self._basis.square(now.x)
+        psi = 1.0 + float(now.x.dot(now.x)) + math.sqrt(square)
+        u, drives = self._law.answer(self.parameters, now.s, square, psi)
+        self.parameters = tuple(
+            self._adapted(value, start, drive if now.learning else 0.0, leak)
+            for value, start, drive, leak in zip(
+                self.parameters, self._law.start, drives, self._leak, strict=True
+            )
+        )
+        return u
+
+    @staticmethod
+    def _adapted(value: float, start: float, drive: float, leak: tuple[float, float]) -> float:
+        """Value after a sample of value' = Gamma (drive - sigma (value - start))."""
+        sigma, kept = leak
+        rest = start + drive / sigma
+        return rest + (value - rest) * kept

@@ -1,0 +1,118 @@
+"""Indirect adaptive fuzzy control of roll, thesis section 4.4.4: f and g are learnt, then inverted.
+
+::
+
+    u = (-fhat(x) - k' e) / ghat(x)                                            (4.25)
+    fhat = xi(x) A (1, x),    ghat = xi(x) b
+
+A holds the consequents of the Takagi-Sugeno rules, (3^n, n + 1). For ghat they are constants: a
+weighted mean of numbers that are all at or above a least value stays there itself, so that keeping
+each b_i above it is the projection that keeps ghat away from zero, everywhere. With s = B' P e ::
+
+    A' = gamma_f s xi' (1, x) - leakage (A - A_0)
+    b' = gamma_g s u xi'      - leakage (b - 1),       b_i >= least
+
+make V = e' P e / 2 + tr(Ã' Ã) / (2 gamma_f) + b̃' b̃ / (2 gamma_g) fall wherever f and g are of this
+form (without leakage; with it, outside a bound). u is counted in roll acceleration, by a nominal g,
+so that g is near one.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
+from utank_hil.parameters import Finite, Positive, Problem, Range
+
+
+@dataclass(frozen=True, slots=True)
+class IndirectFuzzy(FuzzyLaw):
+    """Law (4.25).
+
+    Parameters
+    ----------
+    error, ranges, gain_rad_s2_pa, brake_pa_s_m, sample_time_s
+        As in `FuzzyLaw`.
+    adaptation_f, adaptation_g : float
+        gamma_f and gamma_g.
+    leakage : float
+        Per second.
+    least_gain : float
+        Least ghat, in nominal ones; above 0, below 1.
+    prior : tuple of float, optional
+        What every rule knows of f before learning: a constant, then a factor for each input.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range.
+    """
+
+    adaptation_f: Positive
+    adaptation_g: Positive
+    leakage: Positive
+    least_gain: Annotated[float, Range(above=0, below=1)] = 0.3
+    prior: tuple[Finite, ...] | None = None
+
+    def _problems(self) -> list[Problem]:
+        problems, needed = FuzzyLaw._problems(self), len(self.ranges) + 1
+        if self.prior is not None and len(self.prior) != needed:
+            problems.append(("prior", f"must have {needed} numbers, got {len(self.prior)}"))
+        return problems
+
+    def controller(self) -> "IndirectFuzzyController":
+        """A new steppable controller."""
+        return IndirectFuzzyController(self)
+
+
+class IndirectFuzzyController(FuzzyController):
+    """Steps an `IndirectFuzzy`.
+
+    Parameters
+    ----------
+    law : IndirectFuzzy
+
+    Attributes
+    ----------
+    drift : ndarray, shape (rules, inputs + 1)
+        A, the consequents of fhat.
+    gain : ndarray, shape (rules,)
+        b, the consequents of ghat.
+    """
+
+    def __init__(self, law: IndirectFuzzy) -> None:
+        self._law = law
+        inputs = len(law.ranges)
+        self._prior = np.zeros(inputs + 1) if law.prior is None else np.array(law.prior)
+        self._k1, self._k2 = law.error.gains
+        self._kept = math.exp(-law.leakage * law.sample_time_s)
+        self._extended = np.ones(inputs + 1)
+        super().__init__(law)
+
+    def _forget(self) -> None:
+        self._start = np.tile(self._prior, (self._basis.rules, 1))
+        self.drift = self._start.copy()
+        self.gain = np.ones(self._basis.rules)
+
+    def _answer(self, now: FuzzyInputs) -> float:
+        xi = self._basis(now.x)
+        self._extended[1:] = now.x
+        drift = float(xi.dot(self.drift).dot(self._extended))
+        u = (-drift - self._k1 * now.e[0] - self._k2 * now.e[1]) / float(xi.dot(self.gain))
+        # the rules know nothing of what lies beyond their reach
+        self._adapt(xi, now.s if now.learning and not now.beyond else 0.0, u)
+        return u
+
+    def _adapt(self, xi: FloatArray, s: float, u: float) -> None:
+        """Let A and b learn over a sample from the error signal `s` under the acceleration `u`."""
+        law, kept = self._law, self._kept
+        per_rate = (1 - kept) / law.leakage  # the sample time, for a small leakage
+        self.drift -= self._start
+        self.drift *= kept
+        self.drift += self._start
+        self.drift += np.multiply.outer((law.adaptation_f * per_rate * s) * xi, self._extended)
+        self.gain = 1 + kept * (self.gain - 1) + (law.adaptation_g * per_rate * s * u) * xi
+        np.maximum(self.gain, law.least_gain, out=self.gain)

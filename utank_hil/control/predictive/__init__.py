@@ -1,0 +1,1 @@
+"""Predictive laws of fixed gains: GPC and DPC."""

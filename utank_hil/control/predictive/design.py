@@ -1,0 +1,317 @@
+"""From a ship, a tank and what is known of the sea to a predictive law.
+
+The predictor is made for the plant as the loop sees it: ship and tank, the drive's lag, the delay
+from sensor to pump, and the waves. A wave moment that comes in groups around a peak is modelled as
+white noise through a lightly damped oscillator::
+
+    K'' + 2 zeta wp K' + wp^2 K = noise
+
+and a white disturbance of the pump's pressure stands for all that the model does not know: the more
+of it, the less the predictor trusts its model, and the greater the margins.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.arx import ARX
+from utank_hil.control.interface import LinearLaw
+from utank_hil.control.predictive.finite_memory import finite_memory_arx
+from utank_hil.control.predictive.gains import design_dpc, design_gpc
+from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.control.washout import WashableLaw, WashoutLaw
+from utank_hil.dynamics.linear import STATES, state_matrices
+from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import (
+    NotNegative,
+    Positive,
+    Problem,
+    Range,
+    SampleTime,
+    range_problems,
+    refuse,
+)
+
+MOST_ORDER: Final = 500
+"""Of a predictor: its law has as many states per output, and judging it takes their cube."""
+
+MOST_SAMPLES: Final = 1000
+"""Of a horizon: more than the sea can be foreseen by far."""
+
+WASHOUT_SHARE: Final = 0.25
+"""Of the ship's roll frequency, a washout's corner at most: there it takes 3 % of the roll and
+turns its phase by 14 degrees; above, it takes the roll itself from the law."""
+
+
+def measured_problems(measured: tuple[str, ...], *needed: str) -> list[Problem]:
+    """What is wrong with names of outputs, of which the `needed` ones must be there."""
+    if measured and set(needed) <= set(measured) <= set(STATES):
+        return []
+    besides = f", {' and '.join(needed)} with them" if needed else ""
+    return [("measured", f"must name outputs among {', '.join(STATES)}{besides}, got {measured}")]
+
+
+def weight_problems(name: str, weight: tuple[float, ...]) -> list[Problem]:
+    """The problem of weights that are all zero: the best law for them is to do nothing."""
+    if any(each > 0 for each in weight):
+        return []
+    return [(name, f"must have a positive number: with {weight} the law does nothing")]
+
+
+def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
+    """A law with its washout, or itself for a corner of zero.
+
+    Raises
+    ------
+    ValueError
+        If the corner is so near to the ship's roll that the washout takes that out, too.
+    """
+    if washout_rad_s == 0:
+        return law
+    most = WASHOUT_SHARE * ship.natural_frequency_rad_s
+    if washout_rad_s > most:
+        reason = (
+            f"must be {most:.3g} at most, a quarter of the ship's roll frequency, or the law does "
+            f"not see her roll; got {washout_rad_s:g}"
+        )
+        refuse("design", [("washout_rad_s", reason)])
+    return WashoutLaw(law, washout_rad_s)
+
+
+def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) -> Problem:
+    """The problem of a parameter that does not have one value for each output."""
+    return (
+        name,
+        f"must have one value per measured output, {len(measured)} of them, got {values}",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Predictor:
+    """What the predictor is told; with it the ARX model of a ship and tank is determined.
+
+    Parameters
+    ----------
+    measured : tuple of str
+        Outputs, in order: ``"roll_rad"``, ``"roll_rate_rad_s"``, ``"level_m"``,
+        ``"level_rate_m_s"``.
+    measurement_std : tuple of float
+        Standard deviation of the white noise on each, in its unit.
+    order : int
+        Number p of past samples.
+    wave_peak_rad_s : float
+        Frequency wp of the wave moment's peak, below half that of the samples.
+    wave_damping_ratio : float
+        zeta; small for long groups.
+    wave_slope_rad : float
+        RMS of the effective wave slope, wave moment per roll stiffness of the ship.
+    pressure_noise_pa_rt_s : float
+        Root of the two-sided density of the white pressure disturbance.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    measured: tuple[str, ...]
+    measurement_std: tuple[Positive, ...]
+    order: Annotated[int, Range(least=1, most=MOST_ORDER)]
+    wave_peak_rad_s: Positive
+    wave_damping_ratio: Positive
+    wave_slope_rad: Positive
+    pressure_noise_pa_rt_s: NotNegative
+    sample_time_s: SampleTime = 0.2
+
+    def __post_init__(self) -> None:
+        problems = [*measured_problems(self.measured), *range_problems(self)]
+        if len(self.measurement_std) != len(self.measured):
+            problems.append(per_output("measurement_std", self.measurement_std, self.measured))
+        nyquist_rad_s = np.pi / self.sample_time_s if self.sample_time_s > 0 else np.inf
+        if self.wave_peak_rad_s >= nyquist_rad_s:
+            reason = (
+                f"must be below {nyquist_rad_s:.3g}, half the frequency of the samples, or the law "
+                f"never sees the waves; got {self.wave_peak_rad_s:g}"
+            )
+            problems.append(("wave_peak_rad_s", reason))
+        refuse("predictor", problems)
+
+
+@dataclass(frozen=True, slots=True)
+class PredictiveDesign:
+    """A predictive law in parameters: what a configuration file holds.
+
+    Parameters
+    ----------
+    kind : {"gpc", "dpc"}
+        Which law.
+    predictor : Predictor
+    control_horizon, prediction_horizon : int
+    output_weight : tuple of float, optional
+        One for each measured output. None, for DPC alone, is the exact deadbeat.
+    first_output : int
+        See `design_gpc`; for GPC alone.
+    washout_rad_s : float
+        Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
+        the ship's roll frequency at most; 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, or DPC has a first output.
+    """
+
+    kind: Literal["gpc", "dpc"]
+    predictor: Predictor
+    control_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
+    prediction_horizon: Annotated[int, Range(least=1, most=MOST_SAMPLES)]
+    output_weight: tuple[NotNegative, ...] | None = None
+    first_output: Annotated[int, Range(least=0)] = 0
+    washout_rad_s: NotNegative = 0.0
+
+    def __post_init__(self) -> None:
+        problems = [*range_problems(self), *self._horizon_problems()]
+        measured = self.predictor.measured
+        if self.kind not in ("gpc", "dpc"):
+            problems.append(("kind", f"must be gpc or dpc, got {self.kind}"))
+        if self.kind == "gpc" and self.output_weight is None:
+            problems.append(
+                ("output_weight", "GPC needs an output_weight for each measured output")
+            )
+        if self.output_weight is not None and len(self.output_weight) != len(measured):
+            problems.append(per_output("output_weight", self.output_weight, measured))
+        elif self.output_weight is not None:
+            problems += weight_problems("output_weight", self.output_weight)
+        refuse("predictive design", problems)
+
+    def _horizon_problems(self) -> list[Problem]:
+        control, prediction = self.control_horizon, self.prediction_horizon
+        if self.kind == "dpc":
+            problems = []
+            if control >= prediction:
+                problems.append(
+                    (
+                        "control_horizon",
+                        f"must be below prediction_horizon, got {control} and {prediction}",
+                    )
+                )
+            if self.first_output:
+                problems.append(
+                    ("first_output", "belongs to GPC; DPC weighs from control_horizon on")
+                )
+            return problems
+        if control > prediction:
+            return [
+                (
+                    "control_horizon",
+                    f"must be prediction_horizon at most, got {control} and {prediction}",
+                )
+            ]
+        if self.first_output >= prediction:
+            return [
+                (
+                    "first_output",
+                    f"must be below prediction_horizon, got {self.first_output} and {prediction}",
+                )
+            ]
+        return []
+
+    def law(
+        self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
+    ) -> LinearLaw:
+        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+
+        Raises
+        ------
+        ValueError
+            If a parameter is out of its range.
+        """
+        return washed(self._predictive_law(ship, tank, delay_s, lag_s), self.washout_rad_s, ship)
+
+    def _predictive_law(
+        self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
+    ) -> PredictiveLaw:
+        arx = wave_arx(self.predictor, ship, tank, delay_s, lag_s)
+        if self.kind == "dpc":
+            return design_dpc(
+                arx, self.control_horizon, self.prediction_horizon, self.output_weight
+            )
+        if self.output_weight is None:
+            raise ValueError("GPC needs an output_weight for each measured output")
+        return design_gpc(
+            arx,
+            self.control_horizon,
+            self.prediction_horizon,
+            self.output_weight,
+            first_output=self.first_output,
+        )
+
+
+def pump_model(ship: RollShip, tank: Tank, measured: tuple[str, ...]) -> LinearModel:
+    """Continuous model from pump pressure to the `measured` outputs, without python-control."""
+    a, b = state_matrices(ship, tank)
+    c = np.eye(len(STATES))[[STATES.index(name) for name in measured]]
+    return LinearModel(a, b[:, :1], c, np.zeros((len(measured), 1)), 0.0)
+
+
+def wave_plant(
+    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
+) -> tuple[LinearModel, FloatArray]:
+    """Sampled model of ship, tank, drive and wave moment, and its process noise.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    ship : RollShip
+    tank : Tank
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Returns
+    -------
+    plant : LinearModel
+        From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
+    process_covariance : ndarray, shape (n, n)
+    """
+    a_ship, b_ship = state_matrices(ship, tank)
+    pressure, wave = b_ship[:, :1], b_ship[:, 1:]
+    wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
+    n = len(STATES)
+    a = np.zeros((n + 2, n + 2))
+    a[:n, :n] = a_ship
+    a[:n, n : n + 1] = wave * ship.stiffness_nm_rad * predictor.wave_slope_rad
+    a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
+    b = np.vstack([pressure, np.zeros((2, 1))])
+    noise = np.zeros((n + 2, 2))
+    noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
+    noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
+    model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
+    plant = sample(model, predictor.sample_time_s, delay_s, lag_s)
+    process = np.zeros(plant.A.shape)
+    process[: n + 2, : n + 2] = noise_covariance(a, noise, predictor.sample_time_s)
+    return plant, process
+
+
+def wave_arx(
+    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
+) -> ARX:
+    """ARX model of least prediction error for a ship and tank in waves.
+
+    Parameters
+    ----------
+    predictor : Predictor
+    ship : RollShip
+    tank : Tank
+    delay_s, lag_s : float
+        As in `sampled_model`.
+    """
+    plant, process = wave_plant(predictor, ship, tank, delay_s, lag_s)
+    rows = [STATES.index(name) for name in predictor.measured]
+    measurement = np.diag(np.square(predictor.measurement_std))
+    seen = plant._replace(C=plant.C[rows], D=plant.D[rows])
+    return finite_memory_arx(seen, process, measurement, predictor.order)

@@ -1,0 +1,204 @@
+"""The picture of a bench: what the tank did to the ship, passive beside active."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import RetuningState
+from utank_hil.pictures.style import COLORS, HIGHLIGHT, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ZOOM_S: Final = 180.0
+_LANES: Final[dict[int, tuple[str, float]]] = {
+    RetuningState.IDENTIFY: ("identification", 0.25),
+    RetuningState.DESIGN: ("design", 0.4),
+    RetuningState.TRIAL: ("trial", 0.55),
+    RetuningState.RETUNED: ("retuned", 1.0),
+    RetuningState.REFUSED: ("refused", 0.1),
+    RetuningState.UNDONE: ("undone", 0.1),
+}
+"""Name and strength of colour of what a run does to retune itself."""
+_NAMED_SHARE: Final = 0.07
+"""A lane's stretch that is a smaller part of the axis has no room for its name."""
+_LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
+
+
+@dataclass(frozen=True, slots=True)
+class BenchCurve:
+    """One run of a bench, as it is drawn.
+
+    Attributes
+    ----------
+    label : str
+        What the legend says of it, figures included: they come from who judges the run.
+    time_s, roll_rad, level_m, pressure_pa : array (n,)
+        Level is the starboard surface above its still level.
+    retuning : array (n,), optional
+        `RetuningState` of a run that retuned itself: what it did is drawn as a lane of its own.
+    """
+
+    label: str
+    time_s: FloatArray
+    roll_rad: FloatArray
+    level_m: FloatArray
+    pressure_pa: FloatArray
+    retuning: FloatArray | None = None
+
+
+def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
+    """Draw roll, level and pressure of all runs: the whole time, and three minutes of it.
+
+    Those are the ones around the largest roll. Where runs retuned themselves, they are the ones
+    around the first trial of a new law instead, and lanes below show when each run identified,
+    tried and kept one.
+
+    Parameters
+    ----------
+    curves : sequence of BenchCurve
+        The first is the reference, the passive tank: the largest roll is its own, and it is drawn
+        in grey behind the others.
+    path : Path
+        The `.png` file; written anew.
+    title : str
+        Stands above the picture.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ValueError
+        If there are no curves, or more than the colours that can be told apart.
+    """
+    if not 1 <= len(curves) <= len(COLORS):
+        raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
+    whole = (float(curves[0].time_s[0]), float(curves[0].time_s[-1]))
+    centre_s, zoomed = _centre(curves)
+    zoom = _around(centre_s, whole)
+    spans = [whole] if zoom == whole else [whole, zoom]
+    retuning = any(curve.retuning is not None for curve in curves)
+    lane = 0.25 * sum(curve.retuning is not None for curve in curves)
+    size_in = (13.0 if len(spans) > 1 else 9.0, 7.5 + (0.6 + lane if retuning else 0.0))
+    with picture(path, title, size_in) as figure:
+        axes = figure.subplots(
+            3 + retuning,
+            len(spans),
+            sharex="col",
+            sharey="row",
+            squeeze=False,
+            height_ratios=[2.0, 2.0, 2.0, lane][: 3 + retuning],
+        )
+        for column, span_s in zip(axes.T, spans, strict=True):
+            _draw_column(column, curves, span_s)
+        if len(spans) > 1:
+            unit_s, _ = _time_unit(whole)
+            for axis in axes[:3, 0]:
+                axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color=HIGHLIGHT, alpha=0.35, lw=0)
+            axes[0, 0].set_title("Whole run", loc="left", fontsize=10)
+            axes[0, 1].set_title(zoomed, loc="left", fontsize=10)
+        for axis, label in zip(axes[:, 0], _LABELS, strict=False):
+            axis.set_ylabel(label)
+        if retuning:
+            axes[-1, 0].set_ylabel("Retuning", rotation=0, ha="right", va="center")
+        figure.align_ylabels()
+        handles = axes[0, -1].get_lines()[: len(curves)]
+        figure.legend(
+            handles,
+            [curve.label for curve in curves],
+            loc="outside lower left",
+            ncols=len(curves),
+            frameon=False,
+        )
+    return path
+
+
+def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
+    """Return the time that is shown closely, and what to call it."""
+    trials = [
+        float(curve.time_s[curve.retuning == RetuningState.TRIAL][0])
+        for curve in curves
+        if curve.retuning is not None and (curve.retuning == RetuningState.TRIAL).any()
+    ]
+    if trials:
+        return min(trials), "Around the new law's first command"
+    reference = curves[0]
+    worst_s = float(reference.time_s[np.argmax(np.abs(reference.roll_rad))])
+    return worst_s, "Around the largest roll"
+
+
+def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
+    """Return `ZOOM_S` around a time, or all of a run that is not much longer."""
+    if whole[1] - whole[0] < 2 * ZOOM_S:
+        return whole
+    start_s = min(max(centre_s - ZOOM_S / 2, whole[0]), whole[1] - ZOOM_S)
+    return start_s, start_s + ZOOM_S
+
+
+def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
+    """Return the length in seconds, and the name, of the unit a time axis is labelled in."""
+    return (60.0, "min") if span_s[1] - span_s[0] > 600.0 else (1.0, "s")
+
+
+def _draw_column(
+    axes: "Sequence[Axes]", curves: Sequence[BenchCurve], span_s: tuple[float, float]
+) -> None:
+    """Draw roll, level and pressure over one span of time."""
+    unit_s, unit = _time_unit(span_s)
+    width = 0.5 if unit_s > 1 else 1.4
+    for curve, color in zip(curves, COLORS, strict=False):
+        shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
+        time = curve.time_s[shown] / unit_s
+        values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
+        for axis, value in zip(axes, values, strict=False):
+            axis.plot(time, value[shown], color=color, linewidth=width)
+    if len(axes) > len(values):
+        _draw_lanes(axes[-1], curves, span_s)
+    axes[-1].set_xlim(span_s[0] / unit_s, span_s[1] / unit_s)
+    axes[-1].set_xlabel(f"Time ({unit})")
+
+
+def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float, float]) -> None:
+    """Draw what each run that retuned itself did when: the stronger, the more in service."""
+    unit_s, _ = _time_unit(span_s)
+    lanes = [
+        (curve, c) for curve, c in zip(curves, COLORS, strict=False) if curve.retuning is not None
+    ]
+    for place, (curve, color) in enumerate(lanes):
+        assert curve.retuning is not None
+        starts = np.flatnonzero(np.diff(curve.retuning, prepend=np.nan))
+        ends_s = [*curve.time_s[starts[1:]], curve.time_s[-1]]
+        for start, end_s in zip(starts, ends_s, strict=True):
+            name, strength = _LANES.get(int(curve.retuning[start]), ("", 0.0))
+            begin_s, end_s = max(curve.time_s[start], span_s[0]), min(end_s, span_s[1])
+            if not name or begin_s >= end_s:
+                continue
+            axis.barh(
+                place,
+                (end_s - begin_s) / unit_s,
+                0.8,
+                begin_s / unit_s,
+                color=color,
+                alpha=strength,
+                lw=0,
+            )
+            if end_s - begin_s > _NAMED_SHARE * (span_s[1] - span_s[0]):
+                axis.text(
+                    (begin_s + end_s) / 2 / unit_s,
+                    place,
+                    name,
+                    ha="center",
+                    va="center",
+                    fontsize=8,
+                    color="white" if strength > 0.6 else "black",
+                )
+    axis.set_ylim(len(lanes) - 0.4, -0.6)
+    axis.set_yticks([])
+    axis.grid(visible=False)

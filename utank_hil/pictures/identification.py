@@ -1,0 +1,123 @@
+"""The picture of an identification: does the model hold on data it has not seen."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control import pump_model
+from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.transfer import state_space_response
+from utank_hil.identification import (
+    DisturbanceBasis,
+    StabilizationPoint,
+    hankel_singular_values,
+    stabilization,
+)
+from utank_hil.identification.record_length import first_part
+from utank_hil.pictures.style import COLORS, picture
+from utank_hil.retuning.redesign import Identification, RetuningTask
+
+SHOWN_S = 120.0
+BAND_RAD_S = np.linspace(0.15, 1.5, 300)
+ORDERS = range(2, 21, 2)
+
+
+def draw_identification(
+    record: FloatArray, found: Identification, task: RetuningTask, path: Path, title: str
+) -> Path:
+    """Draw held-out roll and its prediction, responses, residuals and the stabilization diagram.
+
+    Parameters
+    ----------
+    record : ndarray, shape (N, 1 + m)
+    found : Identification
+        Of that record.
+    task : RetuningTask
+    path : Path
+        The `.png` file; written anew.
+    title : str
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    measured = task.design.predictor.measured
+    roll, arx = measured.index("roll_rad"), found.okid.arx
+    step_s = arx.sample_time_s
+    split = first_part(len(record))
+    shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
+    here = np.nan_to_num(record[shown])
+    basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)
+    predicted = arx.predict(here[:, :1], here[:, 1:])[arx.order :, roll]
+    waves, measured_roll = basis[:, arx.order :].T, here[arx.order :, roll + 1]
+    predicted = predicted + waves @ np.linalg.lstsq(waves, measured_roll - predicted, rcond=None)[0]
+    time_s = np.arange(shown.start + arx.order, shown.stop) * step_s
+    z = np.exp(1j * BAND_RAD_S * step_s)
+    powers = z[:, None] ** -np.arange(arx.order + 1)
+    left = np.eye(arx.outputs) - np.einsum("wi,iab->wab", powers[:, 1:], arx.alpha)
+    responses = {
+        "configured": _ship_response(task, task.ship, task.tank, z),
+        "ARX model": np.linalg.solve(left, np.einsum("wi,iab->wab", powers, arx.beta)),
+        "identified ship": _ship_response(task, found.fit.ship, found.fit.tank, z),
+    }
+    with picture(path, title, (12.0, 8.0)) as figure:
+        (above, bode), (residuals, modes) = figure.subplots(2, 2)
+        above.plot(time_s, np.rad2deg(measured_roll), color=COLORS[0], label="measured")
+        above.plot(time_s, np.rad2deg(predicted), color=COLORS[1], lw=1.0, label="predicted")
+        above.set(xlabel="Time (s)", ylabel="Roll (°), held out")
+        above.legend(frameon=False)
+        for (name, response), color in zip(responses.items(), COLORS, strict=False):
+            size = np.rad2deg(np.abs(response[:, roll, 0])) * 10e3
+            bode.semilogy(BAND_RAD_S, size, color=color, label=name)
+        bode.set(xlabel="Frequency (rad/s)", ylabel="Roll for 10 kPa of the pump (°)")
+        bode.legend(frameon=False)
+        correlation = found.validation.residual_correlation
+        for column, name in enumerate(measured):
+            residuals.plot(
+                np.arange(1, len(correlation) + 1) * step_s,
+                correlation[:, column],
+                color=COLORS[1 + column],
+                marker=".",
+                label=name,
+            )
+        bound = 1.96 / math.sqrt(found.validation.rows)
+        residuals.axhspan(-bound, bound, color=COLORS[0], alpha=0.15, lw=0)
+        residuals.set(
+            xlabel="Lag (s)", ylabel="Autocorrelation of held-out errors", ylim=(-0.6, 0.6)
+        )
+        residuals.legend(frameon=False)
+        for point in _stable_points(found):
+            modes.plot(
+                point.frequency_rad_s,
+                point.order,
+                "o" if point.frequency_stable and point.damping_stable else "x",
+                color=COLORS[1 if point.frequency_stable else 0],
+            )
+        modes.axvline(found.fit.ship.natural_frequency_rad_s, color=COLORS[2], lw=1)
+        modes.set(
+            xlabel="Frequency (rad/s)",
+            ylabel="Model order (o: stable; line: identified ship)",
+            xlim=(BAND_RAD_S[0], BAND_RAD_S[-1]),
+        )
+    return path
+
+
+def _ship_response(task: RetuningTask, ship: RollShip, tank: Tank, z: ComplexArray) -> ComplexArray:
+    plant = sample(
+        pump_model(ship, tank, task.design.predictor.measured),
+        task.design.predictor.sample_time_s,
+        task.delay_s,
+        task.lag_s,
+    )
+    return state_space_response(plant, z)
+
+
+def _stable_points(found: Identification) -> tuple[StabilizationPoint, ...]:
+    rank = len(hankel_singular_values(found.okid.markov))
+    orders = [order for order in ORDERS if order <= rank]
+    return stabilization(found.okid.markov, orders, found.okid.arx.sample_time_s)

@@ -1,0 +1,190 @@
+"""Bode and Nyquist pictures of a set of laws on a ship, by one call each."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.comparison import NO_TANK, PASSIVE, Loop
+from utank_hil.analysis.loop.margins import loop_response
+from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
+from utank_hil.analysis.loop.sea_response import roll_response_without_tank
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.predictive.design import pump_model
+from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.pictures.style import COLORS, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_bode(
+    loops: Sequence[Loop],
+    ship: RollShip,
+    tank: Tank,
+    path: Path,
+    title: str,
+    delay_s: float = 0.05,
+    lag_s: float = 0.1,
+) -> Path:
+    """Draw magnitude and phase of the roll per effective wave slope, without and with the tank.
+
+    The effective wave slope is the wave moment over the ship's roll stiffness. The laws are sampled
+    on the continuous plant.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        At most four; the passive tank is always drawn.
+    ship : RollShip
+    tank : Tank
+    path : Path
+        The `.png` file; written anew.
+    title : str
+        Stands above the picture.
+    delay_s, lag_s : float
+        As in `sampled_model`.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ValueError
+        If there are more laws than colours that can be told apart.
+    """
+    from matplotlib.ticker import LogLocator, MultipleLocator
+
+    _check_number(loops)
+    w = ship.natural_frequency_rad_s * np.geomspace(0.2, 5.0, 3000)
+    system = coupled_model(ship, tank)
+    row = system.output_labels.index("roll_rad")
+    with picture(path, title, (9.0, 7.0)) as figure:
+        axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _add_bode(axes, w, ship, roll_response_without_tank(ship, w), NO_TANK, "#AAAAAA")
+        passive, _ = closed_loop_response(None, system, (), w)
+        _add_bode(axes, w, ship, passive[:, row], PASSIVE, COLORS[0])
+        for loop, color in zip(loops, COLORS[1:], strict=False):
+            active, _ = closed_loop_response(loop.law, system, loop.measured, w, delay_s, lag_s)
+            _add_bode(axes, w, ship, active[:, row], loop.name, color)
+        axes[0].set_ylabel("Roll per effective wave slope")
+        axes[1].set_ylabel("Phase (°)")
+        axes[1].set_xlabel("Wave frequency (rad/s)")
+        axes[1].yaxis.set_major_locator(MultipleLocator(90))
+        axes[1].xaxis.set_minor_locator(LogLocator(subs=(2, 3, 5)))
+        axes[1].xaxis.set_major_formatter("{x:g}")
+        axes[1].xaxis.set_minor_formatter("{x:g}")
+        axes[0].yaxis.set_major_formatter("{x:g}")
+        axes[1].set_xlim(w[0], w[-1])
+        figure.align_ylabels()
+        axes[0].legend(frameon=False)
+    return path
+
+
+def draw_nyquist(
+    loops: Sequence[Loop],
+    ship: RollShip,
+    tank: Tank,
+    path: Path,
+    title: str,
+    delay_s: float = 0.05,
+    lag_s: float = 0.1,
+) -> Path:
+    """Draw the sampled loops, broken at the pump, with the circle that none may enter.
+
+    Drawn for negative feedback: -L, critical point -1. Inside the circle of radius 1/2 about it the
+    sensitivity is above 2, which is not armed. Arguments as for `draw_bode`.
+
+    Raises
+    ------
+    ValueError
+        If there are more laws than colours that can be told apart.
+    """
+    _check_number(loops)
+    angle = np.linspace(0, 2 * np.pi, 361)
+    circle = np.exp(1j * angle)
+    with picture(path, title, (8.0, 8.6)) as figure:
+        axes = figure.add_subplot()
+        axes.plot(circle.real, circle.imag, color="#AAAAAA", linewidth=0.9, linestyle=":")
+        forbidden = -1 + circle / PEAK_SENSITIVITY
+        axes.fill(forbidden.real, forbidden.imag, color=COLORS[2], alpha=0.13, linewidth=0)
+        axes.plot(forbidden.real, forbidden.imag, color=COLORS[2], linewidth=0.9)
+        axes.plot(-1, 0, marker="+", color=COLORS[2], markersize=11, markeredgewidth=1.6)
+        axes.annotate(
+            f"sensitivity\nabove {PEAK_SENSITIVITY:g}",
+            (-1, -1 / PEAK_SENSITIVITY),
+            xytext=(0, -4),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            color=COLORS[2],
+        )
+        shown = [forbidden, circle]
+        for loop, color in zip(loops, COLORS[1:], strict=False):
+            ahead = -_loop(loop, ship, tank, delay_s, lag_s)
+            axes.plot(ahead.real, ahead.imag, color=color, linewidth=1.6, label=loop.name)
+            axes.plot(ahead.real, -ahead.imag, color=color, linewidth=0.8, linestyle="--")
+            shown.append(ahead)
+        _frame(axes, np.concatenate(shown))
+        axes.set_xlabel("Real part of −L")
+        axes.set_ylabel("Imaginary part of −L")
+        figure.legend(loc="outside lower left", ncols=len(loops), frameon=False)
+    return path
+
+
+def _check_number(loops: Sequence[Loop]) -> None:
+    if not 1 <= len(loops) < len(COLORS):
+        raise ValueError(
+            f"can draw 1 to {len(COLORS) - 1} laws in one picture beside the passive tank, got "
+            f"{len(loops)}"
+        )
+
+
+def _add_bode(
+    axes: "Sequence[Axes]",
+    w: FloatArray,
+    ship: RollShip,
+    roll_per_moment: ComplexArray,
+    name: str,
+    color: str,
+) -> None:
+    response = ship.stiffness_nm_rad * roll_per_moment
+    style = ":" if name == NO_TANK else "-"
+    axes[0].loglog(w, np.abs(response), style, color=color, linewidth=1.6, label=name)
+    phase = np.rad2deg(np.unwrap(np.angle(response)))
+    axes[1].semilogx(w, phase, style, color=color, linewidth=1.6)
+    for axis in axes:
+        axis.grid(visible=True, which="minor", axis="x", linewidth=0.4)
+
+
+def _loop(loop: Loop, ship: RollShip, tank: Tank, delay_s: float, lag_s: float) -> ComplexArray:
+    """L from well below the ship's roll up to half the sampling frequency, dense in between."""
+    plant = sample(pump_model(ship, tank, loop.measured), loop.law.sample_time_s, delay_s, lag_s)
+    roll = ship.natural_frequency_rad_s
+    w = np.unique(
+        np.concatenate(
+            [
+                np.geomspace(1e-3 * roll, np.pi / loop.law.sample_time_s, 2000),
+                roll * np.linspace(0.3, 3.0, 4000),
+            ]
+        )
+    )
+    return loop_response(loop.law, plant, w[w <= np.pi / loop.law.sample_time_s])
+
+
+def _frame(axes: "Axes", points: ComplexArray) -> None:
+    """Show all of the curves, both halves, in a square with equal scales."""
+    low, high = points.real.min(), points.real.max()
+    half = 1.05 * max((high - low) / 2, np.abs(points.imag).max())
+    axes.set_xlim((low + high) / 2 - half, (low + high) / 2 + half)
+    axes.set_ylim(-half, half)
+    axes.set_aspect("equal")
+    axes.axhline(0, color="#888888", linewidth=0.7, zorder=1)
+    axes.axvline(0, color="#888888", linewidth=0.7, zorder=1)

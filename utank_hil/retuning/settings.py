@@ -1,0 +1,135 @@
+"""What a configuration says about retuning."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Final, Literal
+
+from utank_hil.dynamics.ship import RollLimit
+from utank_hil.parameters import Positive, Range, range_problems, refuse
+
+EARLIEST_VERDICT_S: Final = 30.0
+"""A few rolls: what a trial tells before is chance."""
+
+
+_SWEPT: Final = ("multisine", "chirp")
+_BAND_RAD_S: Final = (0.2, 1.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """What the pump gives while the ship is identified: key ``excitation`` of the section.
+
+    Attributes
+    ----------
+    kind : str
+        Of `utank_hil.identification`: ``random_pulses``, or ``prbs`` (full pressure one way or the
+        other, drawn anew after each shortest pulse), ``multisine`` or ``chirp``.
+    band_rad_s : tuple of float or None
+        Frequencies of multisine and chirp; None: 0.2 to 1.2 rad/s.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, or a band is given that is not used.
+    """
+
+    kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
+    band_rad_s: tuple[Positive, Positive] | None = None
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.band_rad_s is not None:
+            low, high = self.band_rad_s
+            if self.kind not in _SWEPT:
+                problems.append(("band_rad_s", f"is for {' and '.join(_SWEPT)}, not {self.kind}"))
+            elif not low < high:
+                problems.append(("band_rad_s", f"must rise, got {low} and {high}"))
+        refuse("excitation", problems)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """The band in use."""
+        return self.band_rad_s or _BAND_RAD_S
+
+
+@dataclass(frozen=True, slots=True)
+class RetuningSettings:
+    """When and how the controller may retune itself: section ``retuning`` of a controller.
+
+    Attributes
+    ----------
+    roll_period_range_s : tuple of float
+        Shortest and longest natural roll period of the ship's stability booklet; a model outside
+        it is refused.
+    order : int
+        Of the identified ARX model.
+    identification_s : float
+        Time for which pulses are given and recorded.
+    pulse_pa : float
+        Greatest pressure of the pulses.
+    pulse_hold_s : tuple of float
+        Shortest and longest pulse.
+    excitation : Excitation
+        What kind of signal the pulses are.
+    alone : bool
+        Give the pulses without the law's pressure instead of adding them to it.
+    added_roll_rad : float
+        Greatest roll that the pulses alone may cause in still water, on the configured ship.
+    roll_limit_rad : float
+        Roll at which identification is given up; at most what `SafetyLimits` may allow.
+    every_s : float or None
+        Retune by itself so long after the last time; None: never on schedule.
+    change_factor : float or None
+        Retune by itself when the running model's prediction errors, compared with the roll, have
+        changed by this factor since it was taken into service; None: not watched.
+    trial_s : float
+        Time for which a new law is on trial, and the old one's is remembered for comparison: from
+        `EARLIEST_VERDICT_S` to an hour, beyond which a sea is not the same any more.
+    roll_factor, effort_factor : float
+        A new law is taken back when roll or pressure, root mean square over the trial, exceed the
+        old law's by this factor.
+    answer_within_s : float
+        Longest time identification and design may take, ten minutes at most: they take seconds,
+        and what hangs is not to go unnoticed.
+    seed : int
+        Of the pulses.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    roll_period_range_s: tuple[Positive, Positive]
+    order: Annotated[int, Range(least=2)] = 120
+    identification_s: Positive = 500.0
+    pulse_pa: Positive = 30e3
+    pulse_hold_s: tuple[Positive, Positive] = (1.0, 5.0)
+    excitation: Excitation = field(default_factory=Excitation)
+    alone: bool = False
+    added_roll_rad: Positive = 0.05
+    roll_limit_rad: RollLimit = 0.3
+    every_s: Positive | None = None
+    change_factor: Annotated[float, Range(above=1)] | None = None
+    trial_s: Annotated[float, Range(least=EARLIEST_VERDICT_S, most=3600)] = 120.0
+    roll_factor: Positive = 1.25
+    effort_factor: Positive = 2.0
+    answer_within_s: Annotated[float, Range(above=0, most=600)] = 60.0
+    seed: Annotated[int, Range(least=0)] = 1
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        low, high = self.roll_period_range_s
+        if not low < high:
+            problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
+        if self.excitation.kind == "multisine":
+            least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
+            if self.identification_s < least_s:  # at least one harmonic of it in the band
+                problems.append(
+                    (
+                        "identification_s",
+                        f"must be {least_s:.0f} or more for a multisine in the band "
+                        f"{self.excitation.band}, got {self.identification_s:g}",
+                    )
+                )
+        refuse("retuning", problems)
