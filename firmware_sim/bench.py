@@ -3,7 +3,7 @@
 import multiprocessing
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -24,7 +24,8 @@ from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.arrays import FloatArray
-from utank_hil.configuration.laws import PassiveLaw
+from utank_hil.assembly import build_law
+from utank_hil.control import BuiltLaw, PassiveDesign
 from utank_hil.runtime import stop_on_signals
 
 POLL_S: Final = 0.1
@@ -173,20 +174,31 @@ def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
     return function(*arguments, _Watch(_boards[0], index))
 
 
-def jobs_of(scenario: Scenario, seed: int, duration_s: float) -> list[Job]:
-    """The passive tank's run, then one for each controller."""
+def jobs_of(
+    scenario: Scenario,
+    seed: int,
+    duration_s: float,
+    laws: Mapping[str, BuiltLaw] | None = None,
+) -> list[Job]:
+    """The passive tank's run, then one for each controller; `laws` as in `run_bench`."""
+    laws = laws or {name: build_law(each) for name, each in scenario.controllers.items()}
     first = next(iter(scenario.controllers.values()))
-    passive = first.model_copy(update={"law": PassiveLaw(kind="passive")})
+    passive = first.model_copy(update={"law": PassiveDesign(), "retuning": None})
     return [
-        Job(PASSIVE, scenario, passive, PASSIVE_SCRIPT, seed, duration_s),
+        Job(PASSIVE, scenario, passive, build_law(passive), PASSIVE_SCRIPT, seed, duration_s),
         *(
-            Job(name, scenario, controller, scenario.operator, seed, duration_s)
+            Job(name, scenario, controller, laws[name], scenario.operator, seed, duration_s)
             for name, controller in scenario.controllers.items()
         ),
     ]
 
 
-def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> BenchResult:
+def run_bench(
+    scenario: Scenario,
+    options: BenchOptions,
+    progress: Progress,
+    laws: Mapping[str, BuiltLaw] | None = None,
+) -> BenchResult:
     """Run a scenario: passive, then with each controller, all in the same waves.
 
     Each run has a process of its own. Ctrl-C ends the runs between two ticks, with the pump at
@@ -198,6 +210,8 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     options : BenchOptions
     progress : callable
         Called several times a second while runs go on.
+    laws : mapping of str to BuiltLaw, optional
+        Of the scenario's controllers, if they were built before; they are designed without.
 
     Returns
     -------
@@ -210,7 +224,7 @@ def run_bench(scenario: Scenario, options: BenchOptions, progress: Progress) -> 
     """
     seed = scenario.seed if options.seed is None else options.seed
     duration_s = scenario.duration_s if options.duration_s is None else options.duration_s
-    jobs = jobs_of(scenario, seed, duration_s)
+    jobs = jobs_of(scenario, seed, duration_s, laws)
     started = time.monotonic()
     context = multiprocessing.get_context("spawn")
     workers = 2 if options.channel is not None or not options.real_time else 1

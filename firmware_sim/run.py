@@ -15,6 +15,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import SocketCanPort
 from utank_hil.configuration import ControllerConfig
+from utank_hil.control import BuiltLaw
 from utank_hil.retuning import (
     Retuner,
     RetunerProcess,
@@ -68,6 +69,8 @@ class Job:
     name : str
     scenario : Scenario
     controller : ControllerConfig
+    law : BuiltLaw
+        Of the controller.
     script : tuple of TimedAction
         What the operator does.
     seed : int
@@ -77,6 +80,7 @@ class Job:
     name: str
     scenario: Scenario
     controller: ControllerConfig
+    law: BuiltLaw
     script: tuple[TimedAction, ...]
     seed: int
     duration_s: float
@@ -263,7 +267,7 @@ def _controller(
 ) -> tuple[ControllerNode, Table]:
     table = Table(len(SIGNALS), job.ticks, RECORD_TICKS)
     node = build_controller_node(
-        job.controller, retuner=retuner, statistics=statistics, sink=table.write
+        job.controller, job.law, retuner=retuner, statistics=statistics, sink=table.write
     )
     return node, table
 

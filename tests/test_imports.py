@@ -58,9 +58,10 @@ def test_controllers_process_loads_nothing_heavy(source: str) -> None:
 def test_margins_are_judged_without_anything_heavy_because_run_does_it_first() -> None:
     source = """
 from pathlib import Path
-from utank_hil.commands.check import judge
+from utank_hil.commands.gate import admit
 from utank_hil.configuration import ControllerConfig, load_config
-assert judge(load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)) is not None
+path = Path("configs/controllers/gpc.yaml")
+assert admit(load_config(path, ControllerConfig), path).linear is not None
 """
     assert loaded_by(source) == ""
 

@@ -1,29 +1,21 @@
-"""The controller's side put together from its configuration."""
+"""From a configuration to a controller on the bus: the one place where a law is built."""
 
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import load_catalogue
-from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.configuration.laws import build_law
-from utank_hil.control import (
-    CommandLimiter,
-    LinearLaw,
-    PredictiveDesign,
-    wave_arx,
-)
+from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.controller import TICK_S, is_whole
+from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.identification.acceptance import ModelLimits
-from utank_hil.retuning import (
-    AdaptiveController,
-    Retuner,
-    RetuningSettings,
-    Work,
-    make_pulses,
-)
+from utank_hil.parameters import ParameterError
+from utank_hil.retuning import AdaptiveController, Retuner, Work, make_pulses
 from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask, retune
 from utank_hil.runtime.controller_node import (
     NANOSECONDS,
@@ -58,41 +50,77 @@ def measure_of(names: tuple[str, ...]) -> Measure:
     return measure
 
 
+def build_law(config: ControllerConfig) -> BuiltLaw:
+    """Design the law of a configuration for its vessel.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+
+    Returns
+    -------
+    BuiltLaw
+        To be handed on to whatever needs the law: judging it, running it.
+
+    Raises
+    ------
+    ParameterError
+        If it can't be designed; the problems are named by their keys in the configuration.
+    """
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            # an equation that was solved for another matrix than the one given
+            warnings.simplefilter("error", RuntimeWarning)
+            law = config.law.build(config.plant)
+            finite = law.linear is None or all(
+                np.isfinite(matrix).all() for matrix in law.linear.matrices()[:4]
+            )
+        period_s = law.controller().sample_time_s
+    except ParameterError as error:
+        problems = [(f"law.{name}".rstrip("."), reason) for name, reason in error.problems]
+        raise ParameterError("", problems) from error
+    except (ValueError, ArithmeticError, RuntimeWarning) as error:
+        reason = f"can't be designed for this vessel: {error}"
+        raise ParameterError("", [("law", reason)]) from error
+    if not finite:
+        reason = "gives no finite law: a weight or a noise is too large or too small by far"
+        raise ParameterError("", [("law", reason)])
+    if not is_whole(period_s / TICK_S):
+        reason = f"has a sample time of {period_s:g} s, which is not a whole number of {TICK_S:g} s"
+        raise ParameterError("", [("law", reason)])
+    return law
+
+
 def build_controller_node(
     config: ControllerConfig,
+    law: BuiltLaw | None = None,
     *,
     retuner: Retuner | None = None,
     statistics: LoopStatistics | None = None,
     sink: Callable[[FloatArray], None] | None = None,
     event_sink: EventSink | None = None,
 ) -> ControllerNode:
-    """Design the law and build the controller node around it.
+    """Build the controller node of a configuration.
 
     Parameters
     ----------
     config : ControllerConfig
+    law : BuiltLaw, optional
+        Of this configuration, if it was built before; it is designed without.
     retuner : Retuner, optional
         Who identifies and designs, if the configuration has the controller retune itself; without
         one it does not.
     statistics, sink, event_sink
         As `ControllerNode` takes them.
     """
+    law = law or build_law(config)
     tank = config.vessel.tank
     retuning = None
-    built = build_law(config.law, config.vessel, config.delay_s, config.limits)
-    controller = built.controller
-    if (
-        retuner is not None
-        and config.retuning is not None
-        and isinstance(config.law, PredictiveDesign)
-        and built.linear is not None
-    ):
-        controller = retuning = _adaptive(
-            config, config.law, built.linear, config.retuning, retuner
-        )
+    if retuner is not None and config.retuning is not None:
+        retuning = _adaptive(config, law, retuner)
     return ControllerNode(
-        controller,
-        measure_of(built.measured),
+        retuning or law.controller(),
+        measure_of(law.measured),
         LevelObserver(tank, TANK_PERIOD_S),
         CommandLimiter(config.limits, tank, TICK_NS * NANOSECONDS),
         Supervisor(config.safety),
@@ -109,48 +137,46 @@ def build_controller_node(
     )
 
 
+def retuning_task(config: ControllerConfig, order: int, limits: ModelLimits) -> RetuningTask:
+    """What is to be identified and designed anew: the part of a configuration that matters to it.
+
+    Raises
+    ------
+    ValueError
+        If the law is not one that can be designed anew.
+    """
+    design = config.law
+    if not isinstance(design, PredictiveDesign) or "roll_rad" not in design.predictor.measured:
+        raise ValueError("the configuration's law must be predictive and measure roll_rad")
+    return RetuningTask(design, config.plant, order, limits)
+
+
 def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | None:
     """The retuner's work for a configuration and the shape of its longest record, if it has any.
 
     The work may be handed to another process.
     """
-    settings, design = config.retuning, config.law
-    if settings is None or not isinstance(design, PredictiveDesign):
+    settings = config.retuning
+    if settings is None:
         return None
-    task = RetuningTask(
-        design,
-        config.vessel.ship,
-        config.vessel.tank,
-        config.delay_s,
-        config.vessel.pump.lag_s,
-        settings.order,
-        ModelLimits(settings.roll_period_range_s),
-        config.limits.pressure_pa,
-        config.limits,
-        LEAST_GAIN,
-    )
-    rows = round(settings.identification_s / design.predictor.sample_time_s)
-    return partial(retune, task=task), (rows, 1 + len(design.predictor.measured))
+    task = retuning_task(config, settings.order, ModelLimits(settings.roll_period_range_s))
+    task = replace(task, least_gain=LEAST_GAIN)
+    predictor = task.design.predictor
+    rows = round(settings.identification_s / predictor.sample_time_s)
+    return partial(retune, task=task), (rows, 1 + len(predictor.measured))
 
 
-def _adaptive(
-    config: ControllerConfig,
-    design: PredictiveDesign,
-    law: LinearLaw,
-    settings: RetuningSettings,
-    retuner: Retuner,
-) -> AdaptiveController:
+def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> AdaptiveController:
     """A controller that begins with `law` and retunes itself."""
-    ship, tank, path = (
-        config.vessel.ship,
-        config.vessel.tank,
-        (config.delay_s, config.vessel.pump.lag_s),
-    )
+    settings, design = config.retuning, config.law
+    assert settings is not None
+    assert isinstance(design, PredictiveDesign)
+    assert law.linear is not None
     return AdaptiveController(
-        law,
-        wave_arx(design.predictor, ship, tank, *path),
+        law.linear,
+        wave_arx(design.predictor, config.plant),
         design.predictor.measured.index("roll_rad"),
         settings,
-        make_pulses(settings, config.limits, ship, tank, law.sample_time_s, *path),
+        make_pulses(settings, config.plant, law.linear.sample_time_s),
         retuner,
     )

@@ -10,7 +10,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import (
     CONFIGS,
     OUT,
@@ -23,6 +22,7 @@ from utank_hil.commands.common import (
     prepare_out,
     shown,
 )
+from utank_hil.commands.gate import admit
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 
@@ -77,8 +77,10 @@ def bench(
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = load(scenario, Scenario)
-    for controller in loaded.controllers.values():
-        refuse_low_margins(controller)
+    laws = {
+        name: admit(controller, scenario, f"controllers.{name}")
+        for name, controller in loaded.controllers.items()
+    }
     prepare_out(out, REPORT_FILES)
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
@@ -99,7 +101,7 @@ def bench(
         }
         try:
             result = run_bench(
-                loaded, options, lambda name, done: bar.update(tasks[name], completed=done)
+                loaded, options, lambda name, done: bar.update(tasks[name], completed=done), laws
             )
         except OSError as error:
             fail(error)

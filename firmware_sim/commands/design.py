@@ -19,7 +19,6 @@ from firmware_sim.scenario import Scenario
 from utank_hil.commands.common import OUT, Json, fail, load, new_app, notes, prepare_out, shown
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import ControllerConfig, Vessel
-from utank_hil.configuration.laws import LQGLaw
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import Harmonics
 
@@ -58,7 +57,7 @@ def controller(
     from utank_hil.pictures.trade import draw_trade
 
     loaded = load(config, ControllerConfig)
-    law = loaded.law.design if isinstance(loaded.law, LQGLaw) else loaded.law
+    law = loaded.law
     if not isinstance(law, Design):
         fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
     vessel = loaded.vessel
@@ -73,12 +72,8 @@ def controller(
             task = bar.add_task("", total=1.0)
             result = trade(
                 law,
-                vessel.ship,
-                vessel.tank,
+                loaded.plant,
                 _wave_moment(sea, vessel.ship),
-                loaded.delay_s,
-                vessel.pump.lag_s,
-                limits=loaded.limits,
                 progress=lambda done: bar.update(task, completed=done),
             )
     except CalmSeaError as error:

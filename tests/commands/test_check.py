@@ -339,7 +339,7 @@ def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data:
     [
         ("feedback_linearization", {"law__level_damping_ratio": 0.0}, "unstable on its own ship"),
         ("feedback_linearization", {"law__frequency_rad_s": 50.0}, "unstable on its own ship"),
-        ("fuzzy_robust", {"law__design__initial": [500.0, 0.0]}, "unstable on its own ship"),
+        ("fuzzy_robust", {"law__initial": [500.0, 0.0]}, "unstable on its own ship"),
     ],
 )
 def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accepts_it(

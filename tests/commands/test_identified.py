@@ -1,14 +1,15 @@
 """Configurations of ships that were found: they load, say what was found, and stay."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from utank_hil.assembly import build_law
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.configuration.laws import build_law
 from utank_hil.control import PredictiveDesign
 from utank_hil.retuning import ModelSummary
 
@@ -67,9 +68,10 @@ def test_next_start_has_the_law_that_was_retuned(tmp_path: Path) -> None:
     files = ships(tmp_path).write(FOUND)
     started = load_config(files["config"], ControllerConfig)
     assert isinstance(given.law, PredictiveDesign)
-    ship, tank = started.vessel.ship, started.vessel.tank
-    retuned = given.law.law(ship, tank, given.delay_s, given.vessel.pump.lag_s)  # as `retune` does
-    again = build_law(started.law, started.vessel, started.delay_s, started.limits).linear
+    vessel = started.vessel
+    found = dataclasses.replace(given.plant, ship=vessel.ship, tank=vessel.tank)
+    retuned = given.law.law(found)  # as `retune` does
+    again = build_law(started).linear
     assert again is not None
     for part in "ABCD":
         np.testing.assert_array_equal(

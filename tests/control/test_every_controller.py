@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.control import (
     ConstrainedDesign,
+    DesignPlant,
     PassiveController,
     PredictiveDesign,
     Predictor,
@@ -22,7 +24,6 @@ from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr
-from utank_hil.control.lqg_design import LQG_ROLL_RATE_LEVEL
 from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
 from utank_hil.control.stimulation import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
@@ -55,18 +56,18 @@ PUMP_LAWS = {
         STATES,
     ),
     "lqg": (
-        LQG_ROLL_RATE_LEVEL.law(SHIP, TANK).controller,
+        LQG_ROLL_RATE_LEVEL.law(DesignPlant(SHIP, TANK)).controller,
         LQG_ROLL_RATE_LEVEL.predictor.measured,
     ),
-    "gpc": (GPC.law(SHIP, TANK).controller, PREDICTOR.measured),
+    "gpc": (GPC.law(DesignPlant(SHIP, TANK)).controller, PREDICTOR.measured),
     "dpc": (
-        PredictiveDesign("dpc", PREDICTOR, 40, 44).law(SHIP, TANK).controller,
+        PredictiveDesign("dpc", PREDICTOR, 40, 44).law(DesignPlant(SHIP, TANK)).controller,
         PREDICTOR.measured,
     ),
-    "constrained": (CONSTRAINED.law(SHIP, TANK).controller, CONSTRAINED.measured),
-    "washout": (WashoutLaw(GPC.law(SHIP, TANK), 0.02).controller, PREDICTOR.measured),
+    "constrained": (CONSTRAINED.law(DesignPlant(SHIP, TANK)).controller, CONSTRAINED.measured),
+    "washout": (WashoutLaw(GPC.law(DesignPlant(SHIP, TANK)), 0.02).controller, PREDICTOR.measured),
     "feedback linearization": (
-        FeedbackLinearization(SHIP, TANK, 0.5, 0.3, 3.0, 3.8).controller,
+        FeedbackLinearization(0.5, 0.3, 3.0, 3.8, ship=SHIP, tank=TANK).controller,
         STATES,
     ),
     "small gain fuzzy": (
@@ -84,7 +85,9 @@ PUMP_LAWS = {
         STATES,
     ),
     "stimulation": (
-        Stimulation(SHIP, TANK, 0.05, 12.5, 60.0, 50e3, 0.1, 4.0).controller,
+        Stimulation(
+            0.05, 12.5, 60.0, 0.1, ship=SHIP, tank=TANK, pressure_pa=50e3, level_limit_m=4.0
+        ).controller,
         STATES,
     ),
 }

@@ -6,9 +6,8 @@ import pytest
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.control.feedback_linearization import FeedbackLinearization
 from utank_hil.control.gain import GainLaw
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import sample
 
 # Patti-B of Table 4.1 with its tank; a tank below the centre of gravity tests more terms
@@ -27,7 +26,7 @@ def law_of(ship=PATTI_B, tank=TANK, **changes):
         "soft_level_m": 1.8,
         "hard_level_m": 1.95,
     }
-    return FeedbackLinearization(ship, tank, **{**numbers, **changes})
+    return FeedbackLinearization(ship=ship, tank=tank, **{**numbers, **changes})
 
 
 def run(law, initial, duration_s, wave=lambda t: 0.0, step_s=0.02):

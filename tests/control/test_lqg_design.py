@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import margins
-from utank_hil.control import WashoutLaw, pump_model
-from utank_hil.control.lqg_design import LQG_ROLL_RATE_LEVEL, LQGDesign, wave_plant
+from utank_hil.control import DesignPlant, WashoutLaw, pump_model
+from utank_hil.control.lqg_design import LQGDesign, wave_plant
 from utank_hil.control.predictive.design import Predictor
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 
@@ -19,7 +20,7 @@ MEASURED = DESIGN.predictor.measured
 
 
 def test_default_is_robust_and_cuts_roll_at_the_peak_of_the_sea():
-    law = DESIGN.law(SHIP, TANK)
+    law = DESIGN.law(DesignPlant(SHIP, TANK))
     found = margins(law, pump_model(SHIP, TANK, MEASURED), 0.05, 0.1)
     assert found.radius < 1
     assert found.peak_sensitivity < 1.75
@@ -32,7 +33,7 @@ def test_default_is_robust_and_cuts_roll_at_the_peak_of_the_sea():
 
 
 def test_default_is_stable_for_other_roll_periods_and_gains():
-    law = DESIGN.law(SHIP, TANK)
+    law = DESIGN.law(DesignPlant(SHIP, TANK))
     for stretch in (0.7, 1.0, 1.3):
         ship = RollShip(1.9275e9, 1.9275e9 * 0.25 / stretch**2, 4.81875e7)
         found = margins(law, pump_model(ship, TANK, MEASURED), 0.07, 0.1)
@@ -43,8 +44,8 @@ def test_default_is_stable_for_other_roll_periods_and_gains():
 
 def test_regulator_weighs_the_motions_at_the_samples():
     # value iteration over the whole model gives the same cost-to-go: gain of the summed squares
-    law = replace(DESIGN, washout_rad_s=0.0).law(SHIP, TANK)
-    plant, _ = wave_plant(DESIGN.predictor, SHIP, TANK, 0.05, 0.1)
+    law = replace(DESIGN, washout_rad_s=0.0).law(DesignPlant(SHIP, TANK))
+    plant, _ = wave_plant(DESIGN.predictor, DesignPlant(SHIP, TANK))
     weight = np.diag(DESIGN.state_weight)
     outputs = np.hstack([plant.C, plant.D])  # of state and input together
     stage = outputs.T @ weight @ outputs
@@ -60,9 +61,11 @@ def test_regulator_weighs_the_motions_at_the_samples():
 
 def test_washout_and_weights_of_a_design():
     predictor = DESIGN.predictor
-    assert isinstance(LQGDesign(predictor, (1e11, 0, 0, 0), 1.0, 0.02).law(SHIP, TANK), WashoutLaw)
-    cheap = LQGDesign(predictor, (1e11, 0.0, 0.0, 0.0), 1e3).law(SHIP, TANK)
-    dear = LQGDesign(predictor, (1e11, 0.0, 0.0, 0.0), 1.0).law(SHIP, TANK)
+    assert isinstance(
+        LQGDesign(predictor, (1e11, 0, 0, 0), 1.0, 0.02).law(DesignPlant(SHIP, TANK)), WashoutLaw
+    )
+    cheap = LQGDesign(predictor, (1e11, 0.0, 0.0, 0.0), 1e3).law(DesignPlant(SHIP, TANK))
+    dear = LQGDesign(predictor, (1e11, 0.0, 0.0, 0.0), 1.0).law(DesignPlant(SHIP, TANK))
     z = np.exp(1j * np.array([0.12]))
     assert np.linalg.norm(cheap.response(z)) < np.linalg.norm(dear.response(z))
 

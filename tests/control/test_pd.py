@@ -8,9 +8,8 @@ from utank_hil.analysis.loop.margins import margins
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.control.pd import PD_MEASURED, design_pd
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank, coupled_model
-from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.linear import coupled_matrices, pump_model
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)

@@ -29,7 +29,7 @@ def slope(law, inputs=4):
 @pytest.mark.parametrize("shift", [0.0, 0.005])
 def test_of_feedback_linearization_it_places_the_poles_of_the_linear_model(shift):
     w, zeta = 0.6, 0.4
-    law = FeedbackLinearization(SHIP, TANK, w, zeta, 2.5, 3.5, shift, 20.0, 0.3)
+    law = FeedbackLinearization(w, zeta, 2.5, 3.5, shift, 20.0, 0.3, ship=SHIP, tank=TANK)
     a, b = state_matrices(SHIP, TANK)
     output = np.array([1.0, 0.0, shift, 0.0])  # s = phi + kL h
     rate = output @ a

@@ -15,8 +15,8 @@ SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 CALM = WaveMoment([], [], [])
 PLAN = Stimulation(
-    SHIP,
-    TANK,
+    ship=SHIP,
+    tank=TANK,
     amplitude_rad=math.radians(3.0),
     period_s=12.5,
     ramp_s=60.0,

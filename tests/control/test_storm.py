@@ -8,14 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
-from utank_hil.control import (
-    DPC_ROLL_LEVEL,
-    GPC_ROLL,
-    CommandLimiter,
-    LevelObserver,
-    PumpLimits,
-)
+from utank_hil.control import CommandLimiter, DesignPlant, LevelObserver, PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.sea import EffectiveSlope, Sea, load_ndbc
@@ -43,7 +38,9 @@ def storm(wave_moment, design=None):
     advance = np.hstack(transition_and_step(chain, inputs, STEP_S))
     rng = np.random.default_rng(0)
     limiter, observer = CommandLimiter(PumpLimits(), TANK, 0.02), LevelObserver(TANK, 0.02)
-    controller = None if design is None else design.law(SHIP, TANK, 0.05, LAG_S).controller()
+    controller = (
+        None if design is None else design.law(DesignPlant(SHIP, TANK, 0.05, LAG_S)).controller()
+    )
     state, desired, command = np.zeros(7), 0.0, 0.0
     on_its_way, rows = [0.0] * DELAY_STEPS, []
     for k, moment in enumerate(wave_moment):

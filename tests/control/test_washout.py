@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shipped_designs import LQG_ROLL_RATE_LEVEL
 
-from utank_hil.control import LQG_ROLL_RATE_LEVEL, PredictiveLaw, WashoutLaw
+from utank_hil.control import DesignPlant, PredictiveLaw, WashoutLaw
 from utank_hil.dynamics import RollShip, Tank
 
 LAW = PredictiveLaw(
@@ -16,7 +17,9 @@ LAW = PredictiveLaw(
 )
 WASHED = WashoutLaw(LAW, 0.03)
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
-LQG = LQG_ROLL_RATE_LEVEL.law(SHIP, Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10))
+LQG = LQG_ROLL_RATE_LEVEL.law(
+    DesignPlant(SHIP, Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10))
+)
 
 
 def random_law(seed, taps, inputs, outputs):

@@ -206,7 +206,7 @@ def test_disarmed_while_identifying_it_ends_at_zero_and_stays_there() -> None:
 
 
 def test_operator_forbids_and_undoes_over_the_bus() -> None:
-    running = storm().controllers["gpc"].law.law(storm().vessel.ship, storm().vessel.tank)
+    running = storm().controllers["gpc"].law.law(storm().controllers["gpc"].plant)
     same = replace(law_of(0.0), law=running.law, washout_rad_s=running.corner_rad_s)
     script = (*SCRIPT, TimedAction(70.0, Action.UNDO), TimedAction(80.0, Action.FORBID),
               TimedAction(82.0, Action.RETUNE))  # fmt: skip

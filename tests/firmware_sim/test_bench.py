@@ -17,7 +17,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode
 from utank_hil.configuration import load_config
-from utank_hil.configuration.laws import PassiveLaw
+from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
 from utank_hil.telemetry import read_recording
 
@@ -293,7 +293,7 @@ def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
 
 def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
     first = next(iter(STORM.controllers.values()))
-    passive = first.model_copy(update={"law": PassiveLaw(kind="passive")})
+    passive = first.model_copy(update={"law": PassiveDesign()})
     change_s = 8.0
     changing = STORM.model_copy(
         update={

@@ -6,7 +6,7 @@ import pytest
 from roll_plant import INERTIA_KG_M2, SAMPLE_TIME_S, SLOW_PUMP, TANK, jonswap_moment, noisy, pulses
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control import pump_model
+from utank_hil.control import DesignPlant, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.sampling import sample
@@ -45,7 +45,7 @@ def respond(ship: RollShip, tank: Tank, u: FloatArray, moment_nm: FloatArray) ->
 
 def fitted(u: FloatArray, y: FloatArray, outputs: int, order: int, tank: Tank = TANK) -> ShipFit:
     result = okid(u, y[:, :outputs], order, disturbance_polynomial_degree=0)
-    return fit_ship(result, u, CONFIGURED, tank, MEASURED[:outputs], DELAY_S, LAG_S)
+    return fit_ship(result, u, DesignPlant(CONFIGURED, tank, DELAY_S, LAG_S), MEASURED[:outputs])
 
 
 def period_s(fit: ShipFit) -> float:
@@ -85,7 +85,7 @@ def test_stated_deviations_are_the_errors_over_seas(outputs: int, order: int) ->
         u, y = u[:2000], noisy(y, 5e-3, seed)[:2000, :outputs]  # as the retuner does
         waves = find_disturbance_frequencies(u, y)
         found = okid(u, y, order, SAMPLE_TIME_S, waves, 0)
-        fit = fit_ship(found, u, CONFIGURED, TANK, MEASURED[:outputs], DELAY_S, LAG_S)
+        fit = fit_ship(found, u, DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S), MEASURED[:outputs])
         ratios = [getattr(fit.ship, name) / getattr(ship, name) for name in NUMBERS]
         ratios += [fit.tank.damping_ratio / TANK.damping_ratio, period_s(fit) / 12.6]
         errors.append(np.log(ratios) / [*fit.deviation, fit.period_deviation])
@@ -131,4 +131,4 @@ def test_outputs_that_do_not_fit_the_model_are_refused() -> None:
     y = respond(CONFIGURED, TANK, u, np.zeros(len(u)))
     result = okid(u, noisy(y, 1e-3, 2), 10)
     with pytest.raises(ValueError, match="outputs"):
-        fit_ship(result, u, CONFIGURED, TANK, ("roll_rad",))
+        fit_ship(result, u, DesignPlant(CONFIGURED, TANK), ("roll_rad",))

@@ -4,9 +4,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, PumpLimits, pump_model
+from utank_hil.control import DesignPlant, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.sampling import sample
@@ -30,14 +31,9 @@ def task_of(outputs: int, order: int) -> RetuningTask:
     design = DPC_ROLL_LEVEL if outputs == 2 else GPC_ROLL
     return RetuningTask(
         design,
-        CONFIGURED,
-        TANK,
-        DELAY_S,
-        LAG_S,
+        DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S),
         order,
         ModelLimits((6.0, 20.0)),
-        50e3,
-        PumpLimits(),
         LEAST_GAIN,
     )
 

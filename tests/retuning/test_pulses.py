@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
-from utank_hil.control import PumpLimits, pump_model
+from utank_hil.control import DesignPlant, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import chirp, multisine, prbs, random_pulses
@@ -40,7 +40,7 @@ def test_pulses_keep_within_pressure_rate_roll_and_level(kind: str, added_roll_r
         added_roll_rad=added_roll_rad,
         excitation=Excitation(kind),  # type: ignore[arg-type]
     )
-    pulses = make_pulses(settings, LIMITS, SHIP, TANK, 0.2, 0.05, 0.1)
+    pulses = make_pulses(settings, DesignPlant(SHIP, TANK, limits=LIMITS), 0.2)
     assert len(pulses) == 2500
     assert np.abs(pulses).max() <= settings.pulse_pa
     assert np.abs(np.diff(pulses)).max() <= LIMITS.rate_pa_s * 0.2 * (1 + 1e-12)
@@ -68,7 +68,7 @@ def test_each_kind_is_the_signal_of_that_name() -> None:
             pulse_hold_s=(0.6, 3.0),
             excitation=Excitation(kind, (0.3, 0.9) if swept else None),
         )
-        pulses = make_pulses(settings, LIMITS, SHIP, TANK, 0.2, 0.05, 0.1)
+        pulses = make_pulses(settings, DesignPlant(SHIP, TANK, limits=LIMITS), 0.2)
         shape = expected[kind] / np.linalg.norm(expected[kind])
         assert pulses / np.linalg.norm(pulses) == pytest.approx(shape, abs=1e-12)
 
@@ -96,7 +96,7 @@ def test_excitation_is_chosen_in_the_configuration(tmp_path: Path) -> None:
 def test_pumps_own_limit_counts_too() -> None:
     settings = RetuningSettings((6.0, 20.0), pulse_pa=40e3, added_roll_rad=1.0)
     limits = PumpLimits(pressure_pa=10e3)
-    pulses = make_pulses(settings, limits, SHIP, TANK, 0.2, 0.05, 0.1)
+    pulses = make_pulses(settings, DesignPlant(SHIP, TANK, limits=limits), 0.2)
     assert np.abs(pulses).max() <= 10e3
 
 

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 from recorded_ship import CONFIGURED, DELAY_S, LAG_S, TANK, ship_of
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.arrays import FloatArray
-from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, CommandLimiter, PumpLimits, pump_model
+from utank_hil.control import CommandLimiter, DesignPlant, PumpLimits, pump_model
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.linear import STATES, coupled_model, state_matrices
 from utank_hil.dynamics.sampling import sample
@@ -13,7 +14,7 @@ from utank_hil.retuning.rehearsal import RecordedWaves, tank_motion
 
 MEASURED = ("roll_rad", "level_m")
 PLANT = sample(pump_model(CONFIGURED, TANK, MEASURED), 0.2, DELAY_S, LAG_S)
-LAW = DPC_ROLL_LEVEL.law(CONFIGURED, TANK)
+LAW = DPC_ROLL_LEVEL.law(DesignPlant(CONFIGURED, TANK))
 OMEGA = np.array([0.5])
 UNLIMITED = PumpLimits(pressure_pa=1e9, rate_pa_s=1e12, level_m=1e6)
 
@@ -32,9 +33,12 @@ def _record(pressure_pa: float) -> np.ndarray:
 
 
 def _waves(
-    record: FloatArray, ship: RollShip = CONFIGURED, measured: tuple[str, ...] = MEASURED
+    record: FloatArray,
+    limits: PumpLimits,
+    ship: RollShip = CONFIGURED,
+    measured: tuple[str, ...] = MEASURED,
 ) -> RecordedWaves:
-    return RecordedWaves(record, ship, TANK, measured, 0.2, DELAY_S, LAG_S)
+    return RecordedWaves(record, DesignPlant(ship, TANK, DELAY_S, LAG_S, limits), measured, 0.2)
 
 
 @pytest.mark.parametrize("pressure_pa", [0.0, 1e4])
@@ -42,7 +46,7 @@ def test_rehearsed_roll_is_that_of_the_frequency_response(pressure_pa: float) ->
     model = coupled_model(CONFIGURED, TANK)
     passive = closed_loop_response(None, model, MEASURED, OMEGA)[0][0, 0]
     motions, pressure = closed_loop_response(LAW, model, MEASURED, OMEGA, DELAY_S, LAG_S)
-    result = _waves(_record(pressure_pa)).rehearse(LAW, UNLIMITED)
+    result = _waves(_record(pressure_pa), UNLIMITED).rehearse(LAW)
     assert result.passive_rad == pytest.approx(1e7 * abs(passive) / np.sqrt(2), rel=0.01)
     assert result.roll_rad == pytest.approx(1e7 * abs(motions[0, 0]) / np.sqrt(2), rel=0.02)
     assert result.pressure_pa == pytest.approx(1e7 * abs(pressure[0]) / np.sqrt(2), rel=0.02)
@@ -51,7 +55,7 @@ def test_rehearsed_roll_is_that_of_the_frequency_response(pressure_pa: float) ->
 def test_pressure_limit_holds_and_a_gap_is_bridged() -> None:
     record = _record(0.0)
     record[2000:2010] = np.nan
-    result = _waves(record).rehearse(LAW, PumpLimits(pressure_pa=100.0))
+    result = _waves(record, PumpLimits(pressure_pa=100.0)).rehearse(LAW)
     assert result.pressure_pa <= 100.0
     assert result.roll_rad == pytest.approx(result.passive_rad, rel=0.05)
 
@@ -109,11 +113,16 @@ def test_rehearsal_through_the_limits_foretells_the_voyage(
     moment_nm = size * _storm_nm(ship, 1)
     passive = _sailed(ship, None, measured, moment_nm)
     record = np.column_stack([np.zeros(len(passive)), passive[:, [0, 2][:outputs]]])
-    waves = _waves(record, ship, measured)
-    law = design.law(CONFIGURED, TANK)
+    law = design.law(DesignPlant(CONFIGURED, TANK))
     truth = np.sqrt(np.mean(_sailed(ship, law, measured, moment_nm)[300:, 0] ** 2))
-    assert waves.rehearse(law, PumpLimits()).roll_rad == pytest.approx(truth, rel=0.01)
-    free = waves.rehearse(law, PumpLimits(rate_pa_s=1e9, level_m=1e3)).roll_rad
+    assert _waves(record, PumpLimits(), ship, measured).rehearse(law).roll_rad == pytest.approx(
+        truth, rel=0.01
+    )
+    free = (
+        _waves(record, PumpLimits(rate_pa_s=1e9, level_m=1e3), ship, measured)
+        .rehearse(law)
+        .roll_rad
+    )
     assert bool(free < 0.9 * truth) is limits_matter
 
 

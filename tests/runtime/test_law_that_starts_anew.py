@@ -11,8 +11,8 @@ from utank_hil.canbus import Fault, Mode, Quality, SensorMotion
 from utank_hil.control.stimulation import Stimulation
 
 PLAN = Stimulation(
-    VESSEL.ship,
-    VESSEL.tank,
+    ship=VESSEL.ship,
+    tank=VESSEL.tank,
     amplitude_rad=0.05,
     period_s=12.5,
     ramp_s=4.0,

@@ -17,7 +17,7 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.console import Console
@@ -26,25 +26,23 @@ from rich.table import Table
 from tools.studies.trial_setup import shipped
 from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
 from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.laws import build_law
 from utank_hil.control import (
     ClippedValve,
     Controller,
+    DesignPlant,
     ErrorDynamics,
     IndirectFuzzy,
     OnOffValve,
     PassiveController,
-    PumpLimits,
     SmallGainFuzzy,
     ValveRange,
     design_lqr,
     level_brake,
-    pump_model,
 )
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import sample
 from utank_hil.runtime.process_priority import real_time_scheduling
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
@@ -72,14 +70,15 @@ class Candidate:
     ----------
     controller : Controller
     measured : tuple of str
-    limits : PumpLimits
+    plant : DesignPlant
+        That it is run on.
     pumps : bool
         Whether its answer is a pressure; a valve's is not.
     """
 
     controller: Controller
     measured: tuple[str, ...]
-    limits: PumpLimits
+    plant: DesignPlant
     pumps: bool = True
 
 
@@ -117,11 +116,10 @@ class Timed:
 
 def candidates() -> dict[str, Callable[[], Candidate]]:
     """Everything that is timed, by name, the floor first."""
-    config = shipped("gpc")
-    ship, tank, limits = config.vessel.ship, config.vessel.tank, config.limits
-    model = RollModel(ship, tank)
+    plant = shipped("gpc").plant
+    model = RollModel(plant.ship, plant.tank)
     coefficients = model.coefficients
-    lqr = design_lqr(sample(pump_model(ship, tank, STATES), 0.2, 0.0, 0.0), 1e11)
+    lqr = design_lqr(replace(plant, delay_s=0.0, lag_s=0.0).sampled(STATES, 0.2), 1e11)
     error, ranges = ErrorDynamics(1.5, 0.7, 2.5), (0.524, 0.524, 4.0, 4.0)
     gain = (
         -coefficients.coupling
@@ -141,10 +139,10 @@ def candidates() -> dict[str, Callable[[], Candidate]]:
     valve = ValveRange(0.0, 3e5)
 
     def pump(build: Callable[[], Controller]) -> Callable[[], Candidate]:
-        return lambda: Candidate(build(), STATES, limits)
+        return lambda: Candidate(build(), STATES, plant)
 
     def throttle(build: Callable[[], Controller]) -> Callable[[], Candidate]:
-        return lambda: Candidate(build(), STATES, limits, pumps=False)
+        return lambda: Candidate(build(), STATES, plant, pumps=False)
 
     return {
         FLOOR: pump(PassiveController),
@@ -159,18 +157,17 @@ def candidates() -> dict[str, Callable[[], Candidate]]:
 
 def _of_file(config: ControllerConfig) -> Callable[[], Candidate]:
     def build() -> Candidate:
-        built = build_law(config.law, config.vessel, config.delay_s, config.limits)
-        return Candidate(built.controller, built.measured, config.limits)
+        law = build_law(config)
+        return Candidate(law.controller(), law.measured, config.plant)
 
     return build
 
 
 def costs(candidate: Candidate, waves: FloatArray) -> dict[str, float]:
     """Cost of each step in a closed loop, and its memory."""
-    vessel = shipped("gpc").vessel
     timed = Timed(candidate)
     with real_time_scheduling():
-        simulate_loop(vessel.ship, vessel.tank, waves, timed, candidate.measured, candidate.limits)
+        simulate_loop(candidate.plant, waves, timed, candidate.measured)
     took_us = np.array(timed.took_ns[WARM_UP:]) / 1e3
     return {
         "p50_us": float(np.percentile(took_us, 50)),

@@ -117,20 +117,19 @@ def costs(config: ControllerConfig, repeats: int) -> dict[str, float]:
 
 def retune_once(config: ControllerConfig, times: dict[str, list[float]]) -> None:
     """Retune on order, and add the time of each step under its name."""
-    design, settings, vessel = config.law, config.retuning, config.vessel
+    design, settings, plant = config.law, config.retuning, config.plant
     work = retuner_work(config)
     assert isinstance(design, PredictiveDesign)
     assert settings is not None
     assert work is not None
-    path = (config.delay_s, vessel.pump.lag_s)
     period_s = design.predictor.sample_time_s
     with RetunerProcess(*work) as retuner:
         controller = AdaptiveController(
-            design.law(vessel.ship, vessel.tank, *path),
-            wave_arx(design.predictor, vessel.ship, vessel.tank, *path),
+            design.law(plant),
+            wave_arx(design.predictor, plant),
             design.predictor.measured.index("roll_rad"),
             settings,
-            make_pulses(settings, config.limits, vessel.ship, vessel.tank, period_s, *path),
+            make_pulses(settings, plant, period_s),
             retuner,
         )
         ship = _Rolling(config)
@@ -168,18 +167,18 @@ class _Rolling:
     """A linear ship of another loading in a regular wave."""
 
     def __init__(self, config: ControllerConfig) -> None:
-        design, vessel = config.law, config.vessel
+        design, plant = config.law, config.plant
         assert isinstance(design, PredictiveDesign)
-        stiffness = vessel.ship.inertia_kg_m2 * (2 * math.pi / PERIOD_S) ** 2
-        ship = replace(vessel.ship, stiffness_nm_rad=stiffness)
+        stiffness = plant.ship.inertia_kg_m2 * (2 * math.pi / PERIOD_S) ** 2
+        ship = replace(plant.ship, stiffness_nm_rad=stiffness)
         self._period_s = design.predictor.sample_time_s
         names = list(design.predictor.measured)
-        model = coupled_model(ship, vessel.tank)
+        model = coupled_model(ship, plant.tank)
         both = model[names, ["pressure_pa", "wave_moment_nm"]]
-        self._plant = sample(both, self._period_s, config.delay_s, vessel.pump.lag_s)
+        self._plant = sample(both, self._period_s, plant.delay_s, plant.lag_s)
         self._noise = np.random.default_rng(1)
         self._deviation = np.array(design.predictor.measurement_std) / 10
-        self._limit_pa = config.limits.pressure_pa
+        self._limit_pa = plant.limits.pressure_pa
         self._state = np.zeros(len(self._plant.A))
         self._steps = 0
         self.outputs = np.zeros(len(names))

@@ -17,6 +17,7 @@ from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import Vessel
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
 from utank_hil.sea import EffectiveSlope, Sea, load_ndbc
@@ -80,7 +81,7 @@ def bound_programme(vessel: Vessel, seconds: float) -> BoundProgramme:
     waves = passive_motion(ship, tank, moment, SAMPLE_TIME_S, samples + 1)
     try:
         with patch("clarabel.DefaultSolver", _take):
-            clairvoyant_bound(ship, tank, waves, PumpLimits(level_m=4.0))
+            clairvoyant_bound(DesignPlant(ship, tank, limits=PumpLimits(level_m=4.0)), waves)
     except _TakenError as taken:
         cost, gradient, rows, right, cones, _ = taken.args
     passive = np.rad2deg(waves[1:, _ROLL])

@@ -33,9 +33,9 @@ from rich.table import Table
 
 from tools.peers.identification_records import (
     MEASURED,
+    PLANT,
     SAMPLE_TIME_S,
     SHIP,
-    TANK,
     WAVE_RAD_S,
     Matrices,
     record,
@@ -45,8 +45,6 @@ from tools.peers.identification_records import (
 from tools.peers.memory import peak_mb
 from tools.peers.published_identification import PUBLISHED, Identify
 from utank_hil.arrays import FloatArray
-from utank_hil.control.predictive.design import pump_model
-from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import era, find_disturbance_frequencies, okid, refine
 from utank_hil.identification.ship_fit import fit_ship
 
@@ -80,11 +78,9 @@ def physical(order: int, u: FloatArray, y: FloatArray) -> Matrices:
         stiffness_nm_rad=1.4 * SHIP.stiffness_nm_rad,
         damping_nms_rad=0.5 * SHIP.damping_nms_rad,
     )
-    # a command acts from its sample on: one later than the loop's inputs, which are counted ahead
-    found = fit_ship(result, u, expected, TANK, MEASURED, delay_s=SAMPLE_TIME_S, lag_s=0.0)
-    ours = pump_model(found.ship, found.tank, MEASURED)
-    plant = sample(ours, SAMPLE_TIME_S, delay_s=SAMPLE_TIME_S, lag_s=0.0)
-    return plant.A, plant.B, plant.C, plant.D
+    fit = fit_ship(result, u, dataclasses.replace(PLANT, ship=expected), MEASURED)
+    found = dataclasses.replace(PLANT, ship=fit.ship, tank=fit.tank)
+    return found.sampled(MEASURED, SAMPLE_TIME_S)[:4]
 
 
 OURS: dict[str, Method] = {

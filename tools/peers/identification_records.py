@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.identification import random_pulses
@@ -22,6 +23,8 @@ FAST = PumpLimits(pressure_pa=50e3, rate_pa_s=500e3)
 SLOW = PumpLimits(pressure_pa=50e3, rate_pa_s=50e3)
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
+# a command acts from its sample on: one later than the loop's inputs, which are counted ahead
+PLANT = DesignPlant(SHIP, TANK, delay_s=SAMPLE_TIME_S, lag_s=0.0)
 MEASURED = ("roll_rad", "level_m")
 BAND_RAD_S = np.linspace(0.2, 1.2, 101)
 WAVE_RAD_S = 0.6

@@ -100,8 +100,7 @@ def constrained_design(every_sample: bool = False) -> tuple[ConstrainedDesign, C
 
 def constrained_law(design: ConstrainedDesign, config: ControllerConfig) -> ConstrainedLaw:
     """The law of a design on the configured vessel."""
-    vessel = config.vessel
-    return design.law(vessel.ship, vessel.tank, config.delay_s, vessel.pump.lag_s, config.limits)
+    return design.law(config.plant)
 
 
 class _Recording(ConstrainedController):
@@ -144,17 +143,7 @@ def sail(
     moment = sea.roll_moment(ship.stiffness_nm_rad, EffectiveSlope(0.5))
     waves = passive_motion(ship, tank, moment, TICK_S, round(seconds / TICK_S))
     controller = _Recording(law)
-    simulate_loop(
-        ship,
-        tank,
-        waves,
-        controller,
-        measured,
-        config.limits,
-        delay_s=config.delay_s,
-        lag_s=config.vessel.pump.lag_s,
-        seed=1,
-    )
+    simulate_loop(config.plant, waves, controller, measured, seed=1)
     return controller.steps
 
 

@@ -40,9 +40,8 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
     table_console,
-    trial_ship,
 )
-from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures
+from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
@@ -168,7 +167,7 @@ class Outcome:
 
 def run(arguments: argparse.Namespace) -> list[Outcome]:
     """Run every case with every seed."""
-    vessel = trial_ship(shipped("constrained_gpc").vessel)
+    vessel = TrialShip(shipped("constrained_gpc").plant)
     wanted, seeds = chosen(arguments.only), seeds_of(arguments)
     trials = []
     for case in wanted:

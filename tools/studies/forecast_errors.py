@@ -39,7 +39,7 @@ from tools.studies.trial_setup import (
 from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.arrays import FloatArray
-from utank_hil.control import ConstrainedDesign, PredictiveDesign
+from utank_hil.control import ConstrainedDesign, DesignPlant, PredictiveDesign
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.dynamics.linear import STATES, state_matrices
@@ -157,15 +157,12 @@ def factor_model(name: str) -> Model:
     vessel, told = shipped("constrained_gpc").vessel, design()
     plant, covariance = sea_plant(
         told.sea,
-        vessel.ship,
-        vessel.tank,
+        DesignPlant(vessel.ship, vessel.tank, delay_s=0.0, lag_s=0.0),
         pressure_noise_pa_rt_s=told.pressure_noise_pa_rt_s,
         slope_noise_rad_rt_s=told.slope_noise_rad_rt_s,
         heel_std_rad=0.0,
         heel_time_s=told.heel_time_s,
         sample_time_s=told.sample_time_s,
-        delay_s=0.0,
-        lag_s=0.0,
     )
     return Model(name, plant, covariance)
 

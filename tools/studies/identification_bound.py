@@ -21,6 +21,7 @@ from scipy.signal import dlsim
 
 from tools.peers.identification_records import (
     MEASURED,
+    PLANT,
     SAMPLE_TIME_S,
     SEAS,
     SHIP,
@@ -33,9 +34,7 @@ from tools.peers.identification_records import (
     sampled_plant,
 )
 from utank_hil.arrays import FloatArray
-from utank_hil.control import pump_model
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.identification import era, okid, refine
 from utank_hil.identification.ship_fit import fit_ship
 from utank_hil.sea import Sea, load_ndbc
@@ -51,16 +50,8 @@ Noise = tuple[FloatArray, FloatArray]
 
 def matrices_of(ship: RollShip, tank: Tank) -> Matrices:
     """Ship and tank from pressure to roll and level, the pressure held from sample to sample."""
-    model: LinearModel = sample(pump_model(ship, tank, MEASURED), SAMPLE_TIME_S, 0.0, 0.0)
-    # this sampling has y(k) feel u(k); the records here begin to answer a sample later
-    a, b = np.asarray(model.A), np.asarray(model.B)
-    zero = np.zeros((1, len(a)))
-    return (
-        np.block([[a, b], [zero, np.zeros((1, 1))]]),
-        np.vstack([np.zeros_like(b), np.ones((1, 1))]),
-        np.hstack([model.C, model.D]),
-        np.zeros((2, 1)),
-    )
+    plant = dataclasses.replace(PLANT, ship=ship, tank=tank)
+    return plant.sampled(MEASURED, SAMPLE_TIME_S)[:4]
 
 
 def of_physics(theta: FloatArray) -> Matrices:
@@ -142,10 +133,9 @@ def found(u: FloatArray, y: FloatArray) -> dict[str, Matrices]:
     result = okid(u, y, ORDER)
     realized = era(result.markov, 4)
     refined = refine(realized, result, u, y).system
-    shifted = np.concatenate([[0.0], u[:-1]])
     # begun with a ship of another loading
     ship = dataclasses.replace(SHIP, stiffness_nm_rad=1.4 * SHIP.stiffness_nm_rad)
-    fit = fit_ship(okid(shifted, y, ORDER), shifted, ship, TANK, MEASURED, 0.0, 0.0)
+    fit = fit_ship(result, u, dataclasses.replace(PLANT, ship=ship), MEASURED)
     return {
         "OKID, ERA": matrices(realized),
         "OKID, ERA, refined": matrices(refined),

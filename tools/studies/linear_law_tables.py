@@ -38,8 +38,14 @@ from utank_hil.analysis.loop.printed_laws import (
     source_index,
 )
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.configuration import Vessel
-from utank_hil.control import WashoutLaw, design_dpc, design_gpc, design_lqr, design_pd
+from utank_hil.control import (
+    DesignPlant,
+    WashoutLaw,
+    design_dpc,
+    design_gpc,
+    design_lqr,
+    design_pd,
+)
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.optimal_tank import (
     ShipTankRatios,
@@ -114,34 +120,27 @@ def margin_rows() -> Rows:
     ):
         found[name] = _margin_row(law, margins(law, plant, SAMPLE_TIME_S))
     for name, file in SHIPPED.items():
-        config, one = shipped(file), entrant(name, shipped(file))
-        vessel = config.vessel
-        report = robustness(
-            one.law, vessel.ship, vessel.tank, one.measured, config.delay_s, vessel.pump.lag_s
-        )
+        own, one = shipped(file).plant, entrant(name, shipped(file))
+        report = robustness(one.law, own, one.measured)
         found[name] = {
             **_margin_row(one.law, report.nominal),
             "S 20 ms late": report.late_peak_sensitivity,
             "worst pole": report.worst_radius,
         }
         if isinstance(one.law, WashoutLaw):
-            found[name]["list, no washout"] = steady_list(
-                one.law.law, vessel, one.measured, config.delay_s
-            )
+            found[name]["list, no washout"] = steady_list(one.law.law, own, one.measured)
     return found
 
 
-def steady_list(law: LinearLaw, vessel: Vessel, measured: tuple[str, ...], delay_s: float) -> float:
+def steady_list(law: LinearLaw, plant: DesignPlant, measured: tuple[str, ...]) -> float:
     """List under a steady moment with a law, per list with the tank passive."""
-    system, slow = coupled_model(vessel.ship, vessel.tank), np.array([1e-6])
+    system, slow = coupled_model(plant.ship, plant.tank), np.array([1e-6])
     row = system.output_labels.index("roll_rad")
     passive, active = (
-        abs(
-            closed_loop_response(one, system, measured, slow, delay_s, vessel.pump.lag_s)[0][0, row]
-        )
+        closed_loop_response(one, system, measured, slow, plant.delay_s, plant.lag_s)[0][0, row]
         for one in (None, law)
     )
-    return float(active / passive)
+    return float(abs(active) / abs(passive))
 
 
 def _margin_row(law: LinearLaw, found: Margins) -> dict[str, float]:
@@ -229,7 +228,7 @@ def index_rows() -> Rows:
         for name, law in designed_laws(*AS_PRINTED).items()
     }
     lqr = design_lqr(held_model(*AS_PRINTED, STATES), 1e14)
-    own["LQR"] = performance_index(lqr, *AS_PRINTED, STATES, SAMPLE_TIME_S, 0.0)
+    own["LQR"] = performance_index(lqr, DesignPlant(*AS_PRINTED, SAMPLE_TIME_S, 0.0), STATES)
     found: Rows = {}
     for name, indices in (
         ("printed", {**{key: law.index for key, law in PRINTED.items()}, "LQR": 504.0}),

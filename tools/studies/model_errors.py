@@ -27,7 +27,6 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
     table_console,
-    trial_ship,
 )
 from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
@@ -80,14 +79,14 @@ def of_period(ship: RollShip, scale: float) -> RollShip:
 
 def vessel_with(error: Error) -> TrialShip:
     """The first ship as she is, not as the laws believe."""
-    ship = trial_ship(shipped("gpc").vessel)
-    return dataclasses.replace(
-        ship,
-        ship=of_period(ship.ship, error.period_scale),
-        delay_s=ship.delay_s + error.extra_delay_s,
-        lag_s=ship.lag_s if error.lag_s is None else error.lag_s,
-        pump_gain=error.pump_gain,
+    believed = shipped("gpc").plant
+    plant = dataclasses.replace(
+        believed,
+        ship=of_period(believed.ship, error.period_scale),
+        delay_s=believed.delay_s + error.extra_delay_s,
+        lag_s=believed.lag_s if error.lag_s is None else error.lag_s,
     )
+    return TrialShip(plant, pump_gain=error.pump_gain)
 
 
 def entrants(error: Error) -> tuple[Entrant, ...]:

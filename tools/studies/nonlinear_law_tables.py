@@ -17,6 +17,7 @@ import json
 import math
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -32,17 +33,16 @@ from utank_hil.analysis.loop.margins import peak_sensitivity
 from utank_hil.arrays import FloatArray
 from utank_hil.control import (
     ClippedValve,
+    DesignPlant,
     FeedbackLinearization,
     GainLaw,
     OnOffValve,
     Stimulation,
     ValveRange,
     design_lqr,
-    pump_model,
 )
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.valves import duct_valve_loss
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea
 
@@ -57,14 +57,14 @@ WAVE_SLOPE_RAD = 0.02
 
 def linearization(ship: RollShip, tank: Tank, **changes: float) -> FeedbackLinearization:
     """The law with outer poles at the ship's roll frequency, limits wide enough not to act."""
-    numbers = {
+    numbers: dict[str, Any] = {
         "frequency_rad_s": 0.59 if ship is PATTI_B.ship else 0.5,
         "damping_ratio": 0.5,
         "soft_level_m": 1e3,
         "hard_level_m": 2e3,
         "shift_length_m": 10.0,  # the shifted output keeps its grip within the reservoirs
     }
-    return FeedbackLinearization(ship, tank, **{**numbers, **changes})
+    return FeedbackLinearization(**{**numbers, **changes}, ship=ship, tank=tank)
 
 
 def slope(law: FeedbackLinearization) -> GainLaw:
@@ -92,7 +92,7 @@ def growth_rows() -> Rows:
             row = {}
             for timing, (step_s, delay_s, lag_s) in timings.items():
                 law = slope(linearization(ship, tank, sample_time_s=step_s, **changes))
-                plant = sample(pump_model(ship, tank, STATES), step_s, delay_s, lag_s)
+                plant = DesignPlant(ship, tank, delay_s, lag_s).sampled(STATES, step_s)
                 row[f"{timing}: 1/s"] = math.log(closed_loop_radius(law, plant)) / step_s
                 if timing == late and row[f"{timing}: 1/s"] < 0:
                     row["peak sensitivity then"] = peak_sensitivity(law, plant)[0]
@@ -112,33 +112,27 @@ def storm_rows() -> Rows:
         "soft limit 1 m": {"soft_level_m": 1.0, "level_damping_ratio": 0.4},
     }
     found: Rows = {}
-    limits = shipped("feedback_linearization").limits
-    waves = {seed: passive_motion(*_storm(seed), round(STORM_S / TICK_S)) for seed in STORM_SEEDS}
+    plant, count = shipped("feedback_linearization").plant, round(STORM_S / TICK_S)
+    waves = {
+        seed: passive_motion(plant.ship, plant.tank, _storm(seed), TICK_S, count)
+        for seed in STORM_SEEDS
+    }
     for name in track(settings, "storm", console=Console(stderr=True)):
         shares, peaks = [], []
         for seed, passive in waves.items():
             level = {"soft_level_m": 2.5, "hard_level_m": 3.5}
-            law = linearization(FIRST.ship, FIRST.tank, **{**level, **settings[name]})
-            run = simulate_loop(
-                FIRST.ship,
-                FIRST.tank,
-                passive,
-                law.controller(),
-                STATES,
-                limits,
-                lag_s=FIRST.pump.lag_s,
-                seed=seed,
-            )
+            law = linearization(plant.ship, plant.tank, **{**level, **settings[name]})
+            run = simulate_loop(plant, passive, law.controller(), STATES, seed=seed)
             shares.append(_rms(run.motion[:, 0]) / _rms(passive[:, 0]) - 1)
             peaks.append(float(np.abs(run.motion[:, 2]).max()))
         found[name] = {"roll above passive": float(np.mean(shares)), "level peak m": max(peaks)}
     return found
 
 
-def _storm(seed: int) -> tuple[RollShip, Tank, Harmonics, float]:
+def _storm(seed: int) -> Harmonics:
+    """Roll moment of the storm hour on the first ship."""
     sea = Sea.irregular(measured_hour(STORM_HOUR), seed)
-    moment = sea.roll_moment(FIRST.ship.stiffness_nm_rad, EffectiveSlope(0.5))
-    return FIRST.ship, FIRST.tank, moment, TICK_S
+    return sea.roll_moment(FIRST.ship.stiffness_nm_rad, EffectiveSlope(0.5))
 
 
 class FixedOpening:
@@ -165,9 +159,9 @@ def valve_rows() -> Rows:
     tank = dataclasses.replace(FIRST.tank, damping_ratio=0.03)
     model = RollModel(FIRST.ship, tank)
     valve = ValveRange(0.0, duct_valve_loss(tank, min(OPENINGS)))
-    regulator = design_lqr(sample(pump_model(FIRST.ship, tank, STATES), 0.1, 0.0, 0.0), 1e11)
+    regulator = design_lqr(DesignPlant(FIRST.ship, tank, 0.0, 0.0).sampled(STATES, 0.1), 1e11)
     amplitude = FIRST.ship.stiffness_nm_rad * WAVE_SLOPE_RAD
-    storm = _storm(STORM_SEEDS[0])[2]
+    storm = _storm(STORM_SEEDS[0])
     seas = {f"{w:.2f} rad/s": WaveMoment([amplitude], [w], [0.0]) for w in REGULAR_RAD_S}
     seas["storm hour"] = WaveMoment(storm.amplitude, storm.frequency_rad_s, storm.phase_rad)
 
@@ -207,7 +201,14 @@ def stimulation_rows() -> Rows:
     )
     ships = {"first ship": FIRST.ship, "3 x damping, 0.93 x stiffness": other}
     plan = Stimulation(
-        FIRST.ship, FIRST.tank, amplitude_rad, period_s, 60.0, 50e3, math.radians(6.0), 4.0
+        amplitude_rad,
+        period_s,
+        ramp_s=60.0,
+        roll_limit_rad=math.radians(6.0),
+        ship=FIRST.ship,
+        tank=FIRST.tank,
+        pressure_pa=50e3,
+        level_limit_m=4.0,
     )
     found: Rows = {}
     for name, ship in ships.items():

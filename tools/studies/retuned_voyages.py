@@ -11,9 +11,9 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -24,9 +24,11 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.run import Job, Run, run_lockstep
 from firmware_sim.scenario import Scenario
+from tools.studies.trial_setup import designed
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.canbus import RetuningState
-from utank_hil.configuration import ConfigError, load_config
+from utank_hil.configuration import ConfigError
+from utank_hil.control import BuiltLaw
 
 WORKERS = 2
 HEADINGS = (
@@ -82,13 +84,13 @@ def sail(job: Job) -> Run:
     return run_lockstep(job, Unwatched())
 
 
-def jobs_for(scenario: Scenario, seed: int) -> list[Job]:
+def jobs_for(scenario: Scenario, seed: int, laws: Mapping[str, BuiltLaw]) -> list[Job]:
     """Passive; then each controller as it is configured, and without its retuning."""
-    passive, *retuned = jobs_of(scenario, seed, scenario.duration_s)
+    passive, *retuned = jobs_of(scenario, seed, scenario.duration_s, laws)
     jobs = [passive]
     for job in retuned:
         still = job.controller.model_copy(update={"retuning": None})
-        jobs += [job, Job(job.name, job.scenario, still, job.script, seed, job.duration_s)]
+        jobs += [job, replace(job, controller=still)]
     return jobs
 
 
@@ -150,11 +152,11 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     try:
-        scenario = load_config(arguments.scenario, Scenario)
+        scenario, laws = designed(arguments.scenario)
     except ConfigError as error:
         parser.error(str(error))
     seeds = arguments.seeds or [scenario.seed]
-    jobs = {seed: jobs_for(scenario, seed) for seed in seeds}
+    jobs = {seed: jobs_for(scenario, seed, laws) for seed in seeds}
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
         runs = pool.map(sail, [job for seed in seeds for job in jobs[seed]])
         found: list[Voyage] = []

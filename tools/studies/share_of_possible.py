@@ -31,7 +31,6 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
     table_console,
-    trial_ship,
 )
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.analysis.loop.sea_trial import (
@@ -41,6 +40,7 @@ from utank_hil.analysis.loop.sea_trial import (
     Entrant,
     Trial,
     TrialFigures,
+    TrialShip,
 )
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.arrays import FloatArray
@@ -96,7 +96,7 @@ def rows(
     laws: list[Entrant], results: list[dict[str, TrialFigures]]
 ) -> dict[str, dict[str, float]]:
     """Figures of each law by name, the ends of the scale with them."""
-    vessel = shipped("gpc").vessel
+    plant = shipped("gpc").plant
 
     def figures(name: str, field: str) -> FloatArray:
         return np.array([getattr(result[name], field) for result in results])
@@ -109,7 +109,7 @@ def rows(
     for law in laws:
         roll = figures(law.name, "roll_rms_rad")
         share = mean_interval((passive - roll) / (passive - best))
-        report = robustness(law.law, vessel.ship, vessel.tank, law.measured)
+        report = robustness(law.law, plant, law.measured)
         found[law.name] = {
             "roll_rms_deg": math.degrees(roll.mean()),
             "share": share.mean,
@@ -173,7 +173,7 @@ def main() -> None:
         arguments.pressure_pa, level_m=planned.limits.level_m, power_w=arguments.power_w
     )
     laws = entrants(bound)
-    hour, vessel = measured_hour(STORM_HOUR), trial_ship(planned.vessel)
+    hour, vessel = measured_hour(STORM_HOUR), TrialShip(planned.plant)
     results = run_shown(
         [
             Trial(hour, seed, vessel, tuple(laws), arguments.seconds, bound)

@@ -11,6 +11,7 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console
@@ -20,15 +21,19 @@ from rich.table import Table
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.report import NO_TANK, figures
 from firmware_sim.scenario import Scenario
+from tools.studies.trial_setup import designed
 from utank_hil.analysis.motion.confidence import mean_interval
-from utank_hil.configuration import ConfigError, load_config
+from utank_hil.configuration import ConfigError
+from utank_hil.control import BuiltLaw
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
 
 
-def figures_of_seed(scenario: Scenario, options: BenchOptions) -> dict[str, dict[str, float]]:
+def figures_of_seed(
+    scenario: Scenario, options: BenchOptions, laws: Mapping[str, BuiltLaw]
+) -> dict[str, dict[str, float]]:
     """What is kept of each run of a bench, the bare ship with them."""
-    bare, runs = figures(run_bench(scenario, options, lambda _name, _done: None))
+    bare, runs = figures(run_bench(scenario, options, lambda _name, _done: None, laws))
     kept = {NO_TANK: {"roll_rms_deg": math.degrees(bare.rms_rad)}}
     for run in runs:
         kept[run.name] = {
@@ -89,14 +94,14 @@ def main() -> None:
     if arguments.seeds < 2:
         parser.error("--seeds must be 2 or more: one value has no confidence interval")
     try:
-        scenario = load_config(arguments.scenario, Scenario)
+        scenario, laws = designed(arguments.scenario)
     except ConfigError as error:
         parser.error(str(error))
     summary: dict[str, dict[str, list[float]]] = {}
     seeds = range(arguments.first, arguments.first + arguments.seeds)
     for seed in track(seeds, console=Console(stderr=True), description="seeds"):
         options = BenchOptions(seed=seed, duration_s=arguments.duration)
-        for name, kept in figures_of_seed(scenario, options).items():
+        for name, kept in figures_of_seed(scenario, options, laws).items():
             for key, value in kept.items():
                 summary.setdefault(name, {}).setdefault(key, []).append(value)
     if arguments.json:

@@ -1,4 +1,4 @@
-"""What the tools share that try laws in seas: the shipped laws, measured hours, arguments.
+"""What the tools share that try laws in seas: shipped laws, scenarios, measured hours, arguments.
 
 No command of its own.
 """
@@ -14,10 +14,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
-from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip, run_trials
-from utank_hil.configuration import ControllerConfig, Vessel, load_config
-from utank_hil.configuration.laws import build_law
-from utank_hil.control import ConstrainedDesign, PumpLimits
+from firmware_sim.scenario import Scenario
+from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, run_trials
+from utank_hil.assembly import build_law
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.configuration.files import located
+from utank_hil.control import BuiltLaw, ConstrainedDesign, PumpLimits
+from utank_hil.parameters import ParameterError
 from utank_hil.sea import Spectrum, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -30,17 +33,30 @@ def shipped(name: str) -> ControllerConfig:
     return load_config(CONFIGS / "controllers" / f"{name}.yaml", ControllerConfig)
 
 
+def designed(path: Path) -> tuple[Scenario, dict[str, BuiltLaw]]:
+    """A scenario and the laws of its controllers.
+
+    Raises
+    ------
+    ConfigError
+        If the file is not right, or a law can't be designed.
+    """
+    scenario = load_config(path, Scenario)
+    laws = {}
+    for name, config in scenario.controllers.items():
+        try:
+            laws[name] = build_law(config)
+        except ParameterError as error:
+            raise located(error, path, f"controllers.{name}") from error
+    return scenario, laws
+
+
 def entrant(name: str, config: ControllerConfig) -> Entrant:
     """A configured law with the limiter behind it."""
-    built = build_law(config.law, config.vessel, config.delay_s, config.limits)
+    built = build_law(config)
     if built.linear is None:
         raise ValueError(f"{name} is no linear law: only these are tried in seas here")
     return Entrant(name, built.linear, built.measured, config.limits)
-
-
-def trial_ship(vessel: Vessel) -> TrialShip:
-    """The configured ship as the laws were designed for her."""
-    return TrialShip(vessel.ship, vessel.tank, lag_s=vessel.pump.lag_s)
 
 
 def measured_hour(time: str) -> Spectrum:

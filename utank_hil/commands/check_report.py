@@ -12,10 +12,10 @@ from rich.table import Table
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.loop.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
+from utank_hil.commands.gate import JudgedLaw
 from utank_hil.commands.tables import print_table
-from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.configuration.laws import ADAPTIVE, NONLINEAR, build_law
-from utank_hil.configuration.vessel import Vessel
+from utank_hil.configuration import Vessel
+from utank_hil.control import BuiltLaw
 from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
 
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
@@ -23,28 +23,29 @@ NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
 LEAST_LOOP_GAIN = 0.05
 """Below it a law that has all margins is told to do nothing; the shipped ones have 1.3 and more."""
 
-Judged = dict[str, tuple[ControllerConfig, Robustness | None]]
+Judged = dict[str, JudgedLaw]
 
 
-def controller_json(config: ControllerConfig, report: Robustness | None) -> dict[str, Any]:
+def controller_json(judged: JudgedLaw) -> dict[str, Any]:
     """A controller as one JSON object."""
+    config, report = judged.config, judged.robustness
     return {
         "name": config.name,
         "vessel": config.vessel.name,
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
-        "at_rest": _at_rest(config),
+        "at_rest": _at_rest(judged.law),
         "limits": _finite(asdict(config.limits)),
         "robustness": None if report is None else _finite(asdict(report)),
-        "delay_margin_searched_s": None if report is None else _searched_s(config),
-        "failures": [] if report is None else list(report.failures()),
-        "accepted": _accepted(config, report),
+        "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
+        "failures": list(judged.failures),
+        "accepted": judged.accepted,
     }
 
 
 def collection_json(name: str, vessel: Vessel, judged: Judged) -> dict[str, Any]:
     """A file of several controllers, a scenario for one, as one JSON object."""
-    controllers = {name: controller_json(*each) for name, each in judged.items()}
+    controllers = {name: controller_json(each) for name, each in judged.items()}
     return {
         "name": name,
         "vessel": vessel.name,
@@ -102,12 +103,16 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
     }
 
 
-def print_controller(config: ControllerConfig, report: Robustness | None) -> None:
+def print_controller(judged: JudgedLaw) -> None:
     """Print a controller's margins."""
+    config, report = judged.config, judged.robustness
     console = Console(highlight=False)
     console.print(f"{config.name} for {config.vessel.name}: the configuration is valid.")
     if report is None:
-        console.print(NO_LOOP)
+        if judged.law.unjudged:
+            _print_verdict(console, judged)
+        else:
+            console.print(NO_LOOP)
         return
     margin = report.nominal
     table = Table(title="Margins, delay and pump lag included")
@@ -118,7 +123,7 @@ def print_controller(config: ControllerConfig, report: Robustness | None) -> Non
     table.add_row("  at", f"{margin.peak_frequency_rad_s:.2f} rad/s", "")
     table.add_row("pump gain factor", _gain(margin), "")
     table.add_row("phase margin", _phase(margin), "")
-    table.add_row("delay margin", _delay(config, margin), "over 20 ms")
+    table.add_row("delay margin", _delay(judged.law, margin), "over 20 ms")
     table.add_row("disk margin", f"{margin.disk_margin:.2f}", "")
     table.add_row("greatest loop gain", f"{margin.peak_loop_gain:.3g}", "")
     table.add_row("largest eigenvalue of the grid", f"{report.worst_radius:.4f}", "less than 1")
@@ -127,15 +132,19 @@ def print_controller(config: ControllerConfig, report: Robustness | None) -> Non
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
     )
     print_table(console, table)
-    for remark in _remarks(config, report):
+    for remark in _remarks(judged.law, report):
         console.print(remark, soft_wrap=True)
-    for failure in report.failures():
-        console.print(f"[red]missed:[/red] {escape(failure)}")
-    if report.failures():
-        verdict = "accepted by the configuration" if config.accept_low_margins else "refused"
+    _print_verdict(console, judged)
+
+
+def _print_verdict(console: Console, judged: JudgedLaw) -> None:
+    for failure in judged.failures:
+        console.print(f"[red]missed:[/red] {escape(failure)}", soft_wrap=True)
+    if judged.failures:
+        verdict = "accepted by the configuration" if judged.accepted else "refused"
         console.print(f"This law is {verdict}.")
     else:
-        console.print(_met(config))
+        console.print(_met(judged.law))
 
 
 def print_collection(kind: str, name: str, vessel: Vessel, judged: Judged) -> None:
@@ -153,30 +162,37 @@ def print_collection(kind: str, name: str, vessel: Vessel, judged: Judged) -> No
     ):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    for each, (config, report) in judged.items():
-        if report is None:
-            table.add_row(escape(each), *5 * ("",), "no loop")
+    for each, one in judged.items():
+        verdict = _verdict(one)
+        if one.robustness is None:
+            table.add_row(escape(each), *5 * ("",), verdict)
             continue
-        margin = report.nominal
-        met = "at rest" if isinstance(config.law, ADAPTIVE) else "[green]ok[/green]"
-        verdict = met if not report.failures() else "[red]refused[/red]"
+        report, margin = one.robustness, one.robustness.nominal
         table.add_row(
             escape(each),
             f"{margin.peak_sensitivity:.2f}",
             _gain(margin),
             _phase(margin),
-            _delay(config, margin),
+            _delay(one.law, margin),
             f"{report.worst_radius:.4f}",
-            "[yellow]accepted[/yellow]" if report.failures() and config.accept_low_margins
-            else verdict,
-        )  # fmt: skip
+            verdict,
+        )
     print_table(console, table)
-    for each, (config, report) in judged.items():
-        for remark in () if report is None else _remarks(config, report):
+    for each, one in judged.items():
+        for remark in () if one.robustness is None else _remarks(one.law, one.robustness):
             console.print(f"{escape(each)}: {remark}", soft_wrap=True)
-    for each, (_, report) in judged.items():
-        for failure in () if report is None else report.failures():
-            console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}")
+    for each, one in judged.items():
+        for failure in one.failures:
+            console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}", soft_wrap=True)
+
+
+def _verdict(judged: JudgedLaw) -> str:
+    """The verdict on a law in a word."""
+    if judged.failures:
+        return "[yellow]accepted[/yellow]" if judged.accepted else "[red]refused[/red]"
+    if judged.robustness is None:
+        return "no loop"
+    return "at rest" if judged.law.adapts else "[green]ok[/green]"
 
 
 def print_ship(vessel: Vessel) -> None:
@@ -231,44 +247,39 @@ def _phase(margin: Margins) -> str:
     return f"{math.degrees(margin.phase_margin_rad):.0f}°"
 
 
-def _delay(config: ControllerConfig, margin: Margins) -> str:
+def _delay(law: BuiltLaw, margin: Margins) -> str:
     if not math.isfinite(margin.delay_margin_s):
-        return f"over {1e3 * _searched_s(config):.0f} ms"
+        return f"over {1e3 * _searched_s(law):.0f} ms"
     return f"{1e3 * margin.delay_margin_s:.0f} ms"
 
 
-def _searched_s(config: ControllerConfig) -> float:
+def _searched_s(law: BuiltLaw) -> float:
     """Extra delay up to which the loop was found stable, when no margin was found."""
-    linear = build_law(config.law, config.vessel, config.delay_s, config.limits).linear
-    return 0.0 if linear is None else DELAY_SAMPLES * linear.sample_time_s
+    return 0.0 if law.linear is None else DELAY_SAMPLES * law.linear.sample_time_s
 
 
-def _remarks(config: ControllerConfig, report: Robustness) -> list[str]:
-    """What is to be said of margins beside whether they are missed."""
-    said = [note for note in (_at_rest(config),) if note is not None]
+def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
+    """Notes on the margins beside whether they are missed."""
+    notes = [note for note in (_at_rest(law),) if note is not None]
     gain = report.nominal.peak_loop_gain
-    if gain < LEAST_LOOP_GAIN and not isinstance(config.law, ADAPTIVE):
-        said.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
-    return said
+    if gain < LEAST_LOOP_GAIN and not law.adapts:
+        notes.append(f"It hardly acts: its loop gain is {gain:.2g} at most.")
+    return notes
 
 
-def _met(config: ControllerConfig) -> str:
+def _met(law: BuiltLaw) -> str:
     """The verdict on a law that misses nothing."""
-    if isinstance(config.law, ADAPTIVE):
+    if law.adapts:
         return "Met by what it starts from; [yellow]what it learns is not judged.[/yellow]"
     return "[green]All requirements are met.[/green]"
 
 
-def _at_rest(config: ControllerConfig) -> str | None:
+def _at_rest(law: BuiltLaw) -> str | None:
     """What the margins of a nonlinear law are those of; None for a linear one."""
-    if not isinstance(config.law, NONLINEAR):
+    if not law.at_rest:
         return None
-    learning = " with the parameters it starts from" if isinstance(config.law, ADAPTIVE) else ""
+    learning = " with the parameters it starts from" if law.adapts else ""
     return f"The law is nonlinear: these are the margins of its slope at rest{learning}."
-
-
-def _accepted(config: ControllerConfig, report: Robustness | None) -> bool:
-    return config.accept_low_margins or report is None or not report.failures()
 
 
 def _finite(values: dict[str, Any]) -> dict[str, Any]:

@@ -60,9 +60,14 @@ def load(path: Path, model: type[ModelT]) -> ModelT:
     try:
         return load_config(path, model)
     except ConfigError as error:
-        for problem in error.problems:
-            notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
-        raise typer.Exit(2) from None
+        fail_with(error)
+
+
+def fail_with(error: ConfigError) -> NoReturn:
+    """List everything that is wrong with a configuration and end with exit code 2."""
+    for problem in error.problems:
+        notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
+    raise typer.Exit(2) from None
 
 
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from utank_hil.assembly import retuning_task
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out
 from utank_hil.commands.identified import (
     CONTROLLER,
@@ -18,7 +19,6 @@ from utank_hil.commands.identified import (
 )
 from utank_hil.commands.identify_report import figures, print_report
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.control import PredictiveDesign
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.acceptance import ModelLimits
 from utank_hil.identification.logged_samples import logged_samples
@@ -106,20 +106,11 @@ def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> N
 
 
 def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
-    settings, design = config.retuning, config.law
-    if not isinstance(design, PredictiveDesign) or "roll_rad" not in design.predictor.measured:
-        fail("the configuration's law must be predictive and measure roll_rad")
+    settings = config.retuning
     if order is None:
         order = 120 if settings is None else settings.order
     period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
-    vessel = config.vessel
-    return RetuningTask(
-        design,
-        vessel.ship,
-        vessel.tank,
-        config.delay_s,
-        vessel.pump.lag_s,
-        order,
-        ModelLimits(period_range_s),
-        config.limits.pressure_pa,
-    )
+    try:
+        return retuning_task(config, order, ModelLimits(period_range_s))
+    except ValueError as error:
+        fail(error)

@@ -115,16 +115,17 @@ def _waves(found: Identification) -> str:
 def _ship_table(found: Identification, task: RetuningTask) -> Table:
     fit = found.fit
     table = _table("Ship and tank", ("", "configured", "identified", "change", "± 95 %"))
+    before = task.plant
     inertia, stiffness, damping, tank = fit.deviation.tolist()
     rows = (
-        ("roll period, s", 2 * math.pi / task.ship.natural_frequency_rad_s,
+        ("roll period, s", 2 * math.pi / before.ship.natural_frequency_rad_s,
          2 * math.pi / fit.ship.natural_frequency_rad_s, fit.period_deviation),
-        ("inertia, t m²", task.ship.inertia_kg_m2 / 1e3, fit.ship.inertia_kg_m2 / 1e3, inertia),
-        ("stiffness, MN m/rad", task.ship.stiffness_nm_rad / 1e6,
+        ("inertia, t m²", before.ship.inertia_kg_m2 / 1e3, fit.ship.inertia_kg_m2 / 1e3, inertia),
+        ("stiffness, MN m/rad", before.ship.stiffness_nm_rad / 1e6,
          fit.ship.stiffness_nm_rad / 1e6, stiffness),
-        ("damping, MN m s/rad", task.ship.damping_nms_rad / 1e6, fit.ship.damping_nms_rad / 1e6,
+        ("damping, MN m s/rad", before.ship.damping_nms_rad / 1e6, fit.ship.damping_nms_rad / 1e6,
          damping),
-        ("tank damping ratio", task.tank.damping_ratio, fit.tank.damping_ratio, tank),
+        ("tank damping ratio", before.tank.damping_ratio, fit.tank.damping_ratio, tank),
     )  # fmt: skip
     for name, configured, identified, deviation in rows:
         table.add_row(
@@ -151,7 +152,7 @@ def _mode_table(found: Identification, task: RetuningTask) -> Table:
         "Modes of ship and tank together",
         ("", "configured", "identified", "without\nphysics", "± 95 %"),
     )
-    configured = _modes(task.ship, task.tank)
+    configured = _modes(task.plant.ship, task.plant.tank)
     fitted = _modes(found.fit.ship, found.fit.tank)
     realized = realized_modes(found)
     for number, ((w0, z0), (w1, z1)) in enumerate(zip(configured, fitted, strict=True), start=1):

@@ -14,8 +14,8 @@ from rich.markup import escape
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.announcer import Announcer
-from utank_hil.commands.check import refuse_low_margins
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.tables import print_table
@@ -54,7 +54,7 @@ def run(
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
     loaded = load(config, ControllerConfig)
-    refuse_low_margins(loaded)
+    law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.print("[yellow]repeated late ticks are not judged:[/yellow] safety.overruns_in_ten")
     statistics = LoopStatistics()
@@ -90,13 +90,14 @@ def run(
             notes.print("[red]the retuner did not start:[/red] nothing will be retuned")
         node = build_controller_node(
             loaded,
+            law,
             retuner=retuner,
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=None if announcer is None else announcer.write,
         )
         with suppress(PortError):  # the loop meets it too, and its node reacts
-            port.receive()  # what came while the law was designed is old, and must not look fresh
+            port.receive()  # what came while the node was built is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)

@@ -89,6 +89,25 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
     return loaded
 
 
+def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigError:
+    """What was found wrong with a configuration later, at the places where the values are written.
+
+    Parameters
+    ----------
+    error : ParameterError
+        Its problems are named by their keys in the configuration.
+    path : Path or str
+        The file that the configuration was read from.
+    key : str
+        Where in that file the configuration stands; empty for the file as a whole.
+    """
+    reader = _Reader()
+    reader.read(Path(path))
+    return ConfigError(
+        [reader.problem(_split(key) + _split(name), reason) for name, reason in error.problems]
+    )
+
+
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
     """Which of several models a file is written for, by its keys.
 
@@ -194,11 +213,12 @@ class _Reader:
             found = [(at + _split(name), reason) for name, reason in cause.problems]
         else:
             found = [(at, _reason(error, model))]
-        problems = []
-        for key, reason in found:
-            file, within = self._within(key)
-            problems.append(ConfigProblem(file, _dotted(within), reason))
-        return problems
+        return [self.problem(key, reason) for key, reason in found]
+
+    def problem(self, key: Key, reason: str) -> ConfigProblem:
+        """A problem at the place where the value of a key is written."""
+        file, within = self._within(key)
+        return ConfigProblem(file, _dotted(within), reason)
 
     def _give_up(self, key: Key, problem: ConfigProblem) -> dict[str, Any]:
         self.problems.append(problem)

@@ -34,11 +34,16 @@ hard limit.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, fields
+from typing import Literal
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.slope import slope_at_rest
+from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
@@ -46,13 +51,11 @@ from utank_hil.parameters import NotNegative, Positive, SampleTime, range_proble
 
 
 @dataclass(frozen=True, slots=True)
-class FeedbackLinearization:
-    """The law and its model; measured are roll, roll rate, level and level rate.
+class FeedbackLinearizationDesign:
+    """The law in parameters.
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     frequency_rad_s, damping_ratio : float
         w and zeta of the linear response that the output s is given.
     soft_level_m, hard_level_m : float
@@ -64,17 +67,13 @@ class FeedbackLinearization:
         l.
     level_damping_ratio : float
         zeta_h; 0 for the exact linear response.
-    sample_time_s : float
 
     Raises
     ------
     ValueError
-        If a parameter is out of its range, the reservoirs end between the soft and the hard limit
-        of the level, or the pump loses its grip on the shifted output within the hard limit.
+        If a parameter is out of its range.
     """
 
-    ship: RollShip
-    tank: Tank
     frequency_rad_s: Positive
     damping_ratio: Positive
     soft_level_m: Positive
@@ -82,9 +81,7 @@ class FeedbackLinearization:
     shift_rad_m: NotNegative = 0.0
     shift_length_m: Positive = 1.0
     level_damping_ratio: NotNegative = 0.0
-    sample_time_s: SampleTime = 0.01
-    model: RollModel = field(init=False, repr=False, compare=False)
-    _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
+    kind: Literal["feedback_linearization"] = "feedback_linearization"
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
@@ -95,14 +92,51 @@ class FeedbackLinearization:
                     f"must be below hard_level_m, got {self.soft_level_m} and {self.hard_level_m}",
                 )
             )
+        refuse("feedback linearization", problems)
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant; its delay and lag are not known to the law."""
+        parameters = {each.name: getattr(self, each.name) for each in fields(self)}
+        law = FeedbackLinearization(**parameters, ship=plant.ship, tank=plant.tank)
+        slope = slope_at_rest(law.controller, len(STATES))
+        return BuiltLaw(law.controller, STATES, slope, at_rest=True)
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackLinearization(FeedbackLinearizationDesign):
+    """The law and its model; measured are roll, roll rate, level and level rate.
+
+    Parameters
+    ----------
+    frequency_rad_s, ..., kind
+        As in `FeedbackLinearizationDesign`.
+    ship : RollShip
+    tank : Tank
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, the reservoirs end between the soft and the hard limit
+        of the level, or the pump loses its grip on the shifted output within the hard limit.
+    """
+
+    _: KW_ONLY
+    ship: RollShip
+    tank: Tank
+    sample_time_s: SampleTime = 0.01
+    model: RollModel = field(init=False, repr=False, compare=False)
+    _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        FeedbackLinearizationDesign.__post_init__(self)
         end_m = self.tank.level_limit_m
         if self.soft_level_m < end_m < self.hard_level_m:
             reason = (
                 f"{self.hard_level_m}: the reservoirs end at {end_m:g} m, where the law would "
                 "still act: lower it to that"
             )
-            problems.append(("hard_level_m", reason))
-        refuse("feedback linearization", problems)
+            refuse("feedback linearization", [("hard_level_m", reason)])
         object.__setattr__(self, "model", RollModel(self.ship, self.tank))
         brake = level_brake(self.model, self.level_damping_ratio)
         object.__setattr__(self, "_brake_pa_s_m", brake)

@@ -1,8 +1,11 @@
-"""What every controller is, an object stepped once a sample time, and what every linear law is."""
+"""What every controller, every linear law and every design of a law is."""
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
 
 from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.sampling import LinearModel
 
 
@@ -88,3 +91,51 @@ class LinearLaw(Protocol):
 
     def controller(self) -> Controller:
         """A new steppable controller, at rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltLaw:
+    """A law designed for a plant.
+
+    Attributes
+    ----------
+    controller : callable
+        Makes a new `Controller`, at rest.
+    measured : tuple of str
+        What the controller measures, in order; names of `STATES`.
+    linear : LinearLaw or None
+        The law for the analysis of its loop. None where there is no loop.
+    at_rest : bool
+        The law is not linear, and `linear` is its slope at rest.
+    adapts : bool
+        The law changes while it runs, and `linear` is what it starts from.
+    unjudged : str
+        Why its loop can't be judged, of a law that closes one; empty where it can, or need not.
+    """
+
+    controller: Callable[[], Controller]
+    measured: tuple[str, ...]
+    linear: LinearLaw | None = None
+    at_rest: bool = False
+    adapts: bool = False
+    unjudged: str = ""
+
+
+class LawDesign(Protocol):
+    """A law in parameters: a frozen dataclass that a configuration file can hold.
+
+    Its field `kind` is a ``Literal`` of the names by which a file chooses it.
+    """
+
+    @property
+    def kind(self) -> Any:
+        """Name of the law in a configuration file."""
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant.
+
+        Raises
+        ------
+        ValueError
+            If a parameter does not fit the plant; a `ParameterError` names it.
+        """

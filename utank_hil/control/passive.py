@@ -1,11 +1,13 @@
 """The controller that does nothing: the tank as a passive damper."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw
 from utank_hil.parameters import Range, SampleTime, range_problems, refuse
 
 
@@ -40,3 +42,14 @@ class PassiveController:
 
     def reset(self) -> None:
         """Nothing to forget."""
+
+
+@dataclass(frozen=True, slots=True)
+class PassiveDesign:
+    """The passive tank as a law of a configuration."""
+
+    kind: Literal["passive"] = "passive"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, the same for all
+        """Zero pressure; there is no loop."""
+        return BuiltLaw(PassiveController, ("roll_rad",))

@@ -5,11 +5,14 @@ ratio of `passive_optimum`. The pump changes the water's stiffness and loss, not
 and water are coupled.
 """
 
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Literal
 
 import numpy as np
 
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import GainLaw
+from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
@@ -45,3 +48,15 @@ def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLa
     spring = mass * frequency**2 - stiffness
     loss = 2 * best.damping_ratio * frequency * mass - damping
     return GainLaw(np.array([[spring, loss]]) / tank.reservoir_area_m2, sample_time_s)
+
+
+@dataclass(frozen=True, slots=True)
+class PDDesign:
+    """PD on the level as a law of a configuration."""
+
+    kind: Literal["pd"] = "pd"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant."""
+        law = design_pd(plant.ship, plant.tank)
+        return BuiltLaw(law.controller, PD_MEASURED, law)

@@ -15,12 +15,14 @@ pressure is zero at once, and the tank left to quiet the ship. Either end lasts 
 """
 
 import math
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import KW_ONLY, dataclass, fields
+from typing import Annotated, Literal
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw
 from utank_hil.dynamics.linear import STATES, coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -39,50 +41,51 @@ SHORT = 0.01  # of the pressure's amplitude: what falls short by less left as it
 
 
 @dataclass(frozen=True, slots=True)
-class Stimulation:
-    """What to do, and for which ship.
+class StimulationDesign:
+    """The wanted roll in parameters.
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     amplitude_rad, period_s : float
         Wanted roll.
     ramp_s : float
         Time in which the amplitude goes from zero to full and back.
-    pressure_pa : float
-        Greatest pressure.
-    roll_limit_rad, level_limit_m : float
+    roll_limit_rad : float
         Where the stimulation ends.
     correction_s : float
         T.
     duration_s : float
         Time from the beginning of the ramp in to that of the ramp out; infinity for no such end.
-    sample_time_s : float
 
     Raises
     ------
     ValueError
-        If a parameter is not positive, the amplitude is at or above the roll limit, the duration
-        ends within the ramp in, or the model says that it takes more pressure or level than there
-        is.
+        If a parameter is not positive, the amplitude is at or above the roll limit, or the duration
+        ends within the ramp in.
     """
 
-    ship: RollShip
-    tank: Tank
     amplitude_rad: Positive
     period_s: Positive
     ramp_s: Positive
-    pressure_pa: Positive
     roll_limit_rad: Positive
-    level_limit_m: Positive
     correction_s: Positive = 120.0
     duration_s: Annotated[float, Range(above=0, infinite=True)] = math.inf
-    sample_time_s: SampleTime = 0.02
+    kind: Literal["stimulate"] = "stimulate"
 
     def __post_init__(self) -> None:
-        problems = range_problems(self)
-        refuse("stimulation", problems or [*self._limit_problems(), *self._reach_problems()])
+        refuse("stimulation", range_problems(self) or self._limit_problems())
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Plan it for a plant, within its limits; it closes no loop that quiets the roll."""
+        parameters = {each.name: getattr(self, each.name) for each in fields(self)}
+        law = Stimulation(
+            **parameters,
+            ship=plant.ship,
+            tank=plant.tank,
+            pressure_pa=plant.limits.pressure_pa,
+            level_limit_m=plant.limits.level_m,
+        )
+        return BuiltLaw(law.controller, STATES)
 
     def _limit_problems(self) -> list[Problem]:
         problems = []
@@ -93,6 +96,41 @@ class Stimulation:
             reason = f"{self.duration_s} must be ramp_s {self.ramp_s} or more"
             problems.append(("duration_s", reason))
         return problems
+
+
+@dataclass(frozen=True, slots=True)
+class Stimulation(StimulationDesign):
+    """What to do, and for which ship.
+
+    Parameters
+    ----------
+    amplitude_rad, ..., kind
+        As in `StimulationDesign`.
+    ship : RollShip
+    tank : Tank
+    pressure_pa : float
+        Greatest pressure.
+    level_limit_m : float
+        Where the stimulation ends.
+    sample_time_s : float
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or the model says that the amplitude takes more pressure
+        or level than there is.
+    """
+
+    _: KW_ONLY
+    ship: RollShip
+    tank: Tank
+    pressure_pa: Positive
+    level_limit_m: Positive
+    sample_time_s: SampleTime = 0.02
+
+    def __post_init__(self) -> None:
+        StimulationDesign.__post_init__(self)
+        refuse("stimulation", self._reach_problems())
 
     def _reach_problems(self) -> list[Problem]:
         roll, level = self.gains

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
@@ -102,3 +103,10 @@ def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
         outputs=list(STATES),
         name="ship_and_tank",
     )
+
+
+def pump_model(ship: RollShip, tank: Tank, measured: tuple[str, ...]) -> LinearModel:
+    """Continuous model from pump pressure to the `measured` outputs, without python-control."""
+    a, b = state_matrices(ship, tank)
+    c = np.eye(len(STATES))[[STATES.index(name) for name in measured]]
+    return LinearModel(a, b[:, :1], c, np.zeros((len(measured), 1)), 0.0)

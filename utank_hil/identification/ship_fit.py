@@ -31,8 +31,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.control.predictive.design import pump_model
-from utank_hil.dynamics.sampling import sample
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification.errors import IdentificationError
@@ -68,7 +67,7 @@ class ShipFit:
     dispersion : float
         Root mean square of the misfit over what the prediction errors explain.
     later_s : ndarray, shape (m,)
-        By how much each output is later than `delay_s` and `lag_s` have it.
+        By how much each output is later than the plant's delay and lag have it.
     pressure : float
         Pressure over command.
     """
@@ -85,11 +84,8 @@ class ShipFit:
 def fit_ship(
     result: OkidResult,
     u: FloatArray,
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     measured: tuple[str, ...],
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
 ) -> ShipFit:
     """Fit ship and tank to what OKID found.
 
@@ -99,12 +95,10 @@ def fit_ship(
         One input.
     u : array_like, shape (N,)
         The input it was found with, gaps included.
-    ship, tank : RollShip, Tank
-        To begin with; what is not fitted is theirs.
+    plant : DesignPlant
+        Where the fit begins; what is not fitted stays as it is there.
     measured : tuple of str
         Outputs of the model, by their names in `utank_hil.dynamics.linear.STATES`.
-    delay_s, lag_s : float
-        As in `utank_hil.dynamics.sampled_model`.
 
     Returns
     -------
@@ -117,7 +111,7 @@ def fit_ship(
     IdentificationError
         If no ship can be fitted.
     """
-    arx = result.arx
+    arx, ship, tank = result.arx, plant.ship, plant.tank
     if (arx.outputs, arx.inputs) != (len(measured), 1):
         raise ValueError(
             f"the model must have one input and the outputs {measured}, it has {arx.inputs} and "
@@ -131,22 +125,23 @@ def fit_ship(
     spread = np.array([*_SPREAD, _PRESSURE_SPREAD, *[_DELAY_SPREAD_S] * arx.outputs])
     amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), arx.sample_time_s)
 
-    def changed(theta: FloatArray) -> tuple[RollShip, Tank]:
+    def changed(theta: FloatArray) -> DesignPlant:
         factor = np.exp(theta[:_PRESSURE]).tolist()
-        return (
-            dataclasses.replace(
+        return dataclasses.replace(
+            plant,
+            ship=dataclasses.replace(
                 ship,
                 inertia_kg_m2=ship.inertia_kg_m2 * factor[0],
                 stiffness_nm_rad=ship.stiffness_nm_rad * factor[1],
                 damping_nms_rad=ship.damping_nms_rad * factor[2],
             ),
-            dataclasses.replace(tank, damping_ratio=tank.damping_ratio * factor[3]),
+            tank=dataclasses.replace(tank, damping_ratio=tank.damping_ratio * factor[3]),
         )
 
     def response(theta: FloatArray) -> ComplexArray:
-        plant = sample(pump_model(*changed(theta), measured), arx.sample_time_s, delay_s, lag_s)
-        resolvent = z[:, None, None] * np.eye(len(plant.A)) - plant.A
-        exact = plant.C @ np.linalg.solve(resolvent, plant.B + 0j) + plant.D
+        model = changed(theta).sampled(measured, arx.sample_time_s)
+        resolvent = z[:, None, None] * np.eye(len(model.A)) - model.A
+        exact = model.C @ np.linalg.solve(resolvent, model.B + 0j) + model.D
         later = np.exp(theta[_PRESSURE] - 1j * np.outer(lines, theta[_PRESSURE + 1 :]))
         found: ComplexArray = later[:, :, None] * exact
         return found
@@ -173,8 +168,10 @@ def fit_ship(
     of_period = np.array([0.5, -0.5, 0.0, 0.0])
     part = len(result.column_scale) / result.rows
     wider = (1 + part) / (1 - part)
+    found = changed(theta)
     return ShipFit(
-        *changed(theta),
+        found.ship,
+        found.tank,
         wider * np.sqrt(covariance.diagonal()),
         wider * float(np.sqrt(of_period @ covariance @ of_period)),
         dispersion,

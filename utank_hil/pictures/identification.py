@@ -6,10 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.control import pump_model
-from utank_hil.dynamics.sampling import sample
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.control import DesignPlant
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.identification import (
     DisturbanceBasis,
@@ -61,9 +58,9 @@ def draw_identification(
     powers = z[:, None] ** -np.arange(arx.order + 1)
     left = np.eye(arx.outputs) - np.einsum("wi,iab->wab", powers[:, 1:], arx.alpha)
     responses = {
-        "configured": _ship_response(task, task.ship, task.tank, z),
+        "configured": _ship_response(task, task.plant, z),
         "ARX model": np.linalg.solve(left, np.einsum("wi,iab->wab", powers, arx.beta)),
-        "identified ship": _ship_response(task, found.fit.ship, found.fit.tank, z),
+        "identified ship": _ship_response(task, found.plant(task), z),
     }
     with picture(path, title, (12.0, 8.0)) as figure:
         (above, bode), (residuals, modes) = figure.subplots(2, 2)
@@ -107,14 +104,9 @@ def draw_identification(
     return path
 
 
-def _ship_response(task: RetuningTask, ship: RollShip, tank: Tank, z: ComplexArray) -> ComplexArray:
-    plant = sample(
-        pump_model(ship, tank, task.design.predictor.measured),
-        task.design.predictor.sample_time_s,
-        task.delay_s,
-        task.lag_s,
-    )
-    return state_space_response(plant, z)
+def _ship_response(task: RetuningTask, plant: DesignPlant, z: ComplexArray) -> ComplexArray:
+    predictor = task.design.predictor
+    return state_space_response(plant.sampled(predictor.measured, predictor.sample_time_s), z)
 
 
 def _stable_points(found: Identification) -> tuple[StabilizationPoint, ...]:

@@ -12,11 +12,9 @@ from utank_hil.analysis.loop.margins import loop_response
 from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
 from utank_hil.analysis.loop.sea_response import roll_response_without_tank
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_model
-from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.pictures.style import COLORS, picture
 
 if TYPE_CHECKING:
@@ -25,12 +23,9 @@ if TYPE_CHECKING:
 
 def draw_bode(
     loops: Sequence[Loop],
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     path: Path,
     title: str,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
 ) -> Path:
     """Draw magnitude and phase of the roll per effective wave slope, without and with the tank.
 
@@ -41,14 +36,11 @@ def draw_bode(
     ----------
     loops : sequence of Loop
         At most four; the passive tank is always drawn.
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
     path : Path
         The `.png` file; written anew.
     title : str
         Stands above the picture.
-    delay_s, lag_s : float
-        As in `sampled_model`.
 
     Returns
     -------
@@ -63,8 +55,9 @@ def draw_bode(
     from matplotlib.ticker import LogLocator, MultipleLocator
 
     _check_number(loops)
+    ship = plant.ship
     w = ship.natural_frequency_rad_s * np.geomspace(0.2, 5.0, 3000)
-    system = coupled_model(ship, tank)
+    system = coupled_model(ship, plant.tank)
     row = system.output_labels.index("roll_rad")
     with picture(path, title, (9.0, 7.0)) as figure:
         axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -72,7 +65,9 @@ def draw_bode(
         passive, _ = closed_loop_response(None, system, (), w)
         _add_bode(axes, w, ship, passive[:, row], PASSIVE, COLORS[0])
         for loop, color in zip(loops, COLORS[1:], strict=False):
-            active, _ = closed_loop_response(loop.law, system, loop.measured, w, delay_s, lag_s)
+            active, _ = closed_loop_response(
+                loop.law, system, loop.measured, w, plant.delay_s, plant.lag_s
+            )
             _add_bode(axes, w, ship, active[:, row], loop.name, color)
         axes[0].set_ylabel("Roll per effective wave slope")
         axes[1].set_ylabel("Phase (°)")
@@ -90,12 +85,9 @@ def draw_bode(
 
 def draw_nyquist(
     loops: Sequence[Loop],
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     path: Path,
     title: str,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
 ) -> Path:
     """Draw the sampled loops, broken at the pump, with the circle that none may enter.
 
@@ -128,7 +120,7 @@ def draw_nyquist(
         )
         shown = [forbidden, circle]
         for loop, color in zip(loops, COLORS[1:], strict=False):
-            ahead = -_loop(loop, ship, tank, delay_s, lag_s)
+            ahead = -_loop(loop, plant)
             axes.plot(ahead.real, ahead.imag, color=color, linewidth=1.6, label=loop.name)
             axes.plot(ahead.real, -ahead.imag, color=color, linewidth=0.8, linestyle="--")
             shown.append(ahead)
@@ -164,10 +156,10 @@ def _add_bode(
         axis.grid(visible=True, which="minor", axis="x", linewidth=0.4)
 
 
-def _loop(loop: Loop, ship: RollShip, tank: Tank, delay_s: float, lag_s: float) -> ComplexArray:
+def _loop(loop: Loop, plant: DesignPlant) -> ComplexArray:
     """L from well below the ship's roll up to half the sampling frequency, dense in between."""
-    plant = sample(pump_model(ship, tank, loop.measured), loop.law.sample_time_s, delay_s, lag_s)
-    roll = ship.natural_frequency_rad_s
+    sampled = plant.sampled(loop.measured, loop.law.sample_time_s)
+    roll = plant.ship.natural_frequency_rad_s
     w = np.unique(
         np.concatenate(
             [
@@ -176,7 +168,7 @@ def _loop(loop: Loop, ship: RollShip, tank: Tank, delay_s: float, lag_s: float) 
             ]
         )
     )
-    return loop_response(loop.law, plant, w[w <= np.pi / loop.law.sample_time_s])
+    return loop_response(loop.law, sampled, w[w <= np.pi / loop.law.sample_time_s])
 
 
 def _frame(axes: "Axes", points: ComplexArray) -> None:

@@ -3,25 +3,14 @@
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control import ARX, PumpLimits, pump_model
-from utank_hil.dynamics.sampling import sample
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.control import ARX, DesignPlant, PumpLimits
 from utank_hil.retuning.settings import RetuningSettings
 
 
-def make_pulses(
-    settings: RetuningSettings,
-    limits: PumpLimits,
-    ship: RollShip,
-    tank: Tank,
-    sample_time_s: float,
-    delay_s: float,
-    lag_s: float,
-) -> FloatArray:
+def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:
     """Pulses of the chosen kind within pressure and rate, and within roll and level on this ship.
 
-    Roll and level are those that the pulses alone cause in still water. The level limit of `limits`
+    Roll and level are those that the pulses alone cause in still water. The level limit
     applies to the sum of waves, law and pulses, at every command; this is only its first guard.
 
     Returns
@@ -37,6 +26,7 @@ def make_pulses(
     # scipy.optimize: not for every start
     from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
+    limits = plant.limits
     within = PumpLimits(
         pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
     )
@@ -50,7 +40,7 @@ def make_pulses(
             pulses = multisine(how_long_s, within, seed, settings.excitation.band, sample_time_s)
         case "chirp":
             pulses = chirp(how_long_s, within, settings.excitation.band, sample_time_s)
-    plant = sample(pump_model(ship, tank, ("roll_rad", "level_m")), sample_time_s, delay_s, lag_s)
-    model = ARX.from_state_space(plant, len(plant.A))
+    sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
+    model = ARX.from_state_space(sampled, len(sampled.A))
     room = np.array([settings.added_roll_rad, limits.level_m])
     return pulses * response_scale(pulses, model, room)

@@ -5,6 +5,7 @@ on the rest and against physics, design, and judge the law on the ship that was 
 and in the recorded waves.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -13,16 +14,13 @@ import numpy as np
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.arrays import FloatArray
 from utank_hil.control import (
-    ARX,
+    DesignPlant,
     LinearLaw,
     PredictiveDesign,
     PredictiveLaw,
-    PumpLimits,
     wave_arx,
 )
 from utank_hil.control.washout import WashoutLaw
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,
@@ -68,30 +66,19 @@ class RetuningTask:
     ----------
     design : PredictiveDesign
         How laws are made.
-    ship, tank : RollShip, Tank
+    plant : DesignPlant
         As configured: where the search begins.
-    delay_s, lag_s : float
-        Of the loop, as in `utank_hil.dynamics.sampled_model`.
     order : int
         Of the ARX model.
     limits : ModelLimits
-    pressure_pa : float
-        Greatest pressure of the pump.
-    pump_limits : PumpLimits or None
-        All that limits the pump; None: the usual limits with that pressure.
     least_gain : float or None
         Part by which a law must roll less than the configured one; None: they are not compared.
     """
 
     design: PredictiveDesign
-    ship: RollShip
-    tank: Tank
-    delay_s: float
-    lag_s: float
+    plant: DesignPlant
     order: int
     limits: ModelLimits
-    pressure_pa: float
-    pump_limits: PumpLimits | None = None
     least_gain: float | None = None
 
 
@@ -113,6 +100,10 @@ class Identification:
     wave_frequencies_rad_s: tuple[float, ...]
     validation: Validation
     fit: ShipFit
+
+    def plant(self, task: RetuningTask) -> DesignPlant:
+        """The configured plant with the ship and tank that were found."""
+        return dataclasses.replace(task.plant, ship=self.fit.ship, tank=self.fit.tank)
 
 
 def retune(record: FloatArray, task: RetuningTask) -> Answer:
@@ -199,7 +190,7 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         disturbance_polynomial_degree=OFFSET,
     )
     validation = validate(result.arx, record[split:, :1], record[split:, 1:], waves, LAGS, OFFSET)
-    fit = fit_ship(result, u, task.ship, task.tank, predictor.measured, task.delay_s, task.lag_s)
+    fit = fit_ship(result, u, task.plant, predictor.measured)
     return Identification(result, waves, validation, fit)
 
 
@@ -224,23 +215,21 @@ def _refuse_empty(part: FloatArray) -> None:
 
 def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
     """A law for the ship that was found, if it passes."""
-    ship, tank = found.fit.ship, found.fit.tank
+    plant = found.plant(task)
     design, measured = task.design, task.design.predictor.measured
-    law = design.law(ship, tank, task.delay_s, task.lag_s)
-    report = robustness(law, ship, tank, measured, task.delay_s, task.lag_s)
-    limits = task.pump_limits or PumpLimits(pressure_pa=task.pressure_pa)
-    waves = RecordedWaves(record, ship, tank, measured, law.sample_time_s, task.delay_s, task.lag_s)
-    trial = waves.rehearse(law, limits)
+    law = design.law(plant)
+    report = robustness(law, plant, measured)
+    waves = RecordedWaves(record, plant, measured, law.sample_time_s)
+    trial = waves.rehearse(law)
     before = None
     if task.least_gain is not None:
-        configured = design.law(task.ship, task.tank, task.delay_s, task.lag_s)
-        before = waves.rehearse(configured, limits)
+        before = waves.rehearse(design.law(task.plant))
     objections = (*report.failures(), *_rehearsal_objections(trial, before, task))
     if objections:
         return Refusal(objections)
     return Candidate(
         *_parts(law),
-        _model(found.fit, task),
+        wave_arx(design.predictor, plant),
         _summary(found, report, trial),
     )
 
@@ -264,10 +253,10 @@ def _rehearsal_objections(
             f"in the recorded waves the law rolls {math.degrees(trial.roll_rad):.2f} degrees RMS, "
             f"the passive tank {math.degrees(trial.passive_rad):.2f}"
         )
-    if not trial.pressure_pa <= EFFORT_PART * task.pressure_pa:
+    if not trial.pressure_pa <= EFFORT_PART * task.plant.limits.pressure_pa:
         found.append(
             f"in the recorded waves the law takes {trial.pressure_pa / 1e3:.0f} kPa RMS of "
-            f"{task.pressure_pa / 1e3:.0f}"
+            f"{task.plant.limits.pressure_pa / 1e3:.0f}"
         )
     return tuple(found)
 
@@ -278,10 +267,6 @@ def _parts(law: LinearLaw) -> tuple[PredictiveLaw, float]:
         return law.law, law.corner_rad_s
     assert isinstance(law, PredictiveLaw)
     return law, 0.0
-
-
-def _model(fit: ShipFit, task: RetuningTask) -> ARX:
-    return wave_arx(task.design.predictor, fit.ship, fit.tank, task.delay_s, task.lag_s)
 
 
 def _summary(found: Identification, report: Robustness, trial: Rehearsal) -> ModelSummary:

@@ -13,11 +13,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
-from utank_hil.control.limits import CommandLimiter, PumpLimits
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control.limits import CommandLimiter
 from utank_hil.dynamics.linear import STATES, coupled_matrices
-from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
@@ -53,32 +53,26 @@ class RecordedWaves:
     ----------
     record : ndarray, shape (N, 1 + m)
         Command and outputs; gaps are NaN.
-    ship, tank : RollShip, Tank
+    plant : DesignPlant
         Of the record.
     measured : tuple of str
         The outputs by name, ``roll_rad`` among them.
     sample_time_s : float
         Of the record.
-    delay_s, lag_s : float
-        As in `utank_hil.dynamics.sampled_model`.
     """
 
     def __init__(
         self,
         record: FloatArray,
-        ship: RollShip,
-        tank: Tank,
+        plant: DesignPlant,
         measured: tuple[str, ...],
         sample_time_s: float,
-        delay_s: float,
-        lag_s: float,
     ) -> None:
-        self._tank = tank
+        self._limits, self._tank = plant.limits, plant.tank
         self._measured = [STATES.index(name) for name in measured]
         self._roll = measured.index("roll_rad")
-        model = pump_model(ship, tank, STATES)
-        self._plant = sample(model, sample_time_s / COMMANDS, delay_s, lag_s)
-        slow = sample(model, sample_time_s, delay_s, lag_s)
+        self._plant = plant.sampled(STATES, sample_time_s / COMMANDS)
+        slow = plant.sampled(STATES, sample_time_s)
         pushed = _response(slow, np.nan_to_num(record[:, 0]))[:, self._measured]
         waves = record[:, 1:] - pushed
         # through a gap the waves are taken as they were
@@ -87,21 +81,19 @@ class RecordedWaves:
         waves = np.nan_to_num(waves[last])
         self._waves = waves - waves.mean(axis=0)
         roll_rad = self._waves[:, self._roll]
-        self._levels = tank_motion(ship, tank, roll_rad, sample_time_s, COMMANDS)
+        self._levels = tank_motion(plant.ship, plant.tank, roll_rad, sample_time_s, COMMANDS)
         self._first = min(round(_SETTLING_S / sample_time_s), len(record) // 2)
 
-    def rehearse(self, law: LinearLaw, limits: PumpLimits) -> Rehearsal:
+    def rehearse(self, law: LinearLaw) -> Rehearsal:
         """Let a law of one input meet the waves.
 
         Parameters
         ----------
         law : LinearLaw
             For the record's outputs at its sample time.
-        limits : PumpLimits
-            Of the controller.
         """
         plant, controller = self._plant, law.controller()
-        limiter = CommandLimiter(limits, self._tank, plant.dt)
+        limiter = CommandLimiter(self._limits, self._tank, plant.dt)
         state = np.zeros(len(plant.A))
         sums = np.zeros(2)
         for k, (waves, levels) in enumerate(

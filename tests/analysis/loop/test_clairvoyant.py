@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
-from utank_hil.control import GPC_ROLL, PumpLimits
+from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.active_set import ActiveSetSolver
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
@@ -42,7 +42,7 @@ def replay(commands):
 
 
 def test_history_obeys_the_dynamics_and_keeps_the_limits():
-    best = clairvoyant_bound(SHIP, TANK, WAVES, LIMITS, lag_s=LAG_S)
+    best = clairvoyant_bound(DesignPlant(SHIP, TANK, lag_s=LAG_S, limits=LIMITS), WAVES)
     history = replay(best.command_pa)
     np.testing.assert_allclose(best.motion, WAVES[1:] + history[:, :4], atol=1e-6)
     np.testing.assert_allclose(best.pressure_pa, history[:, 4], atol=1.0)
@@ -55,7 +55,7 @@ def test_history_obeys_the_dynamics_and_keeps_the_limits():
 
 def test_bound_equals_a_dense_programme_in_the_commands_alone():
     # condensed by superposition, solved by an active-set method
-    best = clairvoyant_bound(SHIP, TANK, WAVES, LIMITS, lag_s=LAG_S)
+    best = clairvoyant_bound(DesignPlant(SHIP, TANK, lag_s=LAG_S, limits=LIMITS), WAVES)
     plant = lagged()
     pulse, state = np.empty((SAMPLES, 5)), plant.B[:, 0]
     for k in range(SAMPLES):
@@ -82,13 +82,15 @@ def test_bound_equals_a_dense_programme_in_the_commands_alone():
 
 
 def test_wider_limits_never_raise_the_bound_and_a_power_limit_never_lowers_it():
-    bound = clairvoyant_bound(SHIP, TANK, WAVES, LIMITS).roll_rms_rad
+    bound = clairvoyant_bound(DesignPlant(SHIP, TANK, limits=LIMITS), WAVES).roll_rms_rad
     for field, value in (("pressure_pa", 80e3), ("rate_pa_s", 2e5), ("level_m", 3.5)):
         wider = dataclasses.replace(LIMITS, **{field: value})
-        assert clairvoyant_bound(SHIP, TANK, WAVES, wider).roll_rms_rad < bound * (1 + 1e-6)
+        assert clairvoyant_bound(
+            DesignPlant(SHIP, TANK, limits=wider), WAVES
+        ).roll_rms_rad < bound * (1 + 1e-6)
     powers = [
         clairvoyant_bound(
-            SHIP, TANK, WAVES, dataclasses.replace(LIMITS, power_w=power)
+            DesignPlant(SHIP, TANK, limits=dataclasses.replace(LIMITS, power_w=power)), WAVES
         ).roll_rms_rad
         for power in (2e5, 5e5, 1e8)
     ]
@@ -100,7 +102,7 @@ def test_the_hull_of_the_power_limit_lets_every_permitted_history_through():
     # power of the history with a power limit stays above what any history within it could need
     power_w = 3e5
     limits = dataclasses.replace(LIMITS, power_w=power_w)
-    best = clairvoyant_bound(SHIP, TANK, WAVES, limits)
+    best = clairvoyant_bound(DesignPlant(SHIP, TANK, limits=limits), WAVES)
     flow = power_w / TANK.reservoir_area_m2
     cut = 4.0 * best.pressure_pa + LIMITS.pressure_pa * best.motion[:, 3]
     assert np.abs(cut).max() <= flow + 4.0 * LIMITS.pressure_pa + 1.0
@@ -114,13 +116,13 @@ def test_the_hull_of_the_power_limit_lets_every_permitted_history_through():
 
 def test_a_controller_on_the_same_record_stays_above_the_bound():
     waves = passive_motion(SHIP, TANK, MOMENT, TICK_S, 20 * SAMPLES + 1)
-    controller = GPC_ROLL.law(SHIP, TANK).controller()
-    run = simulate_loop(SHIP, TANK, waves, controller, ("roll_rad",), LIMITS)
+    controller = GPC_ROLL.law(DesignPlant(SHIP, TANK)).controller()
+    run = simulate_loop(DesignPlant(SHIP, TANK, limits=LIMITS), waves, controller, ("roll_rad",))
     rms = np.sqrt(np.mean(np.square(run.motion[20::20, 0])))
-    assert rms > clairvoyant_bound(SHIP, TANK, WAVES, LIMITS).roll_rms_rad
+    assert rms > clairvoyant_bound(DesignPlant(SHIP, TANK, limits=LIMITS), WAVES).roll_rms_rad
 
 
 def test_waves_that_flood_the_tank_whatever_the_pump_does_are_told():
     weak = PumpLimits(pressure_pa=10.0, rate_pa_s=100.0, level_m=0.1)
     with pytest.raises(ValueError, match="level_m"):
-        clairvoyant_bound(SHIP, TANK, WAVES, weak)
+        clairvoyant_bound(DesignPlant(SHIP, TANK, limits=weak), WAVES)

@@ -8,11 +8,12 @@ import matplotlib.image
 import numpy as np
 import pytest
 from rich.console import Console
+from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.comparison import Loop, compare, comparison_table
 from utank_hil.analysis.loop.sea_response import CalmSeaError
 from utank_hil.analysis.loop.trade import trade
-from utank_hil.control import GPC_ROLL, PD_MEASURED, PredictiveLaw, design_pd
+from utank_hil.control import PD_MEASURED, DesignPlant, PredictiveLaw, design_pd
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.pictures.loops import draw_bode, draw_nyquist
 from utank_hil.pictures.records import draw_phase, draw_time
@@ -22,7 +23,7 @@ from utank_hil.sea import Harmonics
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 WAVES = Harmonics(np.array([1e7, 2e7]), np.array([0.48, 0.62]), np.zeros(2))
-GPC = Loop("GPC", GPC_ROLL.law(SHIP, TANK), ("roll_rad",))
+GPC = Loop("GPC", GPC_ROLL.law(DesignPlant(SHIP, TANK)), ("roll_rad",))
 # pushes the water the wrong way, hard
 WRONG = Loop(
     "wrong",
@@ -33,7 +34,7 @@ SIDES = ((0x00, 0x72, 0xB2), (0xD5, 0x5E, 0x00))
 
 
 def test_reductions_are_those_of_the_root_mean_squares():
-    rows = compare([GPC], SHIP, TANK, WAVES)
+    rows = compare([GPC], DesignPlant(SHIP, TANK), WAVES)
     assert [row.name for row in rows] == ["no tank", "passive", "GPC"]
     rms = [row.motion.roll_rms_rad for row in rows]
     assert rows[0].roll_below_no_tank == 0
@@ -45,14 +46,14 @@ def test_reductions_are_those_of_the_root_mean_squares():
 
 
 def test_an_unstable_law_has_no_figures():
-    row = compare([WRONG], SHIP, TANK, WAVES)[2]
+    row = compare([WRONG], DesignPlant(SHIP, TANK), WAVES)[2]
     assert row.motion is None
     assert row.margins.radius > 1
 
 
 def test_the_table_says_what_the_rows_hold():
     console = Console(width=200, record=True, file=io.StringIO())
-    rows = compare([GPC, WRONG], SHIP, TANK, WAVES)
+    rows = compare([GPC, WRONG], DesignPlant(SHIP, TANK), WAVES)
     console.print(comparison_table(rows, "Two laws"))
     text = console.export_text()
     gpc, wrong = (next(x for x in text.splitlines() if name in x) for name in ("GPC", "wrong"))
@@ -69,7 +70,7 @@ def pixels(path: Path, rgb: tuple[int, int, int]) -> np.ndarray:
 def test_bode_and_nyquist_draw_a_curve_for_each_law(tmp_path: Path):
     loops = [GPC, Loop("PD", design_pd(SHIP, TANK), PD_MEASURED)]
     for draw in (draw_bode, draw_nyquist):
-        path = draw(loops, SHIP, TANK, tmp_path / "two.png", "Two laws")
+        path = draw(loops, DesignPlant(SHIP, TANK), tmp_path / "two.png", "Two laws")
         assert path == tmp_path / "two.png"
         assert all(len(pixels(path, rgb)) > 1000 for rgb in SIDES)
 
@@ -77,7 +78,9 @@ def test_bode_and_nyquist_draw_a_curve_for_each_law(tmp_path: Path):
 def test_bode_of_a_ship_with_hardly_any_water_peaks_at_her_roll_frequency(tmp_path: Path):
     zero = PredictiveLaw(np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), 0.2)
     tank = Tank(17.1, 4.88, 1e-3, 1e-3, damping_ratio=0.9)
-    path = draw_bode([Loop("none", zero, ("roll_rad",))], SHIP, tank, tmp_path / "b.png", "")
+    path = draw_bode(
+        [Loop("none", zero, ("roll_rad",))], DesignPlant(SHIP, tank), tmp_path / "b.png", ""
+    )
     rows, columns = pixels(path, SIDES[0]).T
     curve = columns < 0.6 * columns.max()  # leaves the legend out
     peak = columns[curve][rows[curve] == rows[curve].min()].mean()
@@ -88,7 +91,7 @@ def test_bode_of_a_ship_with_hardly_any_water_peaks_at_her_roll_frequency(tmp_pa
 def test_more_laws_than_colours_are_refused(tmp_path: Path):
     for draw in (draw_bode, draw_nyquist):
         with pytest.raises(ValueError, match=f"got {len(COLORS)}"):
-            draw([GPC] * len(COLORS), SHIP, TANK, tmp_path / "many.png", "Many")
+            draw([GPC] * len(COLORS), DesignPlant(SHIP, TANK), tmp_path / "many.png", "Many")
 
 
 def test_records_are_drawn_over_time_and_in_the_plane(tmp_path: Path):
@@ -116,6 +119,6 @@ def test_no_record_and_too_many_are_refused(tmp_path: Path):
 def test_a_sea_that_does_not_roll_the_ship_is_refused_by_name(amplitude_nm):
     calm = Harmonics(np.array([amplitude_nm]), np.array([0.5]), np.zeros(1))
     with pytest.raises(CalmSeaError, match="does not roll the ship"):
-        compare([GPC], SHIP, TANK, calm)
+        compare([GPC], DesignPlant(SHIP, TANK), calm)
     with pytest.raises(CalmSeaError, match="does not roll the ship"):
-        trade(GPC_ROLL, SHIP, TANK, calm)
+        trade(GPC_ROLL, DesignPlant(SHIP, TANK), calm)

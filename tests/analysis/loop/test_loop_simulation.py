@@ -5,10 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
-from utank_hil.control import PassiveController, PumpLimits
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control import DesignPlant, PassiveController, PumpLimits
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES, coupled_model
+from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import Harmonics
 
@@ -58,7 +57,7 @@ def test_pump_acts_as_in_the_sampled_model_with_delay_and_lag():
     commands = 1e4 * np.random.default_rng(0).normal(size=50)
     script = Script(commands)
     still = np.zeros((50 * 20, 4))
-    run = simulate_loop(SHIP, TANK, still, script, STATES, FREE, noise=SILENT)
+    run = simulate_loop(DesignPlant(SHIP, TANK, limits=FREE), still, script, STATES, noise=SILENT)
     plant = sample(pump_model(SHIP, TANK, STATES), 0.2, 0.05, 0.1)
     state = np.zeros(len(plant.A))
     held = np.concatenate([[0.0], commands])  # v(k + 1) is the command of sample k
@@ -71,18 +70,17 @@ def test_pump_acts_as_in_the_sampled_model_with_delay_and_lag():
 
 def test_with_no_pressure_the_motion_is_the_passive_one():
     waves = passive_motion(SHIP, TANK, WAVES, 0.01, 500)
-    run = simulate_loop(SHIP, TANK, waves, PassiveController(), ("roll_rad",), PumpLimits())
+    run = simulate_loop(
+        DesignPlant(SHIP, TANK, limits=PumpLimits()), waves, PassiveController(), ("roll_rad",)
+    )
     np.testing.assert_array_equal(run.motion, waves)
 
 
 def test_a_delay_between_the_ticks_is_refused():
     with pytest.raises(ValueError, match="delay_s"):
         simulate_loop(
-            SHIP,
-            TANK,
+            DesignPlant(SHIP, TANK, delay_s=0.055),
             np.zeros((10, 4)),
             PassiveController(),
             ("roll_rad",),
-            PumpLimits(),
-            delay_s=0.055,
         )

@@ -6,7 +6,7 @@ import pytest
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.performance_index import FREQUENCY_RATIOS, performance_index
 from utank_hil.analysis.loop.printed_laws import DPC_BOTH, PRINTED, SAMPLE_TIME_S, designed_laws
-from utank_hil.control import PredictiveLaw
+from utank_hil.control import DesignPlant, PredictiveLaw
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 5.8e7)
@@ -22,7 +22,7 @@ def test_index_is_the_integral_of_amplitude_taken_away_per_pressure():
         passive = closed_loop_response(None, system, measured, w)[0][0, 0]
         active, pressure = closed_loop_response(law, system, measured, w, SAMPLE_TIME_S, 0)
         total += 20 * step * abs(abs(passive) - abs(active[0, 0])) / abs(pressure[0])
-    found = performance_index(law, SHIP, TANK, measured, SAMPLE_TIME_S, 0)
+    found = performance_index(law, DesignPlant(SHIP, TANK, SAMPLE_TIME_S, 0.0), measured)
     assert found == pytest.approx(total, rel=0.02)
 
 
@@ -33,11 +33,8 @@ def test_gain_of_a_law_counts_for_nothing_where_it_is_small():
             PredictiveLaw(
                 np.zeros((1, 1, 1)), np.full((1, 1, 1), gain), np.zeros((1, 1, 1)), SAMPLE_TIME_S
             ),
-            SHIP,
-            TANK,
+            DesignPlant(SHIP, TANK, SAMPLE_TIME_S, 0.0),
             ("roll_rad",),
-            SAMPLE_TIME_S,
-            0,
         )
         for gain in (1e-3, 1e-4)
     )

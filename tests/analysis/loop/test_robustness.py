@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.robustness import (
@@ -13,11 +14,10 @@ from utank_hil.analysis.loop.robustness import (
     PERIOD_SCALES,
     robustness,
 )
-from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL
+from utank_hil.control import DesignPlant
 from utank_hil.control.gain import GainLaw
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import sample
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
@@ -25,7 +25,9 @@ TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 
 
 def judge(design):
-    return robustness(design.law(SHIP, TANK), SHIP, TANK, design.predictor.measured)
+    return robustness(
+        design.law(DesignPlant(SHIP, TANK)), DesignPlant(SHIP, TANK), design.predictor.measured
+    )
 
 
 @pytest.mark.parametrize("design", [GPC_ROLL, DPC_ROLL_LEVEL], ids=["gpc", "dpc"])
@@ -66,7 +68,7 @@ def test_a_law_that_only_another_inertia_destabilizes_is_found_out():
     by_stiffness = [radii(law, stiffness_nm_rad=scale**-2) for scale in PERIOD_SCALES]
     by_inertia = [radii(law, inertia_kg_m2=scale) for scale in INERTIA_SCALES]
     assert max(by_stiffness) < 1 < max(by_inertia)
-    found = robustness(law, SHIP, TANK, STATES)
+    found = robustness(law, DesignPlant(SHIP, TANK), STATES)
     assert found.worst_radius >= max(by_inertia)
     assert found.worst_inertia_scale == INERTIA_SCALES[int(np.argmax(by_inertia))]
     assert any("of the ship's inertia" in failure for failure in found.failures())
@@ -75,7 +77,7 @@ def test_a_law_that_only_another_inertia_destabilizes_is_found_out():
 @pytest.mark.parametrize("gains", [(0.0, 3e5, 0.0, 2e4), (1e6, 6e6, 1e4, 2e4)])
 def test_the_worst_of_the_grid_is_the_worst_of_all_ships_gains_and_delays(gains):
     law = GainLaw(np.array([gains]), 0.05)
-    found = robustness(law, SHIP, TANK, STATES)
+    found = robustness(law, DesignPlant(SHIP, TANK), STATES)
     worst = 0.0
     changes = [{"stiffness_nm_rad": scale**-2} for scale in PERIOD_SCALES]
     changes += [{"inertia_kg_m2": scale} for scale in INERTIA_SCALES]

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.sea_response import motion_in_sea, roll_response_without_tank
-from utank_hil.control import GPC_ROLL, PredictiveLaw
+from utank_hil.control import DesignPlant, PredictiveLaw
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.sea import Harmonics
 
@@ -49,7 +50,7 @@ def simulated_rms(law):
 
 
 def test_closed_form_is_the_simulated_loop():
-    law = GPC_ROLL.law(SHIP, TANK, DELAY_S, LAG_S)
+    law = GPC_ROLL.law(DesignPlant(SHIP, TANK, DELAY_S, LAG_S))
     motion = motion_in_sea(law, coupled_model(SHIP, TANK), ("roll_rad",), WAVES, DELAY_S, LAG_S)
     roll, level, pressure = simulated_rms(law)
     assert motion.roll_rms_rad == pytest.approx(roll, rel=1e-3)
@@ -75,7 +76,7 @@ def test_a_law_of_zero_gain_leaves_the_passive_tank():
 
 
 def test_waves_faster_than_the_samples_meet_the_passive_tank():
-    law, system = GPC_ROLL.law(SHIP, TANK), coupled_model(SHIP, TANK)
+    law, system = GPC_ROLL.law(DesignPlant(SHIP, TANK)), coupled_model(SHIP, TANK)
     fast = Harmonics(*(np.array([x]) for x in (4e6, 1.01 * np.pi / TS, 0.0)))
     assert motion_in_sea(law, system, ("roll_rad",), fast) == motion_in_sea(None, system, (), fast)
 

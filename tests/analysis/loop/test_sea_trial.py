@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
 from utank_hil.analysis.loop.sea_trial import (
@@ -17,16 +18,16 @@ from utank_hil.analysis.loop.sea_trial import (
     run_trials,
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
-from utank_hil.control import GPC_ROLL, PredictiveLaw, PumpLimits
+from utank_hil.control import DesignPlant, PredictiveLaw, PumpLimits
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 LIMITS = PumpLimits(pressure_pa=30e3)
-GPC = Entrant("gpc", GPC_ROLL.law(SHIP, TANK), ("roll_rad",), LIMITS)
+GPC = Entrant("gpc", GPC_ROLL.law(DesignPlant(SHIP, TANK)), ("roll_rad",), LIMITS)
 SEA = jonswap(4.0, 10.0)
-TRIAL = Trial(SEA, 3, TrialShip(SHIP, TANK), (GPC,), 60.0, LIMITS)
+TRIAL = Trial(SEA, 3, TrialShip(DesignPlant(SHIP, TANK)), (GPC,), 60.0, LIMITS)
 
 
 def still(gain: float = 0.0) -> PredictiveLaw:
@@ -39,7 +40,9 @@ def test_figures_are_those_of_the_runs_by_hand():
     moment = Sea.irregular(SEA, 3).roll_moment(SHIP.stiffness_nm_rad, EffectiveSlope(0.5))
     bare = roll_without_tank(SHIP, moment, TICK_S, 6001)
     waves = passive_motion(SHIP, TANK, moment, TICK_S, 6001)
-    run = simulate_loop(SHIP, TANK, waves, GPC.law.controller(), ("roll_rad",), LIMITS, seed=3)
+    run = simulate_loop(
+        DesignPlant(SHIP, TANK, limits=LIMITS), waves, GPC.law.controller(), ("roll_rad",), seed=3
+    )
     assert figures[NO_TANK].roll_rms_rad == pytest.approx(np.sqrt(np.mean(bare**2)))
     assert figures[PASSIVE].roll_rms_rad == pytest.approx(np.sqrt(np.mean(waves[:, 0] ** 2)))
     assert figures[PASSIVE].pressure_rms_pa == 0
@@ -80,7 +83,7 @@ def test_pump_gain_scales_what_the_pump_does_to_the_ship():
             Trial(
                 SEA,
                 3,
-                TrialShip(SHIP, TANK, pump_gain=gain),
+                TrialShip(DesignPlant(SHIP, TANK), pump_gain=gain),
                 (Entrant("law", still(4e5 / gain), ("roll_rad",), wide),),
                 60.0,
             )

@@ -6,12 +6,12 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.trade import scaled, trade, varied
-from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL
+from utank_hil.control import DesignPlant
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.sea_plant import SeaModel
-from utank_hil.control.lqg_design import LQG_ROLL_RATE_LEVEL
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.pictures.trade import draw_trade
 from utank_hil.sea import EffectiveSlope, Sea, ittc
@@ -24,7 +24,7 @@ FACTORS = (10.0, 0.1, 1.0)
 
 @pytest.fixture(scope="module")
 def gpc():
-    return trade(GPC_ROLL, SHIP, TANK, MOMENT, factors=FACTORS)
+    return trade(GPC_ROLL, DesignPlant(SHIP, TANK), MOMENT, factors=FACTORS)
 
 
 def test_more_weight_buys_less_roll_with_margin_and_pressure(gpc):
@@ -58,7 +58,7 @@ def test_a_longer_horizon_comes_first_because_it_asks_for_less():
         output_weight=None,
         predictor=dataclasses.replace(DPC_ROLL_LEVEL.predictor, order=8),
     )
-    result = trade(exact, SHIP, TANK, MOMENT, factors=(0.9, 1.5))
+    result = trade(exact, DesignPlant(SHIP, TANK), MOMENT, factors=(0.9, 1.5))
     assert [point.factor for point in result.points] == [1.5, 0.9]
 
 
@@ -76,14 +76,14 @@ def test_a_constrained_law_is_traded_by_its_pressure_weight_where_no_limit_is_ac
     design = ConstrainedDesign("constrained_gpc", sea)
     assert varied(design) == "output weight"
     assert scaled(design, 4.0).pressure_weight_rad2 == design.pressure_weight_rad2 / 4
-    gentle, hard = trade(design, SHIP, TANK, MOMENT, factors=(0.01, 1.0)).points
+    gentle, hard = trade(design, DesignPlant(SHIP, TANK), MOMENT, factors=(0.01, 1.0)).points
     assert gentle.motion.pressure_rms_pa < hard.motion.pressure_rms_pa
     assert gentle.roll_below_passive < hard.roll_below_passive
 
 
 def test_progress_ends_at_one():
     told = []
-    trade(GPC_ROLL, SHIP, TANK, MOMENT, factors=(1.0, 2.0), progress=told.append)
+    trade(GPC_ROLL, DesignPlant(SHIP, TANK), MOMENT, factors=(1.0, 2.0), progress=told.append)
     assert told == [0.5, 1.0]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
-from utank_hil.control import PumpLimits
+from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics import RollShip, Tank
@@ -35,8 +35,10 @@ def storm(seconds: float, scale: float = 1.0):
 
 
 def run(design, waves, limits=LIMITS, behind=UNGUARDED):
-    controller = design.law(SHIP, TANK, limits=limits).controller()
-    result = simulate_loop(SHIP, TANK, waves, controller, design.measured, behind, seed=1)
+    controller = design.law(DesignPlant(SHIP, TANK, limits=limits)).controller()
+    result = simulate_loop(
+        DesignPlant(SHIP, TANK, limits=behind), waves, controller, design.measured, seed=1
+    )
     return result, controller
 
 
@@ -107,4 +109,4 @@ def test_bad_values_are_refused_by_name(bad):
 
 def test_a_margin_that_leaves_no_level_is_refused():
     with pytest.raises(ValueError, match="level_margin_m"):
-        dataclasses.replace(DESIGN, level_margin_m=4.0).law(SHIP, TANK, limits=LIMITS)
+        dataclasses.replace(DESIGN, level_margin_m=4.0).law(DesignPlant(SHIP, TANK, limits=LIMITS))

@@ -5,10 +5,10 @@ import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
 from utank_hil.control.constrained.sea_plant import sea_plant
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES, coupled_model
+from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
@@ -22,15 +22,12 @@ TS = 0.2
 def plant_of(model: SeaModel, heel_std_rad: float = 0.0):
     return sea_plant(
         model,
-        SHIP,
-        TANK,
+        DesignPlant(SHIP, TANK),
         pressure_noise_pa_rt_s=0.0,
         slope_noise_rad_rt_s=0.0,
         heel_std_rad=heel_std_rad,
         heel_time_s=1e4,
         sample_time_s=TS,
-        delay_s=0.05,
-        lag_s=0.1,
     )
 
 

@@ -6,7 +6,15 @@ import sys
 import numpy as np
 import pytest
 
-from utank_hil.control import ARX, PredictiveDesign, PredictiveLaw, Predictor, WashoutLaw, wave_arx
+from utank_hil.control import (
+    ARX,
+    DesignPlant,
+    PredictiveDesign,
+    PredictiveLaw,
+    Predictor,
+    WashoutLaw,
+    wave_arx,
+)
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.dynamics.sampling import noise_covariance, sampled_model
 
@@ -20,7 +28,7 @@ def test_predictor_knows_what_the_pump_does_exactly():
     plant = sampled_model(
         coupled_model(SHIP, TANK)[["roll_rad", "level_m"], ["pressure_pa"]], 0.2, 0.05, 0.1
     )
-    arx = wave_arx(PREDICTOR, SHIP, TANK, 0.05, 0.1)
+    arx = wave_arx(PREDICTOR, DesignPlant(SHIP, TANK))
     u = 1e4 * np.random.default_rng(0).normal(size=(25, 1))
     x, y = np.zeros(plant.nstates), []
     for sample in u:
@@ -63,20 +71,22 @@ def test_predictor_errs_less_in_its_sea_than_one_that_knows_no_waves():
     u = np.zeros((len(y), 1))
     knowing, unknowing = (
         np.sqrt(np.mean((arx.predict(u, y) - y)[100:, 0] ** 2))
-        for arx in (wave_arx(exact, SHIP, TANK), still)
+        for arx in (wave_arx(exact, DesignPlant(SHIP, TANK)), still)
     )
     assert knowing < 0.2 * unknowing
 
 
 def test_washout_and_kind_of_law():
     gpc = PredictiveDesign("gpc", PREDICTOR, 20, 30, output_weight=(1e12, 0.0))
-    assert isinstance(gpc.law(SHIP, TANK), PredictiveLaw)
+    assert isinstance(gpc.law(DesignPlant(SHIP, TANK)), PredictiveLaw)
     washed = PredictiveDesign("gpc", PREDICTOR, 20, 30, (1e12, 0.0), washout_rad_s=0.02)
-    assert isinstance(washed.law(SHIP, TANK), WashoutLaw)
+    assert isinstance(washed.law(DesignPlant(SHIP, TANK)), WashoutLaw)
     # a relaxed deadbeat law weighs only its window
-    dpc = PredictiveDesign("dpc", PREDICTOR, 20, 30, output_weight=(1e12, 0.0)).law(SHIP, TANK)
+    dpc = PredictiveDesign("dpc", PREDICTOR, 20, 30, output_weight=(1e12, 0.0)).law(
+        DesignPlant(SHIP, TANK)
+    )
     same = PredictiveDesign("gpc", PREDICTOR, 20, 30, (1e12, 0.0), first_output=20)
-    np.testing.assert_allclose(dpc.output_gains, same.law(SHIP, TANK).output_gains)
+    np.testing.assert_allclose(dpc.output_gains, same.law(DesignPlant(SHIP, TANK)).output_gains)
 
 
 @pytest.mark.parametrize(
@@ -111,16 +121,15 @@ def test_bad_designs_are_refused():
     with pytest.raises(ValueError, match="first_output belongs to GPC"):
         PredictiveDesign("dpc", PREDICTOR, 20, 30, first_output=5)
     with pytest.raises(ValueError, match="GPC needs an output_weight"):
-        PredictiveDesign("gpc", PREDICTOR, 20, 30).law(SHIP, TANK)
+        PredictiveDesign("gpc", PREDICTOR, 20, 30).law(DesignPlant(SHIP, TANK))
 
 
 def test_designing_brings_no_plotting_and_no_compiler_into_the_process():
     code = (
         "import sys\n"
-        "from utank_hil.control import GPC_ROLL\n"
-        "from utank_hil.dynamics import RollShip, Tank\n"
-        "GPC_ROLL.law(RollShip(1.9e9, 4.8e8, 4.9e7),"
-        " Tank(17.1, 4.88, 17.11, 6.22)).controller()\n"
+        "from utank_hil.configuration import ControllerConfig, load_config\n"
+        "config = load_config('configs/controllers/gpc.yaml', ControllerConfig)\n"
+        "config.law.build(config.plant).controller()\n"
         "print([m for m in ('matplotlib', 'control', 'numba', 'rerun') if m in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

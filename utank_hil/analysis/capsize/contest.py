@@ -104,8 +104,8 @@ def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
         return lambda: PassiveController(sample_time_s=SAMPLE_S)
     if law == "feedback linearization (4.11)":  # nothing beside it, as printed
         return FeedbackLinearization(
-            PATTI_B.ship,
-            PATTI_B.tank,
+            ship=PATTI_B.ship,
+            tank=PATTI_B.tank,
             frequency_rad_s=0.59,
             damping_ratio=1.0,
             soft_level_m=1e3,
@@ -114,8 +114,8 @@ def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
         ).controller
     if law == "feedback linearization, level braked":
         return FeedbackLinearization(
-            PATTI_B.ship,
-            PATTI_B.tank,
+            ship=PATTI_B.ship,
+            tank=PATTI_B.tank,
             frequency_rad_s=0.59,
             damping_ratio=0.5,
             soft_level_m=1.7,

@@ -24,12 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control.limits import PumpLimits
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import transition_and_step
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 
 _ROLL, _LEVEL, _SPEED = (STATES.index(s) for s in ("roll_rad", "level_m", "level_rate_m_s"))
 _STATES = len(STATES) + 1  # and the pressure
@@ -57,28 +54,21 @@ class ClairvoyantRun:
 
 
 def clairvoyant_bound(
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     wave_motion: FloatArray,
-    limits: PumpLimits,
     *,
     sample_time_s: float = 0.2,
-    lag_s: float = 0.1,
     fastest_water_m_s: float = 4.0,
 ) -> ClairvoyantRun:
-    """Least roll of the linear ship within `limits`, the waves known in advance.
+    """Least roll of the linear ship within the plant's limits, the waves known in advance.
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
+        Its delay makes no difference where the whole record is known.
     wave_motion : ndarray, shape (N + 1, 4)
         `STATES` with the tank passive (`passive_motion`), at 0, Ts, ... N Ts.
-    limits : PumpLimits
-        Pressure, rate, level and power.
     sample_time_s : float
-    lag_s : float
-        Of the drive. A delay makes no difference to who knows the record.
     fastest_water_m_s : float
         v; counts with a finite power limit only.
 
@@ -90,12 +80,13 @@ def clairvoyant_bound(
     import clarabel
     from scipy import sparse
 
+    limits = plant.limits
     waves = wave_motion[1:]
     count = len(waves)
     unit = limits.pressure_pa  # pressures in this unit, roll in degrees: all numbers near one
     scale = np.ones(_STATES)
     scale[-1] = unit
-    a, b = _plant_with_lag(ship, tank, sample_time_s, lag_s)
+    a, b = _plant_with_lag(plant, sample_time_s)
     a, b = a * scale / scale[:, None], b * unit / scale[:, None]
 
     # unknowns: x(1) ... x(N), then u(0) ... u(N-1)
@@ -116,7 +107,7 @@ def clairvoyant_bound(
         (of_state(unit_rows[_LEVEL]), waves[:, _LEVEL], limits.level_m),
     ]
     if math.isfinite(limits.power_w):
-        v, flow = fastest_water_m_s, limits.power_w / (tank.reservoir_area_m2 * unit)
+        v, flow = fastest_water_m_s, limits.power_w / (plant.tank.reservoir_area_m2 * unit)
         cut = of_state(v * unit_rows[-1] + unit_rows[_SPEED])
         bounded += [
             (cut, waves[:, _SPEED], flow + v),
@@ -155,11 +146,9 @@ def clairvoyant_bound(
     )
 
 
-def _plant_with_lag(
-    ship: RollShip, tank: Tank, sample_time_s: float, lag_s: float
-) -> tuple[FloatArray, FloatArray]:
+def _plant_with_lag(plant: DesignPlant, sample_time_s: float) -> tuple[FloatArray, FloatArray]:
     """State after a sample from that before it, and from the command held over it."""
-    pump = pump_model(ship, tank, STATES)
+    pump = plant.model(STATES)
     n = len(STATES)
-    a = np.block([[pump.A, pump.B], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
-    return transition_and_step(a, np.append(np.zeros(n), 1 / lag_s)[:, None], sample_time_s)
+    a = np.block([[pump.A, pump.B], [np.zeros((1, n)), np.full((1, 1), -1 / plant.lag_s)]])
+    return transition_and_step(a, np.append(np.zeros(n), 1 / plant.lag_s)[:, None], sample_time_s)

@@ -14,11 +14,9 @@ from utank_hil.analysis.loop.sea_response import (
     rms,
     roll_response_without_tank,
 )
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.dynamics.linear import coupled_model
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 if TYPE_CHECKING:
@@ -71,31 +69,25 @@ class ComparisonRow:
 
 def compare(
     loops: Sequence[Loop],
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     wave_moment: Harmonics,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
 ) -> tuple[ComparisonRow, ...]:
     """Rows for the ship without tank, with the passive tank, and with each law.
 
     Parameters
     ----------
     loops : sequence of Loop
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
     wave_moment : Harmonics
         The sea's roll moment in N m.
-    delay_s, lag_s : float
-        As in `sampled_model`.
 
     Raises
     ------
     CalmSeaError
         If the sea does not roll the ship: there is no roll to compare.
     """
-    system = coupled_model(ship, tank)
-    response = roll_response_without_tank(ship, wave_moment.frequency_rad_s)
+    system = coupled_model(plant.ship, plant.tank)
+    response = roll_response_without_tank(plant.ship, wave_moment.frequency_rad_s)
     bare = MotionInSea(rms(response, wave_moment), 0.0, 0.0)
     passive = motion_in_sea(None, system, ("roll_rad",), wave_moment)
     require_roll(passive)
@@ -113,12 +105,14 @@ def compare(
 
     rows = [row(NO_TANK, bare), row(PASSIVE, passive)]
     for loop in loops:
-        judged = margins(loop.law, pump_model(ship, tank, loop.measured), delay_s, lag_s)
+        judged = margins(loop.law, plant.model(loop.measured), plant.delay_s, plant.lag_s)
         if judged.radius >= 1:
             rows.append(ComparisonRow(loop.name, None, None, None, judged))
             continue
-        motion = motion_in_sea(loop.law, system, loop.measured, wave_moment, delay_s, lag_s)
-        index = performance_index(loop.law, ship, tank, loop.measured, delay_s, lag_s)
+        motion = motion_in_sea(
+            loop.law, system, loop.measured, wave_moment, plant.delay_s, plant.lag_s
+        )
+        index = performance_index(loop.law, plant, loop.measured)
         rows.append(row(loop.name, motion, judged, index))
     return tuple(rows)
 

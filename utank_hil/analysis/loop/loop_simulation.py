@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.control.limits import CommandLimiter, PumpLimits
+from utank_hil.control.limits import CommandLimiter
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
@@ -96,15 +97,11 @@ def passive_motion(
 
 
 def simulate_loop(
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     wave_motion: FloatArray,
     controller: Controller,
     measured: tuple[str, ...],
-    limits: PumpLimits,
     *,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
     pump_gain: float = 1.0,
     noise: SensorNoise | None = None,
     seed: int = 0,
@@ -114,18 +111,13 @@ def simulate_loop(
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
+        Its delay must be a whole number of ticks.
     wave_motion : ndarray, shape (n, 4)
         From `passive_motion` with a step of `TICK_S`.
     controller : Controller
     measured : tuple of str
         Outputs that it sees, in its order.
-    limits : PumpLimits
-    delay_s : float
-        From measurement to effect at the drive, a whole number of ticks.
-    lag_s : float
-        Of the drive.
     pump_gain : float
         Pressure that a command of 1 Pa ends in.
     noise : SensorNoise, optional
@@ -139,10 +131,11 @@ def simulate_loop(
     ValueError
         If delay or sample time are no whole number of ticks.
     """
-    delay_ticks = _ticks("delay_s", delay_s)
+    delay_ticks = _ticks("delay_s", plant.delay_s)
     sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
     noise = noise or SensorNoise()
-    a, b = state_matrices(ship, tank)
+    lag_s = plant.lag_s
+    a, b = state_matrices(plant.ship, plant.tank)
     pressure_effect = b[:, :1]
     n = len(STATES)
     lagged = np.block([[a, pressure_effect], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
@@ -157,8 +150,8 @@ def simulate_loop(
     shown[:, :n] += wave_motion
     level_shown, pressure_shown = shown[:, _LEVEL].tolist(), shown[:, n].tolist()
     columns = [STATES.index(name) for name in measured]
-    observer = LevelObserver(tank, 2 * TICK_S)
-    limiter = CommandLimiter(limits, tank, TICK_S)
+    observer = LevelObserver(plant.tank, 2 * TICK_S)
+    limiter = CommandLimiter(plant.limits, plant.tank, TICK_S)
     by_pump = np.empty((count, n + 1))  # motion and pressure that the pump makes
     wishes = np.empty(count)
     commands = [0.0] * delay_ticks

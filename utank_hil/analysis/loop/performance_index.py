@@ -15,22 +15,18 @@ import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 
 FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)
 
 
 def performance_index(
     law: LinearLaw,
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     measured: tuple[str, ...],
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
     frequency_ratio: FloatArray = FREQUENCY_RATIOS,
 ) -> float:
     """Index J in rad/Pa; the more the better.
@@ -38,13 +34,10 @@ def performance_index(
     Parameters
     ----------
     law : LinearLaw
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
+        The thesis has a lag of 0 and, since its u(k) is made of y(k-1), a delay of one sample.
     measured : tuple of str
         Names of the outputs that the law sees, in its order.
-    delay_s, lag_s : float
-        As in `sampled_model`. The thesis has a lag of 0 and, since its u(k) is made of y(k-1), a
-        delay of one sample.
     frequency_ratio : ndarray, shape (N,)
         q, increasing. The source does not say how far it went; 2 by default.
 
@@ -53,10 +46,10 @@ def performance_index(
     ValueError
         If a frequency is outside (0, pi / Ts).
     """
-    w = frequency_ratio * ship_ratios(ship, tank)[1]
-    system = coupled_model(ship, tank)
+    w = frequency_ratio * ship_ratios(plant.ship, plant.tank)[1]
+    system = coupled_model(plant.ship, plant.tank)
     row = system.output_labels.index("roll_rad")
     passive, _ = closed_loop_response(None, system, measured, w)
-    active, pressure = closed_loop_response(law, system, measured, w, delay_s, lag_s)
+    active, pressure = closed_loop_response(law, system, measured, w, plant.delay_s, plant.lag_s)
     gain = np.abs(np.abs(passive[:, row]) - np.abs(active[:, row])) / np.abs(pressure)
     return float(np.sum((gain[1:] + gain[:-1]) / 2 * np.diff(frequency_ratio)))

@@ -17,9 +17,10 @@ import numpy as np
 from utank_hil.analysis.loop.performance_index import performance_index
 from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.control.predictive.law import PredictiveLaw
+from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -172,7 +173,7 @@ def source_index(
     law: PredictiveLaw, ship: RollShip, tank: Tank, measured: tuple[str, ...]
 ) -> float:
     """Performance index in the source's timing: a sample of delay and no lag; rad/Pa."""
-    return performance_index(law, ship, tank, measured, SAMPLE_TIME_S, 0.0)
+    return performance_index(law, DesignPlant(ship, tank, SAMPLE_TIME_S, 0.0), measured)
 
 
 def _relative(mine: FloatArray, printed: tuple[float, ...]) -> list[float]:

@@ -8,11 +8,11 @@ import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.margins import Margins, margins, peak_sensitivity, stability_grid
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
-from utank_hil.control.predictive.design import pump_model
+from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 
 PEAK_SENSITIVITY = 2.0
 EXTRA_DELAY_S = 0.020  # two base ticks
@@ -76,28 +76,23 @@ class Robustness:
 
 def robustness(
     law: LinearLaw,
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     measured: tuple[str, ...],
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
 ) -> Robustness:
     """Judge a law on its ship, late, and on a grid of ships, pump gains and delays.
 
     Parameters
     ----------
     law : LinearLaw
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
     measured : tuple of str
         Outputs the law sees.
-    delay_s, lag_s : float
-        As in `sampled_model`.
     """
-    model = pump_model(ship, tank, measured)
+    delay_s, lag_s = plant.delay_s, plant.lag_s
+    model = plant.model(measured)
     late = sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
-    variants = list(_variants(ship))
-    systems = [pump_model(variant, tank, measured) for _, _, variant in variants]
+    variants = list(_variants(plant.ship))
+    systems = [pump_model(variant, plant.tank, measured) for _, _, variant in variants]
     extra_s = (0.0, EXTRA_DELAY_S)
     radii = np.array(
         [stability_grid(law, systems, GAINS, delay_s + extra, lag_s) for extra in extra_s]

@@ -26,10 +26,10 @@ from utank_hil.analysis.loop.loop_simulation import (
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
@@ -63,25 +63,22 @@ class Entrant:
 
 @dataclass(frozen=True, slots=True)
 class TrialShip:
-    """The ship as she is, and her loop, whatever a law was designed for.
+    """The real plant, which may differ from that which a law was designed for.
 
     Attributes
     ----------
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
+        As it really is; its limits are each entrant's own.
     effective_slope : float
         Ratio of effective to true wave slope.
-    delay_s, lag_s, pump_gain : float
+    pump_gain : float
         As in `simulate_loop`.
     noise : SensorNoise or None
         None for the usual one
     """
 
-    ship: RollShip
-    tank: Tank
+    plant: DesignPlant
     effective_slope: float = 0.5
-    delay_s: float = 0.05
-    lag_s: float = 0.1
     pump_gain: float = 1.0
     noise: SensorNoise | None = None
 
@@ -144,7 +141,7 @@ def run_trial(trial: Trial) -> dict[str, TrialFigures]:
     if len(set(names)) < len(names):
         raise ValueError(f"entrants need names of their own, got {', '.join(names)}")
     vessel = trial.vessel
-    ship, tank = vessel.ship, vessel.tank
+    plant, ship, tank = vessel.plant, vessel.plant.ship, vessel.plant.tank
     waves = Sea.irregular(trial.sea, trial.seed)
     moment = waves.roll_moment(ship.stiffness_nm_rad, EffectiveSlope(vessel.effective_slope))
     count = round(trial.duration_s / TICK_S) + 1
@@ -155,14 +152,10 @@ def run_trial(trial: Trial) -> dict[str, TrialFigures]:
     }
     for entrant in trial.entrants:
         run = simulate_loop(
-            ship,
-            tank,
+            dataclasses.replace(plant, limits=entrant.limits),
             passive,
             entrant.law.controller(),
             entrant.measured,
-            entrant.limits,
-            delay_s=vessel.delay_s,
-            lag_s=vessel.lag_s,
             pump_gain=vessel.pump_gain,
             noise=vessel.noise,
             seed=trial.seed,
@@ -170,7 +163,7 @@ def run_trial(trial: Trial) -> dict[str, TrialFigures]:
         figures[entrant.name] = _run_figures(run, tank, entrant)
     if trial.bound_limits is not None:
         bound = clairvoyant_bound(
-            ship, tank, passive[::_BOUND_TICKS], trial.bound_limits, lag_s=vessel.lag_s
+            dataclasses.replace(plant, limits=trial.bound_limits), passive[::_BOUND_TICKS]
         )
         figures[CLAIRVOYANT] = _motion_figures(bound.motion)
     return figures

@@ -9,13 +9,10 @@ import numpy as np
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.analysis.loop.sea_response import MotionInSea, motion_in_sea, require_roll
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.interface import LinearLaw
-from utank_hil.control.limits import PumpLimits
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.predictive.design import PredictiveDesign
 from utank_hil.dynamics.linear import coupled_model
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 Design = PredictiveDesign | ConstrainedDesign | LQGDesign
@@ -96,13 +93,9 @@ def scaled(design: Design, factor: float) -> Design:
 
 def trade(
     design: Design,
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     wave_moment: Harmonics,
-    delay_s: float = 0.05,
-    lag_s: float = 0.1,
     *,
-    limits: PumpLimits | None = None,
     factors: Sequence[float] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trade:
@@ -111,14 +104,10 @@ def trade(
     Parameters
     ----------
     design : PredictiveDesign, ConstrainedDesign or LQGDesign
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
+        A constrained design is judged and predicted within its limits, where it is linear.
     wave_moment : Harmonics
         The sea's roll moment in N m.
-    delay_s, lag_s : float
-        As in `sampled_model`.
-    limits : PumpLimits, optional
-        For a constrained design; its loop is judged and predicted within them, where it is linear.
     factors : sequence of float, optional
         Positive; `WEIGHT_FACTORS` or `HORIZON_FACTORS` when left out.
     progress : callable, optional
@@ -134,7 +123,7 @@ def trade(
         factors = HORIZON_FACTORS if horizon else WEIGHT_FACTORS
     # a longer horizon asks for less
     factors = sorted(factors, reverse=horizon)
-    system = coupled_model(ship, tank)
+    system = coupled_model(plant.ship, plant.tank)
     measured = (
         design.measured if isinstance(design, ConstrainedDesign) else design.predictor.measured
     )
@@ -142,26 +131,13 @@ def trade(
     require_roll(passive)
     points = []
     for number, factor in enumerate(factors, 1):
-        law = _law(scaled(design, factor), ship, tank, delay_s, lag_s, limits)
-        judged = robustness(law, ship, tank, measured, delay_s, lag_s)
+        law = scaled(design, factor).law(plant)
+        judged = robustness(law, plant, measured)
         motion = less = None
         if judged.nominal.radius < 1:
-            motion = motion_in_sea(law, system, measured, wave_moment, delay_s, lag_s)
+            motion = motion_in_sea(law, system, measured, wave_moment, plant.delay_s, plant.lag_s)
             less = 1 - motion.roll_rms_rad / passive.roll_rms_rad
         points.append(TradePoint(factor, motion, less, judged))
         if progress is not None:
             progress(number / len(factors))
     return Trade(varied(design), passive, tuple(points))
-
-
-def _law(
-    design: Design,
-    ship: RollShip,
-    tank: Tank,
-    delay_s: float,
-    lag_s: float,
-    limits: PumpLimits | None,
-) -> LinearLaw:
-    if isinstance(design, ConstrainedDesign):
-        return design.law(ship, tank, delay_s, lag_s, limits)
-    return design.law(ship, tank, delay_s, lag_s)

@@ -16,14 +16,14 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.constrained.sea_plant import sea_plant
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import kalman_predictor
 from utank_hil.control.predictive.design import measured_problems, per_output
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import (
     NotNegative,
     Positive,
@@ -127,42 +127,32 @@ class ConstrainedDesign:
             )
         refuse("constrained design", problems)
 
-    def law(
-        self,
-        ship: RollShip,
-        tank: Tank,
-        delay_s: float = 0.05,
-        lag_s: float = 0.1,
-        limits: PumpLimits | None = None,
-    ) -> ConstrainedLaw:
-        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+    def law(self, plant: DesignPlant) -> ConstrainedLaw:
+        """The law for a plant, planning within its limits.
 
         Raises
         ------
         ValueError
             If a parameter is out of its range.
         """
-        limits = limits or PumpLimits()
+        limits = plant.limits
         if not self.level_margin_m < limits.level_m:
             reason = (
                 f"{self.level_margin_m} leaves nothing of the level limit {limits.level_m} m: "
                 "lower it, or raise the limit"
             )
             refuse("constrained design", [("level_margin_m", reason)])
-        plant, covariance = sea_plant(
+        whole, covariance = sea_plant(
             self.sea,
-            ship,
-            tank,
+            plant,
             pressure_noise_pa_rt_s=self.pressure_noise_pa_rt_s,
             slope_noise_rad_rt_s=self.slope_noise_rad_rt_s,
             heel_std_rad=self.heel_std_rad,
             heel_time_s=self.heel_time_s,
             sample_time_s=self.sample_time_s,
-            delay_s=delay_s,
-            lag_s=lag_s,
         )
         rows = [STATES.index(name) for name in self.measured]
-        model = plant._replace(C=plant.C[rows], D=plant.D[rows])
+        model = whole._replace(C=whole.C[rows], D=whole.D[rows])
         observer_gain, _ = kalman_predictor(
             model, covariance, np.diag(np.square(self.measurement_std))
         )
@@ -176,7 +166,7 @@ class ConstrainedDesign:
             self.pressure_weight_rad2 / limits.pressure_pa**2,
             terminal=_passive_cost(model, weight),
         )
-        steady_state, steady_command = _steady(plant, self.heel_share)
+        steady_state, steady_command = _steady(whole, self.heel_share)
         return ConstrainedLaw(
             model=model,
             observer_gain=observer_gain,
@@ -189,11 +179,16 @@ class ConstrainedDesign:
             ),
             level_output=self.measured.index("level_m"),
             level_penalty=_PENALTY_ROLL_RAD**2 * self.horizon,
-            reservoir_area_m2=tank.reservoir_area_m2,
+            reservoir_area_m2=plant.tank.reservoir_area_m2,
             steady_state=steady_state,
             steady_command=steady_command,
             iteration_limit=self.iteration_limit,
         )
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant."""
+        law = self.law(plant)
+        return BuiltLaw(law.controller, self.measured, law)
 
 
 def _passive_cost(model: LinearModel, weight: FloatArray) -> FloatArray:

@@ -7,58 +7,47 @@ moment runs straight. A heel (wind, cargo, turning) is a moment that wanders slo
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES, state_matrices
-from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.sampling import LinearModel, noise_covariance
 
 
 def sea_plant(
     sea: SeaModel,
-    ship: RollShip,
-    tank: Tank,
+    plant: DesignPlant,
     *,
     pressure_noise_pa_rt_s: float,
     slope_noise_rad_rt_s: float,
     heel_std_rad: float,
     heel_time_s: float,
     sample_time_s: float,
-    delay_s: float,
-    lag_s: float,
 ) -> tuple[LinearModel, FloatArray]:
     """Sampled model of ship, tank, drive, waves and a slowly varying heeling moment.
 
     Parameters
     ----------
     sea : SeaModel
-    ship : RollShip
-    tank : Tank
+    plant : DesignPlant
     pressure_noise_pa_rt_s : float
         Root of the two-sided density of a white pressure disturbance: what the model ignores.
     slope_noise_rad_rt_s : float
         The same of a white roll moment, per roll stiffness.
     heel_std_rad, heel_time_s : float
         Standard deviation and time constant of the heeling moment, per roll stiffness.
-    sample_time_s, delay_s, lag_s : float
-        As in `sampled_model`.
+    sample_time_s : float
 
     Returns
     -------
-    plant : LinearModel
+    model : LinearModel
         From the pump's command to `STATES`. States: `STATES` (less the direct effect of the
         command), lag and past commands, waves, and last the heel.
     process_covariance : ndarray, shape (n, n)
     """
-    a, b = state_matrices(ship, tank)
-    pressure, slope = b[:, :1], b[:, 1:] * ship.stiffness_nm_rad
+    a, b = state_matrices(plant.ship, plant.tank)
+    pressure, slope = b[:, :1], b[:, 1:] * plant.ship.stiffness_nm_rad
     count = len(STATES)
-    pump = sample(
-        LinearModel(a, pressure, np.eye(count), np.zeros((count, 1)), 0.0),
-        sample_time_s,
-        delay_s,
-        lag_s,
-    )
+    pump = plant.sampled(STATES, sample_time_s)
     before, after = _straight_line_effect(a, slope, sample_time_s)
     waves = sea.shaping_filter(sample_time_s)
     keep = np.exp(-sample_time_s / heel_time_s)
@@ -80,14 +69,14 @@ def sea_plant(
     white = np.hstack([pressure * pressure_noise_pa_rt_s, slope * slope_noise_rad_rt_s])
     covariance[:count, :count] += noise_covariance(a, white, sample_time_s)
     rest = np.zeros((n - inner, 1))
-    plant = LinearModel(
+    model = LinearModel(
         whole,
         np.vstack([pump.B, rest]),
         np.hstack([pump.C, np.zeros((count, n - inner))]),
         pump.D,
         sample_time_s,
     )
-    return plant, covariance
+    return model, covariance
 
 
 def _straight_line_effect(

@@ -24,7 +24,7 @@ Derivation, and where the print differs: docs/controllers.md.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
 from utank_hil.parameters import NotNegative, Positive, Problem, Range
@@ -59,6 +59,7 @@ class SmallGainFuzzy(FuzzyLaw):
     adaptation: Positive
     leakage: Positive
     initial: NotNegative = 0.0
+    kind: Literal["fuzzy_small_gain"] = "fuzzy_small_gain"
 
     def _problems(self) -> list[Problem]:
         return [*FuzzyLaw._problems(self), *_q_problems(self, above=2)]
@@ -113,6 +114,7 @@ class RobustFuzzy(FuzzyLaw):
     adaptation: tuple[Positive, Positive]
     leakage: tuple[Positive, Positive]
     initial: tuple[NotNegative, NotNegative] = (0.0, 0.0)
+    kind: Literal["fuzzy_robust"] = "fuzzy_robust"
 
     def _problems(self) -> list[Problem]:
         return [*FuzzyLaw._problems(self), *_q_problems(self, above=1)]

@@ -19,7 +19,7 @@ so that g is near one.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -56,6 +56,7 @@ class IndirectFuzzy(FuzzyLaw):
     leakage: Positive
     least_gain: Annotated[float, Range(above=0, below=1)] = 0.3
     prior: tuple[Finite, ...] | None = None
+    kind: Literal["fuzzy_indirect"] = "fuzzy_indirect"
 
     def _problems(self) -> list[Problem]:
         problems, needed = FuzzyLaw._problems(self), len(self.ranges) + 1

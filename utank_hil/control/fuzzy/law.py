@@ -13,7 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.fuzzy.basis import FuzzyBasis
+from utank_hil.control.interface import BuiltLaw, Controller
+from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.linear import STATES
 from utank_hil.parameters import (
@@ -31,7 +34,7 @@ _LEVEL_RATE = STATES.index("level_rate_m_s")
 
 
 @dataclass(frozen=True, slots=True)
-class FuzzyLaw:
+class FuzzyLaw(ABC):
     """Parameters of every adaptive fuzzy law.
 
     Parameters
@@ -60,6 +63,16 @@ class FuzzyLaw:
 
     def __post_init__(self) -> None:
         refuse("fuzzy law", self._problems())
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, its gain is a parameter
+        """The law, for any plant; what it starts from has a slope at rest."""
+        measured = STATES[: len(self.ranges)]
+        slope = slope_at_rest(self.controller, len(measured))
+        return BuiltLaw(self.controller, measured, slope, at_rest=True, adapts=True)
+
+    @abstractmethod
+    def controller(self) -> Controller:
+        """A new steppable controller."""
 
     def _problems(self) -> list[Problem]:
         """What is wrong with the parameters; laws add to it what their proofs ask for."""

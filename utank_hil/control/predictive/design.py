@@ -17,7 +17,8 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
-from utank_hil.control.interface import LinearLaw
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw, LinearLaw
 from utank_hil.control.predictive.finite_memory import finite_memory_arx
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.control.predictive.law import PredictiveLaw
@@ -25,7 +26,6 @@ from utank_hil.control.washout import WashableLaw, WashoutLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import (
     NotNegative,
     Positive,
@@ -221,22 +221,23 @@ class PredictiveDesign:
             ]
         return []
 
-    def law(
-        self, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
-    ) -> LinearLaw:
-        """The law for a ship and tank behind `delay_s` and `lag_s` (`sampled_model`).
+    def law(self, plant: DesignPlant) -> LinearLaw:
+        """The law for a plant.
 
         Raises
         ------
         ValueError
             If a parameter is out of its range.
         """
-        return washed(self._predictive_law(ship, tank, delay_s, lag_s), self.washout_rad_s, ship)
+        return washed(self._predictive_law(plant), self.washout_rad_s, plant.ship)
 
-    def _predictive_law(
-        self, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
-    ) -> PredictiveLaw:
-        arx = wave_arx(self.predictor, ship, tank, delay_s, lag_s)
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant."""
+        law = self.law(plant)
+        return BuiltLaw(law.controller, self.predictor.measured, law)
+
+    def _predictive_law(self, plant: DesignPlant) -> PredictiveLaw:
+        arx = wave_arx(self.predictor, plant)
         if self.kind == "dpc":
             return design_dpc(
                 arx, self.control_horizon, self.prediction_horizon, self.output_weight
@@ -252,66 +253,49 @@ class PredictiveDesign:
         )
 
 
-def pump_model(ship: RollShip, tank: Tank, measured: tuple[str, ...]) -> LinearModel:
-    """Continuous model from pump pressure to the `measured` outputs, without python-control."""
-    a, b = state_matrices(ship, tank)
-    c = np.eye(len(STATES))[[STATES.index(name) for name in measured]]
-    return LinearModel(a, b[:, :1], c, np.zeros((len(measured), 1)), 0.0)
-
-
-def wave_plant(
-    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float, lag_s: float
-) -> tuple[LinearModel, FloatArray]:
+def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, FloatArray]:
     """Sampled model of ship, tank, drive and wave moment, and its process noise.
 
     Parameters
     ----------
     predictor : Predictor
-    ship : RollShip
-    tank : Tank
-    delay_s, lag_s : float
-        As in `sampled_model`.
+    plant : DesignPlant
 
     Returns
     -------
-    plant : LinearModel
+    model : LinearModel
         From the pump's command to `STATES`; ship and tank, wave moment, lag and past commands.
     process_covariance : ndarray, shape (n, n)
     """
-    a_ship, b_ship = state_matrices(ship, tank)
+    a_ship, b_ship = state_matrices(plant.ship, plant.tank)
     pressure, wave = b_ship[:, :1], b_ship[:, 1:]
     wp, zeta = predictor.wave_peak_rad_s, predictor.wave_damping_ratio
     n = len(STATES)
     a = np.zeros((n + 2, n + 2))
     a[:n, :n] = a_ship
-    a[:n, n : n + 1] = wave * ship.stiffness_nm_rad * predictor.wave_slope_rad
+    a[:n, n : n + 1] = wave * plant.ship.stiffness_nm_rad * predictor.wave_slope_rad
     a[n:, n:] = [[0.0, 1.0], [-(wp**2), -2 * zeta * wp]]
     b = np.vstack([pressure, np.zeros((2, 1))])
     noise = np.zeros((n + 2, 2))
     noise[n + 1, 0] = np.sqrt(4 * zeta * wp**3)  # makes the RMS of the wave state one
     noise[:, 1] = b[:, 0] * predictor.pressure_noise_pa_rt_s
     model = LinearModel(a, b, np.eye(n, n + 2), np.zeros((n, 1)), 0.0)
-    plant = sample(model, predictor.sample_time_s, delay_s, lag_s)
-    process = np.zeros(plant.A.shape)
+    sampled = sample(model, predictor.sample_time_s, plant.delay_s, plant.lag_s)
+    process = np.zeros(sampled.A.shape)
     process[: n + 2, : n + 2] = noise_covariance(a, noise, predictor.sample_time_s)
-    return plant, process
+    return sampled, process
 
 
-def wave_arx(
-    predictor: Predictor, ship: RollShip, tank: Tank, delay_s: float = 0.05, lag_s: float = 0.1
-) -> ARX:
+def wave_arx(predictor: Predictor, plant: DesignPlant) -> ARX:
     """ARX model of least prediction error for a ship and tank in waves.
 
     Parameters
     ----------
     predictor : Predictor
-    ship : RollShip
-    tank : Tank
-    delay_s, lag_s : float
-        As in `sampled_model`.
+    plant : DesignPlant
     """
-    plant, process = wave_plant(predictor, ship, tank, delay_s, lag_s)
+    model, process = wave_plant(predictor, plant)
     rows = [STATES.index(name) for name in predictor.measured]
     measurement = np.diag(np.square(predictor.measurement_std))
-    seen = plant._replace(C=plant.C[rows], D=plant.D[rows])
+    seen = model._replace(C=model.C[rows], D=model.D[rows])
     return finite_memory_arx(seen, process, measurement, predictor.order)

@@ -1,0 +1,82 @@
+"""The gate before the bus: a law is designed, its margins are judged, it is let in or refused."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.assembly import build_law
+from utank_hil.commands.common import fail, fail_with, notes
+from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.files import located
+from utank_hil.control import BuiltLaw
+from utank_hil.parameters import ParameterError
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedLaw:
+    """A law with what its loop stands.
+
+    Attributes
+    ----------
+    config : ControllerConfig
+    law : BuiltLaw
+        Designed for it.
+    robustness : Robustness or None
+        None where there is no loop, or none that can be judged.
+    """
+
+    config: ControllerConfig
+    law: BuiltLaw
+    robustness: Robustness | None
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What the law misses, in words; empty for one that may be armed."""
+        unjudged = (self.law.unjudged,) if self.law.unjudged else ()
+        return unjudged + (() if self.robustness is None else self.robustness.failures())
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it is let on the bus."""
+        return self.config.accept_low_margins or not self.failures
+
+
+def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
+    """Design the law of a configuration and judge its loop, or end the command with exit code 2.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+    path : Path
+        The file it was read from, to name the place of what is wrong.
+    key : str
+        Where in that file it stands; empty for the file as a whole.
+    """
+    try:
+        law = build_law(config)
+    except ParameterError as error:
+        fail_with(located(error, path, key))
+    if law.linear is None:
+        return JudgedLaw(config, law, None)
+    try:
+        found = robustness(law.linear, config.plant, law.measured)
+    except (ValueError, ArithmeticError) as error:
+        fail(f"{config.name}: law: its margins can't be computed: {error}")
+    figures = (found.nominal.radius, found.nominal.peak_sensitivity, found.worst_radius)
+    if not all(map(math.isfinite, figures)):
+        fail(f"{config.name}: law: its margins can't be computed: they are not finite numbers")
+    return JudgedLaw(config, law, found)
+
+
+def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
+    """The law of a configuration, judged; a refused one ends the command with exit code 2."""
+    judged = judge(config, path, key)
+    for failure in judged.failures:
+        notes.print(f"[yellow]{config.name}, margins:[/yellow]", failure, soft_wrap=True)
+    if not judged.accepted:
+        fail(
+            f"{config.name}: the law misses its margins; redesign it, or set "
+            "accept_low_margins: true"
+        )
+    return judged.law

@@ -1,0 +1,52 @@
+"""The plant that a law is designed for: ship and tank, and the way from sensor to pump."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from utank_hil.control.limits import PumpLimits
+from utank_hil.dynamics.linear import pump_model
+from utank_hil.dynamics.sampling import LinearModel, sample
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import NotNegative, range_problems, refuse
+
+_LIMITS: Final = PumpLimits()
+
+
+@dataclass(frozen=True, slots=True)
+class DesignPlant:
+    """A ship with its tank as the control loop sees them.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    delay_s : float
+        From the sampling of a measurement to the drive's answer to the command made of it.
+    lag_s : float
+        Time constant of the pump's pressure.
+    limits : PumpLimits
+        On the command, for the laws that plan within them.
+
+    Raises
+    ------
+    ValueError
+        If delay or lag is negative or not finite.
+    """
+
+    ship: RollShip
+    tank: Tank
+    delay_s: NotNegative = 0.05
+    lag_s: NotNegative = 0.1
+    limits: PumpLimits = _LIMITS
+
+    def __post_init__(self) -> None:
+        refuse("design plant", range_problems(self))
+
+    def model(self, measured: tuple[str, ...]) -> LinearModel:
+        """Continuous model from pump pressure to the outputs `measured`, names of `STATES`."""
+        return pump_model(self.ship, self.tank, measured)
+
+    def sampled(self, measured: tuple[str, ...], sample_time_s: float) -> LinearModel:
+        """Discrete model from command to `measured`, with lag and delay (`dynamics.sampling`)."""
+        return sample(self.model(measured), sample_time_s, self.delay_s, self.lag_s)

@@ -1,0 +1,138 @@
+"""A law of one's own: Python code outside this package, named in a configuration.
+
+The configuration names a factory, ``package.module:function``. It is called with the configured
+parameters, and with the `DesignPlant` if it has a parameter named ``plant``. It returns a new
+`Controller` at rest: an object with ``sample_time_s``, ``step(y)``, ``applied(u)`` and ``reset()``.
+If that has an attribute ``linear``, a `LinearLaw`, its loop is judged by it; else by its impulse
+response at rest.
+"""
+
+import importlib
+import inspect
+import math
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw, Controller
+from utank_hil.control.predictive.design import measured_problems
+from utank_hil.parameters import ParameterError, refuse
+
+_METHODS = ("step", "applied", "reset")
+
+
+@dataclass(frozen=True, slots=True)
+class PythonDesign:
+    """A law of a configuration that is code of one's own.
+
+    Parameters
+    ----------
+    factory : str
+        ``package.module:function``, importable from where the command is started.
+    measured : tuple of str
+        What the law measures, in order; names of `STATES`.
+    parameters : mapping of str to any
+        Keyword arguments of the factory.
+
+    Raises
+    ------
+    ValueError
+        If `factory` is not of that form, or `measured` names no outputs.
+    """
+
+    factory: str
+    measured: tuple[str, ...]
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    kind: Literal["python"] = "python"
+
+    def __post_init__(self) -> None:
+        problems = measured_problems(self.measured)
+        module, colon, name = self.factory.partition(":")
+        dotted = all(part.isidentifier() for part in module.split("."))
+        if not (colon and dotted and name.isidentifier()):
+            reason = f"must be of the form package.module:function, got {self.factory!r}"
+            problems.append(("factory", reason))
+        refuse("python", problems)
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Call the factory and look whether what it returns is a controller.
+
+        Raises
+        ------
+        ParameterError
+            If the factory can't be imported or called, or its controller can't be stepped.
+        """
+        make = partial(_call, self.factory, dict(self.parameters), plant)
+        controller = make()
+        _try_out(controller, len(self.measured))
+        linear = getattr(controller, "linear", None)
+        unjudged = "" if linear else "brings no linear law to judge its loop by"
+        return BuiltLaw(make, self.measured, linear, unjudged=unjudged)
+
+
+def _call(factory: str, parameters: dict[str, Any], plant: DesignPlant) -> Controller:
+    """A new controller; a function of the module, so that it can go to another process."""
+    function = _imported(factory)
+    try:
+        signature = inspect.signature(function)
+        if "plant" in signature.parameters:
+            parameters = {"plant": plant, **parameters}
+        signature.bind(**parameters)
+    except TypeError as error:
+        raise _refused("parameters", f"do not fit {factory}: {error}") from error
+    try:
+        controller: Controller = function(**parameters)
+    except Exception as error:
+        reason = f"{factory} failed: {type(error).__name__}: {error}"
+        raise _refused("factory", reason) from error
+    return controller
+
+
+def _imported(factory: str) -> Callable[..., Any]:
+    module_name, _, name = factory.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.append(here)  # last: nothing there may stand in for an installed package
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:
+        reason = f"can't import {module_name}: {type(error).__name__}: {error}"
+        if isinstance(error, ModuleNotFoundError):
+            reason += f"; it must be installed, or lie in {here}"
+        raise _refused("factory", reason) from error
+    function: object = getattr(module, name, None)
+    if not callable(function):
+        raise _refused("factory", f"module {module_name} has no function {name}")
+    return function
+
+
+def _try_out(controller: Controller, outputs: int) -> None:
+    """Step a controller once at rest: what it lacks is better found here than on the bus."""
+    lacking = [name for name in _METHODS if not callable(getattr(controller, name, None))]
+    if lacking:
+        reason = f"returned an object without {', '.join(lacking)}"
+        raise _refused("factory", reason)
+    sample_time_s = getattr(controller, "sample_time_s", None)
+    if not (isinstance(sample_time_s, int | float) and 0 < sample_time_s < math.inf):
+        reason = f"returned an object whose sample_time_s is {sample_time_s!r}, not a time"
+        raise _refused("factory", reason)
+    try:
+        answer = controller.step(np.zeros(outputs))
+        controller.applied(np.zeros(1))
+        controller.reset()
+    except Exception as error:
+        reason = f"returned a controller that fails at rest: {type(error).__name__}: {error}"
+        raise _refused("factory", reason) from error
+    if not (isinstance(answer, np.ndarray) and answer.shape == (1,) and np.isfinite(answer).all()):
+        reason = f"returned a controller whose step gives {answer!r}, not a pressure of shape (1,)"
+        raise _refused("factory", reason)
+
+
+def _refused(key: str, reason: str) -> ParameterError:
+    return ParameterError("python", [(key, reason)])
