@@ -6,10 +6,10 @@ continuous. With v the law's input count (see `utank_hil.dynamics.sampling`), th
     y(z) = P(z) v(z) + samples of the wave's effect,    v(z) = C(z) y(z)
     L(z) = C(z) P(z),    S(z) = 1 / (1 - L(z)),    z = exp(j w Ts)
 
-(L carries the law's sign, so negative feedback has L near -1.) Law and plant may both have a direct
-path; then v(k) = C x + D y(k) with y(k) = Cp xp + Dp v(k) is solved for v(k). A wave of frequency w below half the
-sampling frequency gives samples of that frequency alone. The held command then has components at w
-and its aliases; the motions returned are those at w.
+(L carries the law's sign, so negative feedback has L near -1.) If law and plant both have a direct
+path, v(k) = C x + D y(k) and y(k) = Cp xp + Dp v(k) are solved for v(k). A wave of frequency w
+below half the sampling frequency gives samples of that frequency alone. The held command then has
+components at w and its aliases; the motions returned are those at w.
 """
 
 from typing import TYPE_CHECKING, Final

@@ -1,19 +1,20 @@
 """A law that is known only by stepping it: its impulse response, and the linear law that has it.
 
-A controller at rest is stepped with an impulse in one measurement; it is told through `applied` that
-its own answers were commanded, without limits. The answers over the size of the impulse are its
-Markov parameters h(1), h(2), ... in the loop's count (`utank_hil.dynamics.sampling`)::
+A controller at rest is stepped with an impulse in one measurement. Its answers are handed back to
+`applied` as they are, without limits. Over the size of the impulse they are the law's Markov
+parameters h(1), h(2), ... in the loop's count (`utank_hil.dynamics.sampling`)::
 
     v(k) = h(1) y(k-1) + h(2) y(k-2) + ...,    C(z) = sum_j h(j) z^-j
 
 The frequency response is this sum itself. The state-space model, of which eigenvalues are taken, is
 the balanced truncation of the sum (Kung; Juang and Pappa)::
 
-    H = [h1 h2 ...; h2 h3 ...; ...] = U S V^T,   A = S^-1/2 U^T H+ V S^-1/2,   H+ one sample on
+    H = [h1 h2 ...; h2 h3 ...; ...] = U S V^T
+    A = S^-1/2 U^T U+ S^1/2,   B = S^1/2 V^T E_m,   C = E_r^T U S^1/2,   U+ = U one sample on
 
-The error of its response is 2 (s_{n+1} + s_{n+2} + ...) at most. H has as many rows as h has samples
-and few singular values that matter; they are found from its products with random vectors (Halko,
-Martinsson and Tropp 2011), which are convolutions.
+The error of its response is 2 (s_{n+1} + s_{n+2} + ...) at most. H has as many rows as h has
+samples, and few singular values that matter. They are found from its products with random vectors
+(Halko, Martinsson and Tropp 2011), which are convolutions.
 
 References
 ----------
@@ -206,20 +207,24 @@ def _answers(
     for step in itertools.count(1):
         y = np.zeros(len(measured))
         y[index] = size if step == 1 else 0.0
-        where = f"step {step} after an impulse of {size:g} in {measured[index]}"
         try:
             answer = np.array(controller.step(y), dtype=np.float64)
             controller.applied(answer.copy())
         except Exception as error:
-            raise NoImpulseResponse(f"{where}: {type(error).__name__}: {error}") from error
+            reason = f"{type(error).__name__}: {error}"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}") from error
         commands = commands or answer.shape
         if answer.ndim != 1 or answer.shape != commands or not np.isfinite(answer).all():
-            raise NoImpulseResponse(
-                f"{where}: the answer must be finite, shape (commands,), got {answer!r}"
-            )
+            reason = f"the answer must be finite, shape (commands,), got {answer!r}"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}")
         if time.monotonic() > until_s:
-            raise NoImpulseResponse(f"{where}: out of time; give the law's linear form")
+            reason = "out of time; make the step faster, or give the law's linear form"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}")
         yield answer
+
+
+def _where(step: int, size: float, name: str) -> str:
+    return f"step {step} after an impulse of {size:g} in {name}"
 
 
 def _slope(
@@ -266,17 +271,17 @@ def _hankel_svd(impulse: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
         return product
 
     random = np.random.default_rng(0)
-    states, most = _FIRST_STATES, samples * min(commands, outputs)
+    most = min(MOST_STATES, samples * min(commands, outputs))
+    states = min(_FIRST_STATES, most)
     while True:
-        states = min(states, most)
         vectors = random.standard_normal((samples * outputs, states))
         for _ in range(2):
             basis = np.linalg.qr(times(spectrum, vectors))[0]
             vectors = times(transposed, basis)
         right, values, inner = np.linalg.svd(vectors, full_matrices=False)
-        if states * values[-1] <= _TRUNCATED * values[0] or states in (most, MOST_STATES):
+        if states == most or states * values[-1] <= _TRUNCATED * values[0]:
             return basis @ inner.T, values, right
-        states *= 2
+        states = min(2 * states, most)
 
 
 def _peaks(impulse: FloatArray, axes: tuple[int, int]) -> FloatArray:
