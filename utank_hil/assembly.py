@@ -32,6 +32,9 @@ from utank_hil.runtime.supervisor import Supervisor
 TANK_PERIOD_S = 0.02
 """Cycle of SENSOR_TANK."""
 
+_STEPPING_S = 20.0
+"""For all steps of a law whose impulse response is to be found."""
+
 _MEASUREMENTS: dict[str, Callable[[Inbox, LevelObserver], float]] = {
     "roll_rad": lambda inbox, level: inbox.roll_rad,  # noqa: ARG005
     "roll_rate_rad_s": lambda inbox, level: inbox.roll_rate_rad_s,  # noqa: ARG005
@@ -72,6 +75,8 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
             law = config.law.build(config.plant)
+            if law.unjudged:
+                law = _by_impulse_response(law)
             finite = law.linear is None or all(
                 np.isfinite(matrix).all() for matrix in law.linear.matrices()[:4]
             )
@@ -89,6 +94,18 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
         reason = f"has a sample time of {period_s:g} s, which is not a whole number of {TICK_S:g} s"
         raise ParameterError("", [("law", reason)])
     return law
+
+
+def _by_impulse_response(law: BuiltLaw) -> BuiltLaw:
+    """The law with the linear law that it is at rest, or why that can not be found by stepping it."""
+    # here: laws that bring their own linear law do not need it
+    from utank_hil.analysis.loop.impulse_response import NoImpulseResponse, impulse_response_law
+
+    try:
+        linear = impulse_response_law(law.controller, law.measured, budget_s=_STEPPING_S)
+    except NoImpulseResponse as error:
+        return replace(law, unjudged=f"its loop can't be judged: {error}")
+    return replace(law, linear=linear, at_rest=not linear.linear, unjudged="")
 
 
 def build_controller_node(

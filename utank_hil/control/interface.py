@@ -75,8 +75,12 @@ class StartsAnew(Protocol):
 class LinearLaw(Protocol):
     """A linear law from outputs y to command u, in the timing of `utank_hil.control.arx`.
 
-    u(k) is made from y(k-1), y(k-2), ...: the transfer matrix is strictly proper. What design
-    functions of linear controllers return, and what `utank_hil.analysis.loop.margins` looks at.
+    What design functions of linear controllers return, and what `utank_hil.analysis.loop` looks at.
+
+    u(k) is made from y(k-1), y(k-2), ..., y(k-1) being the newest measurement: a law that a
+    controller can step is strictly proper in this count, D = 0. A law x+ = A x + B y, u = C x + D y
+    with the newest measurement as y, as control libraries give it, has to be shifted by this one
+    sample first: `utank_hil.control.state_space.StateSpaceLaw` does it.
     """
 
     @property

@@ -3,8 +3,9 @@
 The configuration names a factory, ``package.module:function``. It is called with the configured
 parameters, and with the `DesignPlant` if it has a parameter named ``plant``. It returns a new
 `Controller` at rest: an object with ``sample_time_s``, ``step(y)``, ``applied(u)`` and ``reset()``.
-If that has an attribute ``linear``, a `LinearLaw`, its loop is judged by it; else by its impulse
-response at rest.
+If that has an attribute ``linear``, its loop is judged by it: a discrete state-space model from the
+newest measurement to the command, such as a `control.StateSpace`, or a `LinearLaw`. Else it is
+judged by its impulse response at rest.
 """
 
 import importlib
@@ -20,8 +21,9 @@ from typing import Any, Literal
 import numpy as np
 
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw, Controller
+from utank_hil.control.interface import BuiltLaw, Controller, LinearLaw
 from utank_hil.control.predictive.design import measured_problems
+from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.parameters import ParameterError, refuse
 
 _METHODS = ("step", "applied", "reset")
@@ -71,7 +73,7 @@ class PythonDesign:
         make = partial(_call, self.factory, dict(self.parameters), plant)
         controller = make()
         _try_out(controller, len(self.measured))
-        linear = getattr(controller, "linear", None)
+        linear = _linear_of(controller, len(self.measured))
         unjudged = "" if linear else "brings no linear law to judge its loop by"
         return BuiltLaw(make, self.measured, linear, unjudged=unjudged)
 
@@ -132,6 +134,26 @@ def _try_out(controller: Controller, outputs: int) -> None:
     if not (isinstance(answer, np.ndarray) and answer.shape == (1,) and np.isfinite(answer).all()):
         reason = f"returned a controller whose step gives {answer!r}, not a pressure of shape (1,)"
         raise _refused("factory", reason)
+
+
+def _linear_of(controller: Controller, outputs: int) -> LinearLaw | None:
+    """The controller's own linear law, if it brings one."""
+    own: Any = getattr(controller, "linear", None)
+    if own is None:
+        return None
+    try:
+        law: LinearLaw = StateSpaceLaw(own) if hasattr(own, "A") else own
+        model, period_s = law.matrices(), law.sample_time_s
+    except (AttributeError, TypeError, ValueError) as error:
+        reason = f"returned a controller whose linear is no linear law: {error}"
+        raise _refused("factory", reason) from error
+    if abs(period_s - controller.sample_time_s) > 1e-9:
+        reason = f"has sample_time_s {controller.sample_time_s:g}, but its linear has {period_s:g}"
+        raise _refused("factory", reason)
+    if model.D.shape != (1, outputs):
+        reason = f"returned a controller whose linear is {model.D.shape}, not (1, {outputs})"
+        raise _refused("factory", reason)
+    return law
 
 
 def _refused(key: str, reason: str) -> ParameterError:

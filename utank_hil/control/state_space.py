@@ -5,9 +5,8 @@
     x+ = A x + B y,    u = C x + D y,    y the newest measurement
 
 The loop counts a command one sample after the measurement that it is made of (see
-`utank_hil.dynamics.sampling`): v(k + 1) = C x(k) + D y(k). So in the loop's count the transfer
-matrix is that of the matrices divided by z, strictly proper whatever D; the last command joins the
-states.
+`utank_hil.dynamics.sampling`): v(k + 1) = C x(k) + D y(k). In that count the transfer matrix is
+that of the matrices divided by z, strictly proper whatever D is. The last command joins the states.
 """
 
 from dataclasses import dataclass
@@ -96,7 +95,7 @@ class StateSpaceController:
     def __init__(self, law: StateSpaceLaw) -> None:
         self.sample_time_s = law.sample_time_s
         self._a, self._b, self._c, self._d, _ = law.model
-        self._state = np.zeros(len(self._a))
+        self._state: FloatArray = np.zeros(len(self._a))
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Return C x + D (y - reference), shape (r,), and advance the state."""

@@ -76,5 +76,5 @@ class WashoutLaw:
             [[law.A, -keep * law.B], [np.zeros((outputs, states)), keep * np.eye(outputs)]]
         )
         b = np.vstack([keep * law.B, share * np.eye(outputs)])
-        c = np.hstack([law.C, np.zeros((len(law.C), outputs))])
-        return LinearModel(a, b, c, law.D, law.dt)
+        c = np.hstack([law.C, -keep * law.D])
+        return LinearModel(a, b, c, keep * law.D, law.dt)

@@ -6,12 +6,13 @@ continuous. With v the law's input count (see `utank_hil.dynamics.sampling`), th
     y(z) = P(z) v(z) + samples of the wave's effect,    v(z) = C(z) y(z)
     L(z) = C(z) P(z),    S(z) = 1 / (1 - L(z)),    z = exp(j w Ts)
 
-(L carries the law's sign, so negative feedback has L near -1.) A wave of frequency w below half the
-sampling frequency gives samples of that frequency alone. The held command then has components at w
-and its aliases; the motions returned are those at w.
+(L carries the law's sign, so negative feedback has L near -1.) If law and plant both have a direct
+path, v(k) = C x + D y(k) and y(k) = Cp xp + Dp v(k) are solved for v(k). A wave of frequency w
+below half the sampling frequency gives samples of that frequency alone. The held command then has
+components at w and its aliases; the motions returned are those at w.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from utank_hil.dynamics.transfer import state_space_response
 
 if TYPE_CHECKING:
     from control import StateSpace
+
+_SINGULAR: Final = 1e-12  # singular values of 1 - D Dp below this, relative, count as zero
 
 
 def closed_loop_eigenvalues(
@@ -36,11 +39,29 @@ def closed_loop_eigenvalues(
         Sampled plant from the law's inputs to its outputs (`sampled_model`).
     gain : float
         Factor on the plant.
+
+    Raises
+    ------
+    ValueError
+        If the loop is ill-posed: 1 - D Dp is singular, so the direct paths of law and plant leave
+        the command undetermined.
     """
     compensator = law.matrices()
     reach, direct = gain * plant.B, gain * plant.D
-    inner = compensator.A + compensator.B @ direct @ compensator.C
-    closed = np.block([[plant.A, reach @ compensator.C], [compensator.B @ plant.C, inner]])
+    difference = np.eye(len(compensator.D)) - compensator.D @ direct
+    least = np.linalg.svd(difference, compute_uv=False).min()
+    if least <= _SINGULAR * max(1.0, float(np.abs(compensator.D @ direct).max())):
+        raise ValueError(
+            "the loop is ill-posed: the direct paths (D) of law and plant multiply to one, so that "
+            "no command fits its own measurement; change the law's D"
+        )
+    # v = from_plant xp + from_law x
+    from_plant = np.linalg.solve(difference, compensator.D @ plant.C)
+    from_law = np.linalg.solve(difference, compensator.C)
+    outer = plant.A + reach @ from_plant
+    seen = plant.C + direct @ from_plant
+    inner = compensator.A + compensator.B @ direct @ from_law
+    closed = np.block([[outer, reach @ from_law], [compensator.B @ seen, inner]])
     return np.linalg.eigvals(closed).astype(np.complex128)
 
 

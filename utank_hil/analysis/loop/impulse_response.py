@@ -1,0 +1,290 @@
+"""A law that is known only by stepping it: its impulse response, and the linear law that has it.
+
+A controller at rest is stepped with an impulse in one measurement. Its answers are handed back to
+`applied` as they are, without limits. Over the size of the impulse they are the law's Markov
+parameters h(1), h(2), ... in the loop's count (`utank_hil.dynamics.sampling`)::
+
+    v(k) = h(1) y(k-1) + h(2) y(k-2) + ...,    C(z) = sum_j h(j) z^-j
+
+The frequency response is this sum itself. The state-space model, of which eigenvalues are taken, is
+the balanced truncation of the sum (Kung; Juang and Pappa)::
+
+    H = [h1 h2 ...; h2 h3 ...; ...] = U S V^T
+    A = S^-1/2 U^T U+ S^1/2,   B = S^1/2 V^T E_m,   C = E_r^T U S^1/2,   U+ = U one sample on
+
+The error of its response is 2 (s_{n+1} + s_{n+2} + ...) at most. H has as many rows as h has
+samples, and few singular values that matter. They are found from its products with random vectors
+(Halko, Martinsson and Tropp 2011), which are convolutions.
+
+References
+----------
+S. Y. Kung, A new identification and model reduction algorithm via singular value decomposition,
+12th Asilomar Conference (1978). N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53 (2011)
+217-288.
+"""
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.fft import next_fast_len
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.control.interface import Controller
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.sampling import LinearModel
+
+IMPULSES: Final[Mapping[str, float]] = dict(zip(STATES, (1e-3, 1e-3, 1e-2, 1e-2), strict=True))
+"""Size of the impulse in each measurement, in its unit."""
+MOST_SAMPLES: Final = 200_000
+BUDGET_S: Final = 60.0
+"""For all steps together."""
+MOST_STATES: Final = 256
+
+_QUIET = 1e-9  # of the peak: below this a response has decayed
+_LEAST_QUIET = 100  # samples that it must be quiet for, and for half of those before
+_BEYOND = 1e100  # per unit of the impulse: grows without bound
+_LINEAR = 1e-6  # of the peak: difference between the responses to impulses of a linear law
+_FIRST_STATES = 16
+_TRUNCATED = 1e-7  # of the sum of the singular values: sum of those left out
+_ACCURACY = 1e-6  # of the greatest response: error of the state-space model's
+_BLOCK = 256  # samples of the response that are summed at once
+
+
+class NoImpulseResponse(ValueError):
+    """The impulse response of a law can't be had; the message says why."""
+
+
+class NotDecaying(NoImpulseResponse):
+    """The response goes on: the law holds an integrator, is unstable, or learns."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImpulseResponseLaw:
+    """The linear law that has a controller's impulse response; a `LinearLaw`.
+
+    Attributes
+    ----------
+    impulse : ndarray, shape (N, r, m)
+        Answer of the j-th step, per unit of an impulse in the first.
+    model : LinearModel
+        Realization of `impulse`, strictly proper.
+    linear : bool
+        Whether impulses of half the size and of the other sign have the same response. If not, the
+        law is nonlinear at rest, and `impulse` is the slope for small measurements.
+    make_controller : callable
+    """
+
+    impulse: FloatArray
+    model: LinearModel
+    linear: bool
+    make_controller: Callable[[], Controller]
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between two steps."""
+        return self.model.dt
+
+    def controller(self) -> Controller:
+        """A new controller, at rest: the law itself."""
+        return self.make_controller()
+
+    def response(self, z: ComplexArray) -> ComplexArray:
+        """Transfer matrix from y to u at points of the unit circle, shape (N,); shape (N, r, m)."""
+        points = np.asarray(z, dtype=np.complex128)
+        samples, *shape = self.impulse.shape
+        blocks = math.ceil(samples / _BLOCK)
+        padded = np.zeros((blocks * _BLOCK, math.prod(shape)))
+        padded[:samples] = self.impulse.reshape(samples, -1)
+        powers = points[:, None] ** -np.arange(1.0, _BLOCK + 1)
+        total = np.zeros((len(points), padded.shape[1]), dtype=np.complex128)
+        for block in padded.reshape(blocks, _BLOCK, -1)[::-1]:  # Horner's scheme
+            total = powers @ block + powers[:, -1:] * total
+        return total.reshape(-1, *shape)
+
+    def matrices(self) -> LinearModel:
+        """The law from y to u as a discrete state-space model."""
+        return self.model
+
+
+def impulse_response_law(
+    make_controller: Callable[[], Controller],
+    measured: tuple[str, ...],
+    sizes: Mapping[str, float] = IMPULSES,
+    most_samples: int = MOST_SAMPLES,
+    budget_s: float = BUDGET_S,
+) -> ImpulseResponseLaw:
+    """Find the linear law that a controller is about rest, by stepping it.
+
+    Parameters
+    ----------
+    make_controller : callable
+        Makes a controller at rest.
+    measured : tuple of str
+        What it measures, in order.
+    sizes : mapping of str to float
+        Size of the impulse in each measurement.
+    most_samples : int
+        Steps after which a response must have decayed.
+    budget_s : float
+        Time that the steps may take in all.
+
+    Raises
+    ------
+    NotDecaying
+        If a response has not decayed to 1e-9 of its peak in `most_samples`.
+    NoImpulseResponse
+        If a step raises, its answer is no array of finite numbers, the steps take too long, or no
+        model of `MOST_STATES` states has the response.
+    """
+    until_s = time.monotonic() + budget_s
+    columns, linear = [], True
+    for index, name in enumerate(measured):
+        answers = (
+            _answers(make_controller(), measured, index, factor * sizes[name], until_s)
+            for factor in (0.5, -0.5, 1.0)
+        )
+        column, proportional = _slope(zip(*answers, strict=True), name, sizes[name], most_samples)
+        columns.append(column)
+        linear = linear and proportional
+    impulse = np.zeros((max(map(len, columns)), columns[0].shape[1], len(measured)))
+    for index, column in enumerate(columns):
+        impulse[: len(column), :, index] = column
+    model = realize(impulse, make_controller().sample_time_s)
+    return ImpulseResponseLaw(impulse, model, linear, make_controller)
+
+
+def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
+    """Strictly proper state-space model of an impulse response that has decayed.
+
+    Parameters
+    ----------
+    impulse : ndarray, shape (N, r, m)
+        C B, C A B, C A^2 B, ...
+    sample_time_s : float
+
+    Raises
+    ------
+    NoImpulseResponse
+        If no model of `MOST_STATES` states has the response to 1e-6 of its greatest.
+    """
+    _, commands, outputs = impulse.shape
+    row_scale = _peaks(impulse, (0, 2))
+    column_scale = _peaks(impulse / row_scale[:, None], (0, 1))
+    scaled = impulse / row_scale[:, None] / column_scale
+    left, values, right = _hankel_svd(scaled)
+    tails = np.append(np.cumsum(values[::-1])[::-1], 0.0)
+    states = int(np.argmax(tails <= _TRUNCATED * tails[0]))
+    left, root = left[:, :states], np.sqrt(values[:states])
+    a = (left[:-commands].T @ left[commands:]) / root[:, None] * root
+    b = root[:, None] * right[:outputs, :states].T
+    c = left[:commands] * root
+    # the sum of the samples' errors bounds that of the frequency response
+    state, error = b, np.zeros((commands, outputs))
+    for sample in scaled:
+        error += np.abs(sample - c @ state)
+        state = a @ state
+    greatest = np.abs(np.fft.fft(scaled, axis=0)).max()
+    if not error.max() <= _ACCURACY * greatest:
+        raise NoImpulseResponse(
+            f"no model of {MOST_STATES} states has the impulse response: it is "
+            f"{error.max() / greatest:.1e} off; give the law's linear form"
+        )
+    return LinearModel(
+        a, b * column_scale, row_scale[:, None] * c, np.zeros((commands, outputs)), sample_time_s
+    )
+
+
+def _answers(
+    controller: Controller, measured: tuple[str, ...], index: int, size: float, until_s: float
+) -> Iterator[FloatArray]:
+    """What a controller answers to an impulse, step by step, until a moment of the clock."""
+    commands = None
+    for step in itertools.count(1):
+        y = np.zeros(len(measured))
+        y[index] = size if step == 1 else 0.0
+        try:
+            answer = np.array(controller.step(y), dtype=np.float64)
+            controller.applied(answer.copy())
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}") from error
+        commands = commands or answer.shape
+        if answer.ndim != 1 or answer.shape != commands or not np.isfinite(answer).all():
+            reason = f"the answer must be finite, shape (commands,), got {answer!r}"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}")
+        if time.monotonic() > until_s:
+            reason = "out of time; make the step faster, or give the law's linear form"
+            raise NoImpulseResponse(f"{_where(step, size, measured[index])}: {reason}")
+        yield answer
+
+
+def _where(step: int, size: float, name: str) -> str:
+    return f"step {step} after an impulse of {size:g} in {name}"
+
+
+def _slope(
+    answers: Iterable[tuple[FloatArray, ...]], name: str, size: float, most_samples: int
+) -> tuple[FloatArray, bool]:
+    """Response per unit of an impulse until it has decayed; whether it is that of a linear law.
+
+    `answers` are those to half the impulse, to half of it with the other sign, and to all of it.
+    """
+    slopes: list[FloatArray] = []
+    peak, deviation, loud = 0.0, 0.0, 0  # loud: the last sample that was not quiet
+    for up, down, full in answers:
+        slopes.append((up - down) / size)
+        height = float(np.abs(slopes[-1]).max())
+        peak = max(peak, height)
+        deviation = max(deviation, np.abs(up + down).max(), np.abs(full - 2 * up).max())
+        if height > _QUIET * peak:
+            loud = len(slopes)
+        if len(slopes) >= 1.5 * loud + _LEAST_QUIET:
+            break
+        if len(slopes) == most_samples or height > _BEYOND:
+            raise NotDecaying(
+                f"the answer to an impulse of {size:g} in {name} does not decay: it peaks at "
+                f"{peak * size:.3g} and is {height * size:.3g} after {len(slopes)} steps; a law "
+                "that integrates, learns or is unstable by itself has no impulse response"
+            )
+    return np.array(slopes), bool(deviation <= _LINEAR * peak * size)
+
+
+def _hankel_svd(impulse: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Leading singular vectors and values of the Hankel matrix; as many as matter."""
+    samples, commands, outputs = impulse.shape
+    length = next_fast_len(2 * samples, real=True)
+    spectrum = np.fft.rfft(impulse, length, axis=0)
+    transposed = spectrum.transpose(0, 2, 1)
+
+    def times(spectrum: ComplexArray, vectors: FloatArray) -> FloatArray:
+        """The Hankel matrix, or its transpose, times columns."""
+        product = np.empty((samples * spectrum.shape[1], vectors.shape[1]))
+        for k, vector in enumerate(vectors.T):
+            seen = np.fft.rfft(vector.reshape(samples, -1), length, axis=0).conj()
+            convolved = np.fft.irfft(np.einsum("frm,fm->fr", spectrum, seen), length, axis=0)
+            product[:, k] = convolved[:samples].ravel()
+        return product
+
+    random = np.random.default_rng(0)
+    most = min(MOST_STATES, samples * min(commands, outputs))
+    states = min(_FIRST_STATES, most)
+    while True:
+        vectors = random.standard_normal((samples * outputs, states))
+        for _ in range(2):
+            basis = np.linalg.qr(times(spectrum, vectors))[0]
+            vectors = times(transposed, basis)
+        right, values, inner = np.linalg.svd(vectors, full_matrices=False)
+        if states == most or states * values[-1] <= _TRUNCATED * values[0]:
+            return basis @ inner.T, values, right
+        states = min(2 * states, most)
+
+
+def _peaks(impulse: FloatArray, axes: tuple[int, int]) -> FloatArray:
+    """Greatest magnitude over `axes`; one where there is nothing."""
+    peaks: FloatArray = np.abs(impulse).max(axis=axes)
+    return np.where(peaks > 0, peaks, 1.0)
