@@ -97,7 +97,7 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
 
 
 def _by_impulse_response(law: BuiltLaw) -> BuiltLaw:
-    """The law with the linear law that it is at rest, or why that can not be found by stepping it."""
+    """The law with the linear law that it is at rest, or with the reason why there is none."""
     # here: laws that bring their own linear law do not need it
     from utank_hil.analysis.loop.impulse_response import NoImpulseResponse, impulse_response_law
 
