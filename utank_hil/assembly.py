@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import load_catalogue
+from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.laws import build_law
 from utank_hil.control import (
@@ -26,8 +26,6 @@ from utank_hil.retuning import (
 )
 from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask, retune
 from utank_hil.runtime.controller_node import (
-    NANOSECONDS,
-    TICK_NS,
     ControllerNode,
     ControllerSettings,
     EventSink,
@@ -36,9 +34,7 @@ from utank_hil.runtime.controller_node import (
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
-
-TANK_PERIOD_S = 0.02
-"""Cycle of SENSOR_TANK."""
+from utank_hil.tick import TICK_S
 
 _MEASUREMENTS: dict[str, Callable[[Inbox, LevelObserver], float]] = {
     "roll_rad": lambda inbox, level: inbox.roll_rad,  # noqa: ARG005
@@ -77,7 +73,8 @@ def build_controller_node(
     statistics, sink, event_sink
         As `ControllerNode` takes them.
     """
-    tank = config.vessel.tank
+    tank, catalogue = config.vessel.tank, load_catalogue()
+    level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
     retuning = None
     built = build_law(config.law, config.vessel, config.delay_s, config.limits)
     controller = built.controller
@@ -93,15 +90,15 @@ def build_controller_node(
     return ControllerNode(
         controller,
         measure_of(built.measured),
-        LevelObserver(tank, TANK_PERIOD_S),
-        CommandLimiter(config.limits, tank, TICK_NS * NANOSECONDS),
+        LevelObserver(tank, level_period_s),
+        CommandLimiter(config.limits, tank, TICK_S),
         Supervisor(config.safety),
         ControllerSettings(
             configuration_version=config.vessel.version,
             command_timeout_s=config.command_timeout_ms * 1e-3,
             bit_rate=config.bit_rate,
         ),
-        load_catalogue(),
+        catalogue,
         retuning=retuning,
         statistics=statistics,
         sink=sink,

@@ -8,8 +8,8 @@ from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime import faults
 from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
 from utank_hil.runtime.supervisor import NEVER_NS, Demand, Observations, SafetyLimits, Supervisor
+from utank_hil.tick import TICK_NS
 
-TICK_NS = 10 * MILLISECOND_NS
 HEALTHY = Observations(
     motion_age_ns=0,
     tank_age_ns=0,

@@ -32,16 +32,14 @@ from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Observations, Supervisor
+from utank_hil.tick import TICK_NS, TICK_S
 
 NANOSECONDS: Final = 1e-9
-TICK_NS: Final = 10_000_000
-COMMAND_NS: Final = 2 * TICK_NS
-STATUS_NS: Final = 10 * TICK_NS
 LOAD_WINDOW_NS: Final = 100 * TICK_NS
 # an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
-HEEL_SHARE: Final = TICK_NS * NANOSECONDS / HEEL_TIME_CONSTANT_S
+HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
 DEGRADED_SHARE: Final = 0.5
 FRESH_NS: Final = 50_000_000
 """An older measurement is a gap in the record that the ship is identified from."""
@@ -132,11 +130,11 @@ class ControllerNode:
         sink: Callable[[FloatArray], None] | None = None,
         event_sink: EventSink | None = None,
     ) -> None:
-        sample_ticks = controller.sample_time_s / (TICK_NS * NANOSECONDS)
+        sample_ticks = controller.sample_time_s / TICK_S
         if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
             raise ValueError(
                 f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
-                f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
+                f"{TICK_S} s; design the controller for a multiple of it"
             )
         self._controller = controller
         self._starts_anew = controller if isinstance(controller, StartsAnew) else None
@@ -162,8 +160,8 @@ class ControllerNode:
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
         self._samples = Schedule(round(sample_ticks) * TICK_NS)
-        self._command_schedule = Schedule(COMMAND_NS)
-        self._status_schedule = Schedule(STATUS_NS)
+        self._command_schedule = Schedule(self._commands.cycle_ns)
+        self._status_schedule = Schedule(self._status.cycle_ns)
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._started = self._answered = False
         self.start_ns = 0
@@ -262,7 +260,8 @@ class ControllerNode:
         )
         # an error heals when a whole command cycle passed without one
         seen.link_lost = (
-            self._link_lost_ns is not None and now_ns - self._link_lost_ns <= 2 * TICK_NS
+            self._link_lost_ns is not None
+            and now_ns - self._link_lost_ns <= self._commands.cycle_ns
         )
         seen.address_conflict = inbox.address_conflict
         seen.versions_match = inbox.versions_match
