@@ -20,7 +20,7 @@ from utank_hil.identification.record_length import record_problems
 from utank_hil.parameters import ParameterError, Problem, refuse
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
-from utank_hil.runtime.supervisor import SafetyLimits
+from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.tick import TICK_S
 
 MOST_PULSES_S: Final = 3600.0
