@@ -9,10 +9,11 @@ What counts as a fault, and what it does, is the table in `utank_hil.runtime.fau
 """
 
 from enum import Enum
-from typing import Final, TypeAlias
+from typing import Final
 
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.runtime.faults import FAULTS, Condition, Judgement, Reaction
+from utank_hil.runtime import judging
+from utank_hil.runtime.faults import Condition, Reaction
 from utank_hil.runtime.observations import Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 
@@ -20,24 +21,6 @@ MILLISECOND_NS: Final = 1_000_000
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
-
-# flat, because the tuples below are walked every tick
-_Judged: TypeAlias = tuple[Judgement, Fault, Condition]
-_JUDGED: Final = tuple((c.holds, row.code, c) for row in FAULTS for c in row.conditions)
-
-
-def _with(reaction: Reaction) -> tuple[_Judged, ...]:
-    return tuple(judged for judged in _JUDGED if judged[2].reaction is reaction)
-
-
-_STOPPING: Final = _with(Reaction.STOP)
-_ENDING: Final = _STOPPING + _with(Reaction.RAMP)
-_REFUSING: Final = _ENDING + _with(Reaction.REFUSE)
-_GIVING_UP: Final = _with(Reaction.GIVE_UP)
-_HALVING: Final = _with(Reaction.HALVE)
-_AWAITED: Final = tuple(
-    sorted((j for j in _JUDGED if j[2].awaited is not None), key=lambda j: j[2].awaited or 0)
-)
 
 
 class Demand(Enum):
@@ -91,8 +74,8 @@ class Supervisor:
 
     def _while_active(self, seen: Observations, now_ns: int) -> None:
         self._note_drive(seen, now_ns)
-        self.degraded = self._first(_HALVING, seen) is not None
-        found = self._first(_ENDING, seen)
+        self.degraded = judging.first_halving(seen, self._limits) is not None
+        found = judging.first_ending(seen, self._limits)
         if found is not None:
             self._latch(*found, now_ns)
         elif seen.stop:
@@ -104,14 +87,22 @@ class Supervisor:
     def _while_faulted(self, seen: Observations, now_ns: int) -> None:
         if self.demand is Demand.RAMP:
             self._note_drive(seen, now_ns)
-            if now_ns >= self._zero_at_ns or seen.stop or self._first(_STOPPING, seen):
+            if (
+                now_ns >= self._zero_at_ns
+                or seen.stop
+                or judging.first_stopping(seen, self._limits)
+            ):
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
-        if seen.reset_edge and self.demand is Demand.ZERO and not self._first(_AWAITED, seen):
+        if (
+            seen.reset_edge
+            and self.demand is Demand.ZERO
+            and not judging.first_awaited(seen, self._limits)
+        ):
             self._disarm(Mode.STANDBY)
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
-        missing = self._first(_AWAITED, seen)
+        missing = judging.first_awaited(seen, self._limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
             return
@@ -134,7 +125,7 @@ class Supervisor:
         # being out of operation enabled counts from here on
         self._drive_enabled_ns = now_ns
         seen.drive_out_ms = 0.0
-        refusal = self._first(_REFUSING, seen)
+        refusal = judging.first_refusing(seen, self._limits)
         if refusal is not None:
             self.fault = refusal[0]
         else:
@@ -152,7 +143,7 @@ class Supervisor:
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
         else:
-            found = self._first(_GIVING_UP, seen)
+            found = judging.first_giving_up(seen, self._limits)
             if found is not None:
                 self._disarm(Mode.STANDBY, found[0])
 
@@ -177,13 +168,3 @@ class Supervisor:
         if seen.drive_enabled:
             self._drive_enabled_ns = now_ns
         seen.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS
-
-    def _first(
-        self, judged: tuple[_Judged, ...], seen: Observations
-    ) -> tuple[Fault, Condition] | None:
-        """Find the first condition that holds."""
-        limits = self._limits
-        for holds, code, condition in judged:
-            if holds(seen, limits):
-                return code, condition
-        return None
