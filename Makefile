@@ -49,7 +49,7 @@ check: setup
 	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
 	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents peers studies thesis)
 	$(VENV)/bin/lint-imports --no-logo
-	$(PYTHON) -m tools.documents.catalogue --check
+	$(PYTHON) -m tools.documents.write --check
 
 test: check
 	$(PARALLEL) -m "not socketcan"
@@ -88,7 +88,7 @@ $(PEERS_READY): tools/peers/requirements.lock | $(READY)
 	@touch $@
 
 docs: setup
-	$(PYTHON) -m tools.documents.catalogue
+	$(PYTHON) -m tools.documents.write
 
 lock: setup
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock

@@ -24,6 +24,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.tick import TICK_NS
 
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
@@ -91,7 +92,7 @@ class PumpDrive:
     """
 
     name = "drive"
-    period_ns = 10_000_000
+    period_ns = TICK_NS
 
     def __init__(
         self,
@@ -108,6 +109,8 @@ class PumpDrive:
         self.hears = frozenset([self._commands.can_id])
         self._status_1 = catalogue.transmitter(DriveStatus1)
         self._status_2 = catalogue.transmitter(DriveStatus2)
+        self._status_1_ticks = self._status_1.cycle_ns // TICK_NS
+        self._status_2_ticks = self._status_2.cycle_ns // TICK_NS
         self._housekeeping = Housekeeping(Address.DRIVE, catalogue, configuration_version)
         self._accepted_ns = 0
         self._timeout_ns = 0
@@ -176,10 +179,10 @@ class PumpDrive:
             self._moving_ns = now_ns
             plant.drive_pump(self._setpoint_pa, enabled=enabled)
         frames = []
-        if self._ticks % 2 == 0 or states.state is not self._shown_state:
+        if self._ticks % self._status_1_ticks == 0 or states.state is not self._shown_state:
             frames.append(self._status_1_frame())
             self._shown_state = states.state
-        if self._ticks % 10 == 0:
+        if self._ticks % self._status_2_ticks == 0:
             frames.append(self._status_2_frame())
         frames.extend(self._housekeeping.frames(now_ns, faulted=states.fault is not _NO_FAULT))
         self._ticks += 1

@@ -11,8 +11,7 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
-
-TICK_NS = 10_000_000
+from utank_hil.tick import TICK_NS, TICK_S
 
 
 def _model(ship: RollShip, tank: Tank) -> FloatArray:
@@ -51,11 +50,9 @@ class Plant:
         self._coefficients = tuple(pump.coefficients)
         self._weights = kernel.interpolation_weights()
         frequency, phase = wave_moment.frequency_rad_s, wave_moment.phase_rad
-        self._rotations = np.exp(1j * frequency * kernel.TICK_S)
+        self._rotations = np.exp(1j * frequency * TICK_S)
         # three ticks before the last of the four moments, which is two ticks ahead of the start
-        self._phasors = wave_moment.amplitude * np.exp(
-            1j * (phase - 2.0 * frequency * kernel.TICK_S)
-        )
+        self._phasors = wave_moment.amplitude * np.exp(1j * (phase - 2.0 * frequency * TICK_S))
         self._state = np.zeros(kernel.STATES)
         for index in range(4):
             moment = kernel.turned_sum(self._phasors, self._rotations)
@@ -72,7 +69,7 @@ class Plant:
         self._change_ns = after_ns
 
     def advance(self, now_ns: int) -> None:
-        """Integrate up to `now_ns`, in whole ticks of 10 ms after the first call."""
+        """Integrate up to `now_ns`, in whole ticks after the first call."""
         if self._now_ns is None:
             self._now_ns = now_ns
             if self._change_ns is not None:

@@ -1,6 +1,6 @@
 """Compiled integration of ship, tank and pump. Imports numba: import it late.
 
-One call advances the plant by one tick of 10 ms in steps of 1 ms: the pump and its inner pressure
+One call advances the plant by one tick in steps of 1 ms: the pump and its inner pressure
 loop once a step, the coupled linear model by classical Runge-Kutta with the pump's pressure held
 over the step. The wave moment is a sum of rotating phasors, summed once a tick and interpolated in
 between through four ticks' values; for a wave at 3 rad/s that is exact to 2e-8 of its amplitude.
@@ -11,10 +11,10 @@ from numba import njit
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
+from utank_hil.tick import TICK_S
 
-STEPS = 10
 STEP_S = 1e-3
-TICK_S = STEPS * STEP_S
+STEPS = round(TICK_S / STEP_S)
 
 # entries of the state vector
 ROLL, ROLL_RATE, LEVEL, LEVEL_RATE = range(4)
@@ -80,7 +80,8 @@ def advance_tick(
     moments = state[MOMENTS]
     energy_j = 0.0
     first = moments[1]
-    for step in range(STEPS):
+    # not STEPS: numba's cache would keep the number of an earlier tick
+    for step in range(len(weights) // 2):
         flow_m3_s = model[0, 6] * x[3]
         if state[ENABLED] > 0.5:
             pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, pump_coefficients)

@@ -27,6 +27,7 @@ from utank_hil.analysis.motion.statistics import (
 )
 from utank_hil.canbus import Fault, Mode
 from utank_hil.pictures import BenchCurve, draw_bench
+from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import write_recording
 
 NO_TANK: Final = "no tank"
@@ -221,7 +222,8 @@ def endings(result: BenchResult) -> list[str]:
     ]
     for run in figures(result)[1]:
         if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
-            said.append(f"{run.name}: the controller ended in {run.mode}, fault {run.fault}")
+            words = fault_text(Fault[run.fault])
+            said.append(f"{run.name}: the controller ended in {run.mode}, fault {words}")
         elif run.name != PASSIVE and run.active_share == 0:
             said.append(f"{run.name}: the controller was never in charge")
     return said

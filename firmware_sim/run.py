@@ -33,10 +33,11 @@ from utank_hil.runtime import (
     heard_by,
     real_time_scheduling,
 )
-from utank_hil.runtime.controller_node import TICK_NS, ControllerNode
+from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.table import Table
+from utank_hil.tick import TICK_NS, TICK_S
 
 SECOND_NS: Final = 1_000_000_000
 RECORD_TICKS: Final = 5
@@ -293,10 +294,9 @@ def _run_loop(
 ) -> LoopResult:
     port = None if channel is None else SocketCanPort(channel, heard_by(nodes))
     loop = RealTimeLoop(nodes, port, statistics=statistics)
-    tick_s = TICK_NS / SECOND_NS
 
     def stop() -> bool:
-        return watch.stopped((statistics.ticks + statistics.skipped) * tick_s)
+        return watch.stopped((statistics.ticks + statistics.skipped) * TICK_S)
 
     try:
         with real_time_scheduling() as scheduling:

@@ -20,8 +20,8 @@ from utank_hil.canbus import (
 )
 from utank_hil.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.tick import TICK_NS
 
-MOTION_PERIOD_NS = 10_000_000
 NOISE_BLOCK = 4096
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
@@ -65,8 +65,8 @@ class SensorErrors:
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
-        if not problems and self.motion_delay_ms * 1_000_000 % MOTION_PERIOD_NS:
-            reason = f"must be a multiple of 10, got {self.motion_delay_ms}"
+        if not problems and self.motion_delay_ms * 1_000_000 % TICK_NS:
+            reason = f"must be a multiple of {TICK_NS / 1e6:g}, got {self.motion_delay_ms}"
             problems.append(("motion_delay_ms", reason))
         refuse("sensors", problems)
 
@@ -94,7 +94,7 @@ class SensorNode:
     """
 
     name = "sensors"
-    period_ns = MOTION_PERIOD_NS
+    period_ns = TICK_NS
     hears: frozenset[int] = frozenset()
 
     def __init__(
@@ -109,11 +109,13 @@ class SensorNode:
         self._plant = plant
         self._errors = errors
         self._draw = _standard_normal(seed).__next__
-        delay_ticks = round(errors.motion_delay_ms * 1e6 / MOTION_PERIOD_NS)
+        delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
         self._motion_sender = catalogue.transmitter(SensorMotion)
         self._tank_sender = catalogue.transmitter(SensorTank)
         self._pump_sender = catalogue.transmitter(SensorPump)
+        self._tank_ticks = self._tank_sender.cycle_ns // TICK_NS
+        self._pump_ticks = self._pump_sender.cycle_ns // TICK_NS
         self._housekeeping = Housekeeping(Address.SENSORS, catalogue, configuration_version)
         self._ticks = 0
 
@@ -135,8 +137,9 @@ class SensorNode:
                 )
             )
         ]
-        if self._ticks % 2 == 0:
+        if self._ticks % self._tank_ticks == 0:
             frames.append(self._tank_frame(plant.level_m))
+        if self._ticks % self._pump_ticks == 0:
             frames.append(
                 self._pump_sender.frame(
                     SensorPump(

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import load_catalogue
+from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.controller import TICK_S, is_whole
+from utank_hil.configuration.controller import is_whole
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.identification.acceptance import ModelLimits
@@ -18,8 +18,6 @@ from utank_hil.parameters import ParameterError
 from utank_hil.retuning import AdaptiveController, Retuner, Work, make_pulses
 from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask, retune
 from utank_hil.runtime.controller_node import (
-    NANOSECONDS,
-    TICK_NS,
     ControllerNode,
     ControllerSettings,
     EventSink,
@@ -28,9 +26,7 @@ from utank_hil.runtime.controller_node import (
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
-
-TANK_PERIOD_S = 0.02
-"""Cycle of SENSOR_TANK."""
+from utank_hil.tick import TICK_S
 
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
@@ -131,22 +127,23 @@ def build_controller_node(
         As `ControllerNode` takes them.
     """
     law = law or build_law(config)
-    tank = config.vessel.tank
+    tank, catalogue = config.vessel.tank, load_catalogue()
+    level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
     retuning = None
     if retuner is not None and config.retuning is not None:
         retuning = _adaptive(config, law, retuner)
     return ControllerNode(
         retuning or law.controller(),
         measure_of(law.measured),
-        LevelObserver(tank, TANK_PERIOD_S),
-        CommandLimiter(config.limits, tank, TICK_NS * NANOSECONDS),
+        LevelObserver(tank, level_period_s),
+        CommandLimiter(config.limits, tank, TICK_S),
         Supervisor(config.safety),
         ControllerSettings(
             configuration_version=config.vessel.version,
             command_timeout_s=config.command_timeout_ms * 1e-3,
             bit_rate=config.bit_rate,
         ),
-        load_catalogue(),
+        catalogue,
         retuning=retuning,
         statistics=statistics,
         sink=sink,

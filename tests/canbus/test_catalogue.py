@@ -7,15 +7,18 @@ import pytest
 from message_strategies import CASES, PROTECTED
 
 import utank_hil.canbus
+from utank_hil.analysis.loop.loop_simulation import LEVEL_TICKS
 from utank_hil.canbus import (
     Address,
     AddressClaim,
     Frame,
     Heartbeat,
     PumpCommand,
+    SensorTank,
     load_catalogue,
 )
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
+from utank_hil.tick import TICK_NS
 
 TABLE = {
     "PUMP_CMD": (0x08FF1080, 20),
@@ -66,6 +69,11 @@ def test_identifiers_and_cycles_are_those_of_the_message_table():
     assert found == TABLE
     assert load_catalogue().can_ids == {can_id for can_id, _ in TABLE.values()}
     assert all(dbc.is_extended_frame and dbc.length == 8 for _, _, dbc in CASES)
+
+
+def test_cycles_are_whole_numbers_of_ticks_and_the_simulated_gauges_have_that_of_the_catalogue():
+    assert not any((dbc.cycle_time or 0) * 1_000_000 % TICK_NS for _, _, dbc in CASES)
+    assert load_catalogue().codec(SensorTank).cycle_ns == LEVEL_TICKS * TICK_NS
 
 
 def test_everything_is_commented_has_receivers_and_says_its_unit_in_its_name():

@@ -1,4 +1,4 @@
-"""The page written from the catalogue is fresh, and the benchmark runs."""
+"""The benchmark runs."""
 
 import json
 import subprocess
@@ -9,10 +9,6 @@ def run(*arguments):
     return subprocess.run(
         [sys.executable, "-m", *arguments], check=True, timeout=100, capture_output=True, text=True
     ).stdout
-
-
-def test_the_documented_catalogue_is_the_one_in_the_dbc():
-    run("tools.documents.catalogue", "--check")
 
 
 def test_benchmark_prints_one_json_object_of_positive_ratios():

@@ -16,10 +16,10 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.sea import Harmonics
+from utank_hil.tick import TICK_NS
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 CATALOGUE = load_catalogue()
-TICK_NS = PumpDrive.period_ns
 MS = 1_000_000
 ENABLE = (ControlWord.SHUTDOWN, ControlWord.SWITCH_ON, ControlWord.ENABLE_OPERATION)
 

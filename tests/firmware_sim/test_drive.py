@@ -2,7 +2,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from drive_bench import CATALOGUE, ENABLE, MS, TICK_NS, DriveBench
+from drive_bench import CATALOGUE, ENABLE, MS, DriveBench
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -18,6 +18,7 @@ from utank_hil.canbus import (
     NodeState,
     PumpCommand,
 )
+from utank_hil.tick import TICK_NS
 
 START_NS = 5_123_456_789
 

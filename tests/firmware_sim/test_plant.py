@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from firmware_sim import plant_kernel as kernel
-from firmware_sim.plant import TICK_NS, Plant
+from firmware_sim.plant import Plant
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import AT_REST, pump_coast, pump_step
 from utank_hil.sea import Harmonics
+from utank_hil.tick import TICK_NS, TICK_S
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 CALM = Harmonics(np.zeros(1), np.full(1, 0.5), np.zeros(1))
@@ -185,8 +186,8 @@ def test_wave_moment_is_the_sum_of_harmonics_after_half_an_hour() -> None:
 def test_interpolated_wave_moment_is_as_exact_as_promised(omega: float, bound: float) -> None:
     weights = kernel.interpolation_weights()
     assert weights.shape == (2 * kernel.STEPS + 1, 4)
-    nodes_s = kernel.TICK_S * np.array([-1.0, 0.0, 1.0, 2.0])
-    at_s = np.linspace(0.0, kernel.TICK_S, len(weights))
+    nodes_s = TICK_S * np.array([-1.0, 0.0, 1.0, 2.0])
+    at_s = np.linspace(0.0, TICK_S, len(weights))
     for phase in np.linspace(0, 2 * math.pi, 40):
         values = weights @ np.cos(omega * nodes_s + phase)
         np.testing.assert_allclose(values, np.cos(omega * at_s + phase), rtol=0, atol=bound)

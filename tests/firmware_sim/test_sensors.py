@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drive_bench import CATALOGUE, VESSEL
 
-from firmware_sim.plant import TICK_NS, Plant
+from firmware_sim.plant import Plant
 from firmware_sim.sensors import SensorErrors, SensorNode
 from utank_hil.canbus import (
     Address,
@@ -19,6 +19,7 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.sea import Harmonics
+from utank_hil.tick import TICK_NS
 
 SWELL = Harmonics(np.array([6e7]), np.array([0.6]), np.array([0.4]))
 EXACT = SensorErrors(0.0, 0.0, 0.0, 0.0, 0.0)

@@ -32,10 +32,11 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
-from utank_hil.runtime.controller_node import TICK_NS, ControllerNode, ControllerSettings
+from utank_hil.runtime.controller_node import ControllerNode, ControllerSettings
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import SafetyLimits, Supervisor
+from utank_hil.tick import TICK_NS, TICK_S
 
 CATALOGUE = load_catalogue()
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
@@ -91,8 +92,8 @@ class ControllerBench:
         self.node = ControllerNode(
             self.law,
             measure_of(("roll_rad", "level_m")),
-            LevelObserver(VESSEL.tank, 0.02),
-            CommandLimiter(LIMITS, VESSEL.tank, TICK_NS * 1e-9),
+            LevelObserver(VESSEL.tank, 2 * TICK_S),
+            CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
             ControllerSettings(configuration_version=VERSION),
             CATALOGUE,

@@ -31,7 +31,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-from utank_hil.runtime.controller_node import TICK_NS
+from utank_hil.tick import TICK_NS
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

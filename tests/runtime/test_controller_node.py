@@ -27,9 +27,9 @@ from utank_hil.canbus import (
     SensorMotion,
     SensorPump,
 )
-from utank_hil.runtime.controller_node import TICK_NS
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
+from utank_hil.tick import TICK_NS
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

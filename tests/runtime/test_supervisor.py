@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import pytest
@@ -5,18 +6,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.runtime import faults
-from utank_hil.runtime.faults import MILLISECOND_NS, Reaction, Response
-from utank_hil.runtime.supervisor import NEVER_NS, Demand, Observations, SafetyLimits, Supervisor
+from utank_hil.runtime.faults import FAULTS, Condition, Reaction
+from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.runtime.supervisor import MILLISECOND_NS, Demand, Supervisor
+from utank_hil.tick import TICK_NS
 
-TICK_NS = 10 * MILLISECOND_NS
 HEALTHY = Observations(
-    motion_age_ns=0,
-    tank_age_ns=0,
-    pump_age_ns=0,
-    drive_age_ns=0,
-    echo_age_ns=0,
-    panel_age_ns=0,
+    motion_age_ms=0,
+    tank_age_ms=0,
+    pump_age_ms=0,
+    drive_age_ms=0,
+    echo_age_ms=0,
+    panel_age_ms=0,
 )
 
 
@@ -44,36 +46,57 @@ def armed_bench() -> Bench:
 
 ACTIVE = {"requested_mode": Mode.ACTIVE, "armed": True, "drive_enabled": True}
 # what each fault looks like, all else being well
-SIGNS: list[tuple[Response, dict[str, object]]] = [
-    (faults.MOTION_SILENT, {"motion_age_ns": 40 * MILLISECOND_NS}),
-    (faults.TANK_SILENT, {"tank_age_ns": 1100 * MILLISECOND_NS}),
-    (faults.PUMP_SENSOR_SILENT, {"pump_age_ns": 1100 * MILLISECOND_NS}),
-    (faults.PROTECTION, {"protection_valid": False}),
-    (faults.DRIVE_SILENT, {"drive_age_ns": 70 * MILLISECOND_NS}),
-    (faults.DRIVE_SILENT, {"echo_age_ns": 110 * MILLISECOND_NS}),
-    (faults.DRIVE_FAULT, {"drive_fault": True}),
-    (faults.BUS_LOST, {"link_lost": True}),
-    (faults.ADDRESS_CONFLICT, {"address_conflict": True}),
-    (faults.BUS_OVERLOAD, {"bus_load": 0.9}),
-    (faults.LEVEL_LIMIT, {"high_level": True}),
-    (faults.HEEL_LIMIT, {"roll_rad": -0.4}),
-    (faults.HEEL_LIMIT, {"heel_rad": 0.2}),
-    (faults.OPERATOR_SILENT, {"panel_age_ns": 6000 * MILLISECOND_NS}),
-    (faults.LONG_OVERRUN, {"tick_late_ns": 60 * MILLISECOND_NS}),
-    (faults.REPEATED_OVERRUNS, {"overruns_in_ten": 3}),
-    (faults.VERSION_MISMATCH, {"versions_match": False}),
+SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
+    (Fault.MOTION_SILENT, Reaction.RAMP, {"motion_age_ms": 40}),
+    (Fault.TANK_SILENT, Reaction.RAMP, {"tank_age_ms": 1100}),
+    (Fault.PUMP_SENSOR_SILENT, Reaction.RAMP, {"pump_age_ms": 1100}),
+    (Fault.PROTECTION, Reaction.RAMP, {"protection_valid": False}),
+    (Fault.DRIVE_SILENT, Reaction.STOP, {"drive_age_ms": 70}),
+    (Fault.DRIVE_SILENT, Reaction.STOP, {"echo_age_ms": 110}),
+    (Fault.DRIVE_FAULT, Reaction.STOP, {"drive_fault": True}),
+    (Fault.BUS_LOST, Reaction.STOP, {"link_lost": True}),
+    (Fault.ADDRESS_CONFLICT, Reaction.STOP, {"address_conflict": True}),
+    (Fault.BUS_OVERLOAD, Reaction.STOP, {"bus_load": 0.9}),
+    (Fault.LEVEL_LIMIT, Reaction.STOP, {"high_level": True}),
+    (Fault.INTERNAL, Reaction.STOP, {"law_failed": True}),
+    (Fault.HEEL_LIMIT, Reaction.RAMP, {"roll_rad": -0.4}),
+    (Fault.HEEL_LIMIT, Reaction.RAMP, {"heel_rad": 0.2}),
+    (Fault.OPERATOR_SILENT, Reaction.RAMP, {"panel_age_ms": 6000}),
+    (Fault.OVERRUN, Reaction.STOP, {"tick_late_ms": 60}),
+    (Fault.OVERRUN, Reaction.RAMP, {"overruns_in_ten": 3}),
+    (Fault.VERSION_MISMATCH, Reaction.STOP, {"versions_match": False}),
 ]
 
 
-@pytest.mark.parametrize(("response", "sign"), SIGNS)
+def conditions_in(seen: Observations, *reactions: Reaction) -> list[tuple[Fault, Condition]]:
+    """Conditions of these reactions that hold."""
+    return [
+        (row.code, condition)
+        for row in FAULTS
+        for condition in row.conditions
+        if condition.reaction in reactions and condition.holds(seen, SafetyLimits())
+    ]
+
+
+def test_signs_are_those_of_the_table() -> None:
+    ending = (Reaction.STOP, Reaction.RAMP)
+    assert not conditions_in(HEALTHY, *Reaction)
+    found = []
+    for fault, reaction, sign in SIGNS:
+        ((code, condition),) = conditions_in(replace(HEALTHY, **sign), *ending)  # type: ignore[arg-type]
+        assert (code, condition.reaction) == (fault, reaction)
+        found.append(condition)
+    assert all(c in found for row in FAULTS for c in row.conditions if c.reaction in ending)
+
+
+@pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
 def test_fault_while_armed_ends_at_zero_and_stays_there(
-    response: Response, sign: dict[str, object]
+    fault: Fault, reaction: Reaction, sign: dict[str, object]
 ) -> None:
     bench = armed_bench()
     supervisor = bench.tick(**{**ACTIVE, **sign})
-    assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, response.fault)
-    ramps = response.reaction is Reaction.RAMP
-    assert supervisor.demand is (Demand.RAMP if ramps else Demand.ZERO)
+    assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, fault)
+    assert supervisor.demand is (Demand.RAMP if reaction is Reaction.RAMP else Demand.ZERO)
     for _ in range(101):  # a second on, the sign gone
         bench.tick(**ACTIVE)
     assert supervisor.demand is Demand.ZERO
@@ -81,11 +104,39 @@ def test_fault_while_armed_ends_at_zero_and_stays_there(
     assert not supervisor.drive_wanted
 
 
+def test_faults_that_cut_the_pressure_are_named_before_those_that_ramp() -> None:
+    for ramp in (sign for _, reaction, sign in SIGNS if reaction is Reaction.RAMP):
+        for fault, reaction, sign in SIGNS:
+            if reaction is Reaction.STOP and not ramp.keys() & sign.keys():
+                assert armed_bench().tick(**{**ACTIVE, **ramp, **sign}).fault is fault
+
+
+INIT_SIGNS = [
+    (Fault.BUS_LOST, {"link_lost": True}),
+    (Fault.ADDRESS_CONFLICT, {"address_conflict": True}),
+    (Fault.MOTION_SILENT, {"motion_age_ms": 40}),
+    (Fault.TANK_SILENT, {"tank_age_ms": 110}),
+    (Fault.PUMP_SENSOR_SILENT, {"pump_age_ms": 1100}),
+    (Fault.DRIVE_SILENT, {"drive_age_ms": 70}),
+    (Fault.VERSION_MISMATCH, {"versions_match": False}),
+]
+
+
+def test_start_waits_for_bus_sensors_drive_and_versions_and_names_them_in_this_order() -> None:
+    bench = Bench()
+    missing = {key: value for _, sign in INIT_SIGNS for key, value in sign.items()}
+    for fault, sign in INIT_SIGNS:
+        supervisor = bench.tick(**missing)
+        assert (supervisor.mode, supervisor.fault) == (Mode.INIT, fault)
+        missing = {key: value for key, value in missing.items() if key not in sign}
+    assert bench.tick(**missing).mode is Mode.STANDBY
+
+
 def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_last_sample() -> None:
     bench = armed_bench()
     last_sample_ns = bench.now_ns
     while bench.supervisor.demand is not Demand.ZERO:
-        bench.tick(**ACTIVE, motion_age_ns=bench.now_ns - last_sample_ns)
+        bench.tick(**ACTIVE, motion_age_ms=(bench.now_ns - last_sample_ns) / MILLISECOND_NS)
     assert bench.now_ns - last_sample_ns <= 250 * MILLISECOND_NS
 
 
@@ -144,7 +195,7 @@ def test_operators_stop_is_immediate() -> None:
 
 def test_old_tank_levels_first_halve_the_pressure() -> None:
     bench = armed_bench()
-    bench.tick(**ACTIVE, tank_age_ns=150 * MILLISECOND_NS)
+    bench.tick(**ACTIVE, tank_age_ms=150)
     assert bench.supervisor.degraded
     assert bench.supervisor.mode is Mode.ACTIVE
 
@@ -152,20 +203,20 @@ def test_old_tank_levels_first_halve_the_pressure() -> None:
 def test_a_lost_panel_forbids_arming_at_once() -> None:
     bench = Bench()
     bench.tick()
-    late = {**ACTIVE, "panel_age_ns": 700 * MILLISECOND_NS, "arm_edge": True}
+    late = {**ACTIVE, "panel_age_ms": 700, "arm_edge": True}
     assert not bench.tick(**late).arming
     assert bench.supervisor.fault is Fault.OPERATOR_SILENT
 
 
-ages = st.sampled_from([0, 20, 35, 65, 105, 1005, 5005]).map(lambda ms: ms * MILLISECOND_NS)
+ages = st.sampled_from([0, 20, 35, 65, 105, 1005, 5005])
 observations = st.builds(
     Observations,
-    motion_age_ns=ages,
-    tank_age_ns=ages,
-    pump_age_ns=ages,
-    drive_age_ns=ages,
-    echo_age_ns=ages,
-    panel_age_ns=ages | st.just(NEVER_NS),
+    motion_age_ms=ages,
+    tank_age_ms=ages,
+    pump_age_ms=ages,
+    drive_age_ms=ages,
+    echo_age_ms=ages,
+    panel_age_ms=ages | st.just(math.inf),
     drive_enabled=st.booleans(),
     drive_fault=st.booleans(),
     link_lost=st.booleans(),
@@ -199,7 +250,7 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[Observat
             assert edge_since_disarmed
             assert seen.armed
             assert not seen.stop
-            assert seen.motion_age_ns <= 30 * MILLISECOND_NS
+            assert seen.motion_age_ms <= 30
             assert not any((seen.link_lost, seen.high_level, seen.drive_fault))
         elif not supervisor.arming:
             edge_since_disarmed = False

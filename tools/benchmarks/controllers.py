@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from tools.studies.trial_setup import shipped
-from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
+from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
@@ -45,6 +45,7 @@ from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.runtime.process_priority import real_time_scheduling
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
+from utank_hil.tick import TICK_S
 
 WARM_UP = 200
 TRACED = 200

@@ -1,8 +1,5 @@
-#!/usr/bin/env python3
-"""Write docs/can-catalogue.md from the DBC; with --check, fail if it is stale."""
+"""docs/can-catalogue.md, made from the DBC."""
 
-import argparse
-import sys
 from pathlib import Path
 
 from cantools.database.can import Database, Message, Signal
@@ -127,21 +124,3 @@ def page() -> str:
     rows = "\n".join(overview_row(message) for message in database.messages)
     sections = "\n\n".join(section(message) for message in database.messages)
     return f"{head}{rows}\n\n{sections}\n"
-
-
-def main() -> int:
-    """Write the page, or compare with it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="write nothing; fail if stale")
-    arguments = parser.parse_args()
-    content = page()
-    if not arguments.check:
-        PAGE.write_text(content)
-    elif not PAGE.exists() or PAGE.read_text() != content:
-        print(f"{PAGE} is stale: run tools/documents/catalogue.py", file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

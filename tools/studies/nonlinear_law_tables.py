@@ -28,7 +28,7 @@ from tools.studies.trial_setup import STORM_HOUR, measured_hour, shipped
 from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.analysis.capsize.survival import controlled_run
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
-from utank_hil.analysis.loop.loop_simulation import TICK_S, passive_motion, simulate_loop
+from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.margins import peak_sensitivity
 from utank_hil.arrays import FloatArray
 from utank_hil.control import (
@@ -45,6 +45,7 @@ from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import duct_valve_loss
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea
+from utank_hil.tick import TICK_S
 
 Rows = dict[str, dict[str, float]]
 FIRST = shipped("gpc").vessel

@@ -26,34 +26,27 @@ class Mode(IntEnum):
 
 
 class Fault(IntEnum):
-    """What stopped the controller, or degrades it: one code a row of the fault table."""
+    """What stopped the controller, or degrades it.
+
+    Each code has one row in the fault table, `utank_hil.runtime.faults`. A number that was once
+    sent keeps its meaning.
+    """
 
     NONE = 0
     MOTION_SILENT = 1
     TANK_SILENT = 2
     PUMP_SENSOR_SILENT = 3
     PROTECTION = 4
-    COUNTER_FROZEN = 5
-    UNKNOWN_IDENTIFIERS = 6
     BUS_OVERLOAD = 7
     ADDRESS_CONFLICT = 8
     BUS_LOST = 9
-    STUCK_SIGNAL = 10
-    DRIFT = 11
-    SPIKES = 12
-    NOISE = 13
     LEVEL_LIMIT = 14
-    DRIVE_NOT_FOLLOWING = 15
-    SATURATION = 16
-    SIGN_FLIP = 17
     DRIVE_FAULT = 18
     DRIVE_SILENT = 19
     OVERRUN = 20
     HEEL_LIMIT = 21
-    ROLL_AMPLIFIED = 22
     OPERATOR_SILENT = 23
     VERSION_MISMATCH = 24
-    AUTHENTICATION = 25
     INTERNAL = 26
 
 

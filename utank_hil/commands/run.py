@@ -28,6 +28,7 @@ from utank_hil.runtime import (
     real_time_scheduling,
     stop_on_signals,
 )
+from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
 
 
@@ -125,7 +126,7 @@ def run(
             f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {escape(event_text(event))}",
             soft_wrap=True,
         )
-    console.print(f"ended in {node.mode.name}, fault {node.fault.name}")
+    console.print(f"ended in {node.mode.name}, fault {fault_text(node.fault)}", soft_wrap=True)
     if node.fallbacks:
         console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:

@@ -18,10 +18,8 @@ from utank_hil.identification.record_length import record_problems
 from utank_hil.parameters import Problem, refuse
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
-from utank_hil.runtime.supervisor import SafetyLimits
-
-TICK_S: Final = 0.01
-"""Of the controller's loop; a law's sample time is a whole number of them."""
+from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.tick import TICK_S
 
 MOST_PULSES_S: Final = 3600.0
 """Longest identification: the pulses and the record are kept in memory."""

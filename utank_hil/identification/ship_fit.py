@@ -36,12 +36,13 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.okid import OkidResult
+from utank_hil.tick import TICK_S
 
 _BAND_RAD_S = 2.5  # above it neither ship nor tank move
 _LINES = 64  # in the band; an ARX model of order 120 resolves no more
 _SPREAD = (0.1, 0.7, 0.5, 0.2)  # sigma: how far loading changes each number
 _PRESSURE_SPREAD = 0.005  # of a pressure sensor's slope, and of a loop that holds it
-_DELAY_SPREAD_S = 0.02  # two ticks: sensors and drive are heard in one or the next
+_DELAY_SPREAD_S = 2 * TICK_S  # sensors and drive are heard in one or the next
 _PRESSURE = len(_SPREAD)  # its place among the fitted numbers, the delays after it
 _STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # stiffness to begin with
 _PASSES = 5

@@ -26,24 +26,25 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
 from utank_hil.runtime.drive_sequence import DriveSequence
+from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.observations import Observations
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
-from utank_hil.runtime.supervisor import Demand, Observations, Supervisor
+from utank_hil.runtime.supervisor import Demand, Supervisor
+from utank_hil.tick import TICK_NS, TICK_S
 
 NANOSECONDS: Final = 1e-9
-TICK_NS: Final = 10_000_000
-COMMAND_NS: Final = 2 * TICK_NS
-STATUS_NS: Final = 10 * TICK_NS
+MILLISECOND_NS: Final = 1_000_000
 LOAD_WINDOW_NS: Final = 100 * TICK_NS
 # an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
-HEEL_SHARE: Final = TICK_NS * NANOSECONDS / HEEL_TIME_CONSTANT_S
+HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
 DEGRADED_SHARE: Final = 0.5
-FRESH_NS: Final = 50_000_000
+FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
@@ -54,7 +55,7 @@ _DRIVE_FAULT: Final = DriveState.FAULT
 _NO_DRIVE_FAULT: Final = DriveFault.NONE
 _CONTROL: Final = Demand.CONTROL
 _NO_FAULT: Final = Fault.NONE
-_FAULT_OF_LIMIT: Final = {"roll_rad": Fault.HEEL_LIMIT, "level_m": Fault.LEVEL_LIMIT}
+_FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
 Measure = Callable[[Inbox, LevelObserver], FloatArray]
 EventSink = Callable[[RetuningEvent, int], None]
@@ -132,11 +133,11 @@ class ControllerNode:
         sink: Callable[[FloatArray], None] | None = None,
         event_sink: EventSink | None = None,
     ) -> None:
-        sample_ticks = controller.sample_time_s / (TICK_NS * NANOSECONDS)
+        sample_ticks = controller.sample_time_s / TICK_S
         if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
             raise ValueError(
                 f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
-                f"{TICK_NS * NANOSECONDS} s; design the controller for a multiple of it"
+                f"{TICK_S} s; design the controller for a multiple of it"
             )
         self._controller = controller
         self._starts_anew = controller if isinstance(controller, StartsAnew) else None
@@ -162,8 +163,8 @@ class ControllerNode:
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
         self._samples = Schedule(round(sample_ticks) * TICK_NS)
-        self._command_schedule = Schedule(COMMAND_NS)
-        self._status_schedule = Schedule(STATUS_NS)
+        self._command_schedule = Schedule(self._commands.cycle_ns)
+        self._status_schedule = Schedule(self._status.cycle_ns)
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._started = self._answered = False
         self.start_ns = 0
@@ -248,21 +249,22 @@ class ControllerNode:
         inbox, seen = self._inbox, self._seen
         late_ns = max(0, now_ns - self._last_ns - TICK_NS)
         self._late_history = (self._late_history << 1 | (late_ns > 0)) & 0x3FF
-        seen.tick_late_ns = late_ns
+        seen.tick_late_ms = late_ns / MILLISECOND_NS
         seen.overruns_in_ten = self._late_history.bit_count()
-        seen.motion_age_ns = now_ns - inbox.motion_ns
-        seen.tank_age_ns = now_ns - inbox.tank_ns
-        seen.pump_age_ns = now_ns - inbox.pump_ns
-        seen.drive_age_ns = now_ns - inbox.drive_ns
-        seen.echo_age_ns = now_ns - inbox.echo_ns
-        seen.panel_age_ns = now_ns - inbox.panel_ns
+        seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
+        seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
+        seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
+        seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
+        seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
+        seen.panel_age_ms = (now_ns - inbox.panel_ns) / MILLISECOND_NS
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (
             inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
         )
         # an error heals when a whole command cycle passed without one
         seen.link_lost = (
-            self._link_lost_ns is not None and now_ns - self._link_lost_ns <= 2 * TICK_NS
+            self._link_lost_ns is not None
+            and now_ns - self._link_lost_ns <= self._commands.cycle_ns
         )
         seen.address_conflict = inbox.address_conflict
         seen.versions_match = inbox.versions_match
@@ -311,7 +313,7 @@ class ControllerNode:
                 now_ns,
                 self._inbox.operator,
                 engaged=self._supervisor.demand is Demand.CONTROL,
-                fresh=max(seen.motion_age_ns, seen.tank_age_ns) <= FRESH_NS,
+                fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )
         self._answered = True
         answer = self._controller.step(self._measure(self._inbox, self._level))

@@ -12,7 +12,6 @@ from utank_hil.canbus import (
 )
 from utank_hil.runtime.periodic import Schedule
 
-HEARTBEAT_PERIOD_NS = 100_000_000
 NANOSECONDS = 1e-9
 
 
@@ -35,7 +34,7 @@ class Housekeeping:
         self._catalogue_version = catalogue.version
         self._configuration_version = configuration_version
         self._boot_ns: int | None = None
-        self._beats = Schedule(HEARTBEAT_PERIOD_NS)
+        self._beats = Schedule(self._heartbeat.cycle_ns)
 
     def frames(self, now_ns: int, *, faulted: bool = False) -> list[Frame]:
         """Return what is due at `now_ns`, mostly nothing."""

@@ -14,6 +14,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
 """How long a button that works by its edge stays pressed: longer than two lost messages."""
@@ -58,7 +59,7 @@ class TimedAction:
 
 
 class OperatorPanel:
-    """Sends OPERATOR_CMD every 200 ms and on change.
+    """Sends OPERATOR_CMD in its cycle of the catalogue, and on change.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ class OperatorPanel:
     """
 
     name = "panel"
-    period_ns = 100_000_000
+    period_ns = 10 * TICK_NS
 
     def __init__(
         self,
@@ -85,6 +86,7 @@ class OperatorPanel:
         script: Iterable[TimedAction] = (),
     ) -> None:
         self._sender = catalogue.transmitter(OperatorCommand)
+        self._cycle_ticks = self._sender.cycle_ns // self.period_ns
         self._listener = catalogue.receiver(ControllerStatus)
         self.hears = frozenset([self._listener.can_id])
         self._housekeeping = Housekeeping(Address.OPERATOR, catalogue, configuration_version)
@@ -129,7 +131,7 @@ class OperatorPanel:
             forbid_retuning=self._forbidden,
         )
         frames = []
-        if command != self._sent or self._ticks % 2 == 0:
+        if command != self._sent or self._ticks % self._cycle_ticks == 0:
             frames.append(self._sender.frame(command))
             self._sent = command
         frames.extend(self._housekeeping.frames(now_ns))

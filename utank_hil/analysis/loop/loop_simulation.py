@@ -1,12 +1,13 @@
 """A controller on the linear ship, without bus and nodes: for long runs in many seas.
 
 The ship's motion is that with the tank passive, known exactly, plus what the pump adds. Sensors,
-limiter and drive run at the base tick of 10 ms, the level observer and the level gauges every
-second tick, the controller at its own sample time, in the order of the controller node.
+limiter and drive run every tick, level gauges and level observer every `LEVEL_TICKS`, the
+controller at its own sample time. Their order within a tick is that of the controller node.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -20,8 +21,10 @@ from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
+from utank_hil.tick import TICK_S
 
-TICK_S = 0.01
+LEVEL_TICKS: Final = 2
+"""Cycle of SENSOR_TANK, in ticks."""
 _LEVEL, _SPEED = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 
@@ -150,7 +153,7 @@ def simulate_loop(
     shown[:, :n] += wave_motion
     level_shown, pressure_shown = shown[:, _LEVEL].tolist(), shown[:, n].tolist()
     columns = [STATES.index(name) for name in measured]
-    observer = LevelObserver(plant.tank, 2 * TICK_S)
+    observer = LevelObserver(plant.tank, LEVEL_TICKS * TICK_S)
     limiter = CommandLimiter(plant.limits, plant.tank, TICK_S)
     by_pump = np.empty((count, n + 1))  # motion and pressure that the pump makes
     wishes = np.empty(count)
@@ -159,7 +162,7 @@ def simulate_loop(
     wish_pa = 0.0
     for k in range(count):
         by_pump[k] = memory[: n + 1]
-        if k % 2 == 0:
+        if k % LEVEL_TICKS == 0:
             observer.update(
                 level_shown[k] + float(memory[_LEVEL]), pressure_shown[k] + float(memory[n])
             )

@@ -18,7 +18,6 @@ import numpy as np
 
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import (
-    TICK_S,
     LoopRun,
     SensorNoise,
     passive_motion,
@@ -33,6 +32,7 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.tank import Tank
 from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
+from utank_hil.tick import TICK_S
 
 NO_TANK, PASSIVE, CLAIRVOYANT = "no tank", "passive", "clairvoyant"
 _BOUND_TICKS = 20  # the clairvoyant commands every 0.2 s

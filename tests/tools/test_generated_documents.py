@@ -1,0 +1,33 @@
+"""The generated documents are fresh, and the check of that can fail."""
+
+from pathlib import Path
+
+import pytest
+
+from tools.documents import faults, write
+
+
+def test_the_documents_are_those_of_the_code() -> None:
+    assert write.main(["--check"]) == 0
+
+
+def test_a_stale_table_is_found_and_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = faults.PAGE.read_text(encoding="utf-8")
+    page = tmp_path / "safety.md"
+    page.write_text(text.replace("older than 30 ms", "older than 40 ms"), encoding="utf-8")
+    monkeypatch.setattr(faults, "PAGE", page)
+    assert write.main(["--check"]) == 1
+    assert write.main([]) == 0
+    assert page.read_text(encoding="utf-8") == text
+
+
+def test_a_page_without_its_marks_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "safety.md"
+    page.write_text("# Safety\n", encoding="utf-8")
+    monkeypatch.setattr(faults, "PAGE", page)
+    with pytest.raises(ValueError, match=r"safety\.md: the tables must stand between"):
+        faults.page()

@@ -1,0 +1,45 @@
+"""The order in which the conditions of the fault table are judged."""
+
+from collections.abc import Callable
+from typing import Any, Final, TypeAlias
+
+from utank_hil.canbus.enumerations import Fault
+from utank_hil.runtime.faults import FAULTS, Condition, Reaction
+from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.safety_limits import SafetyLimits
+
+Coded: TypeAlias = tuple[Fault, Condition]
+First: TypeAlias = Callable[[Observations, SafetyLimits], Coded | None]
+"""Finds the first condition that holds."""
+
+_ALL: Final = tuple((row.code, condition) for row in FAULTS for condition in row.conditions)
+
+
+def _with(reaction: Reaction) -> tuple[Coded, ...]:
+    return tuple(coded for coded in _ALL if coded[1].reaction is reaction)
+
+
+def _first_of(conditions: tuple[Coded, ...]) -> First:
+    """Write the function out: a loop over the conditions takes twice the time, every tick."""
+    numbers = range(len(conditions))
+    tests = [f"    if holds_{i}(seen, limits): return conditions[{i}]" for i in numbers]
+    scope: dict[str, Any] = {f"holds_{i}": conditions[i][1].holds for i in numbers}
+    scope["conditions"] = conditions
+    exec("\n".join(["def first(seen, limits):", *tests, "    return None"]), scope)
+    first: First = scope["first"]
+    return first
+
+
+_STOPPING: Final = _with(Reaction.STOP)
+_ENDING: Final = _STOPPING + _with(Reaction.RAMP)
+_AWAITED: Final = sorted(
+    (coded for coded in _ALL if coded[1].awaited is not None),
+    key=lambda coded: coded[1].awaited or 0,
+)
+
+first_stopping: Final = _first_of(_STOPPING)
+first_ending: Final = _first_of(_ENDING)
+first_refusing: Final = _first_of(_ENDING + _with(Reaction.REFUSE))
+first_giving_up: Final = _first_of(_with(Reaction.GIVE_UP))
+first_halving: Final = _first_of(_with(Reaction.HALVE))
+first_awaited: Final = _first_of(tuple(_AWAITED))

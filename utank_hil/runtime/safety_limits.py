@@ -1,0 +1,79 @@
+"""The thresholds of the fault table, as the section `safety` of a configuration sets them."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from utank_hil.dynamics.ship import RollLimit
+from utank_hil.parameters import Range, range_problems, refuse
+
+_HeelLimit = Annotated[float, Range(above=0, most=0.28)]
+_Silence = Annotated[float, Range(above=0, most=1000)]
+_Patience = Annotated[float, Range(above=0, most=10_000)]
+_BusLoad = Annotated[float, Range(above=0, most=0.85)]
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """Thresholds of the fault table (`utank_hil.runtime.faults`); times in milliseconds.
+
+    The defaults are those of `docs/safety.md`. A ship or a machine may need others, but none at
+    which a protection is as good as switched off:
+
+    * Messages, the drive and the loop itself may be away for 1 s at most, the longest that the
+      table lets any sensor be silent under pressure: a tenth of the roll of a ship like the first.
+    * The operator's panel while armed, and a drive that is being enabled, get 10 s at most: a roll
+      period, for which an operator may find his stop unheard, or his arming come late.
+    * Roll 0.7 rad at most: 40 degrees, to which the IS Code 2008 (part A, 2.2.1) counts a ship's
+      righting levers. Heel 0.28 rad at most: 16 degrees, which it lets a steady wind cause (2.3.1).
+    * Bus load 0.85 at most: it is counted in mean frames of 143 bits, of which a bus that is full
+      of the longest, 160 bits, shows 0.89.
+    * Late ticks 10 of ten at most. They may be left to the limit of a single one and the drive's
+      own timeout (None), for a bench under a kernel that keeps no time: `run` tells of it.
+
+    Attributes
+    ----------
+    motion_age_ms, tank_age_ms, pump_age_ms : float
+        Longest age of a sensor's last good sample while armed.
+    tank_degraded_age_ms : float
+        Age of the tank's last good sample from which half the pressure is allowed.
+    drive_age_ms, echo_age_ms : float
+        Longest age of the drive's status, and of its last new command echo.
+    drive_enabled_within_ms : float
+        Longest time the drive may be out of operation enabled while armed.
+    panel_age_to_arm_ms, panel_age_armed_ms : float
+        Longest silence of the operator panel for arming, and while armed.
+    arming_timeout_ms : float
+        Time the drive gets from arming to operation enabled.
+    roll_limit_rad, heel_limit_rad : float
+        Largest roll angle, and largest mean roll angle, while armed.
+    bus_load_limit : float
+        Largest share of the bus in use over a second.
+    long_overrun_ms : float
+        One tick this late cuts the pressure.
+    overruns_in_ten : int or None
+        So many late ticks among the last ten end in a ramp to zero; None: they are not judged.
+
+    Raises
+    ------
+    ValueError
+        If a threshold is out of its range.
+    """
+
+    motion_age_ms: _Silence = 30.0
+    tank_age_ms: _Silence = 1000.0
+    tank_degraded_age_ms: _Silence = 100.0
+    pump_age_ms: _Silence = 1000.0
+    drive_age_ms: _Silence = 60.0
+    echo_age_ms: _Silence = 100.0
+    drive_enabled_within_ms: _Silence = 40.0
+    panel_age_to_arm_ms: _Silence = 600.0
+    panel_age_armed_ms: _Patience = 5000.0
+    arming_timeout_ms: _Patience = 2000.0
+    roll_limit_rad: RollLimit = 0.35
+    heel_limit_rad: _HeelLimit = 0.14
+    bus_load_limit: _BusLoad = 0.8
+    long_overrun_ms: _Silence = 50.0
+    overruns_in_ten: Annotated[int, Range(least=1, most=10)] | None = 3
+
+    def __post_init__(self) -> None:
+        refuse("safety", range_problems(self))
