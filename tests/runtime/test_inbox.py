@@ -70,15 +70,10 @@ class Line:
         )
         self.hear(CATALOGUE.transmitter(Heartbeat, address).frame(beat))
 
-    def content(self) -> tuple[object, ...]:
-        inbox = self.inbox
-        return (
-            inbox.roll_rad, inbox.roll_rate_rad_s, inbox.port_level_m, inbox.starboard_level_m,
-            inbox.level_m, inbox.pressure_pa, inbox.high_level, inbox.drive_state,
-            inbox.drive_fault, inbox.power_w, inbox.operator, inbox.motion_ns, inbox.tank_ns,
-            inbox.pump_ns, inbox.drive_ns, inbox.echo_ns, inbox.panel_ns, inbox.address_conflict,
-            inbox.versions_match, inbox.requested_mode,
-        )  # fmt: skip
+    def content(self) -> dict[str, object]:
+        """Everything that the inbox shows but the count of frames."""
+        shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {"frames"}
+        return {name: getattr(self.inbox, name) for name in shown | {"level_m"}}
 
 
 def test_good_frames_are_kept_with_the_time_they_came() -> None:
@@ -93,9 +88,12 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert inbox.power_w == pytest.approx(20e3)
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
     assert inbox.requested_mode is Mode.ACTIVE
-    assert [getattr(inbox, name) for name in TIMES.values()] == [1010, 1020, 1030, 1040, 1060]
-    assert inbox.echo_ns == 1040
-    assert inbox.frames == 6
+    came_ns = {kind: 1010 + 10 * index for index, kind in enumerate(GOOD)}
+    assert {kind: getattr(inbox, name) for kind, name in TIMES.items()} == {
+        kind: came_ns[kind] for kind in TIMES
+    }
+    assert inbox.echo_ns == inbox.drive_ns
+    assert inbox.frames == len(GOOD)
     assert inbox.protection_valid
 
 
@@ -151,10 +149,10 @@ def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
 
 
 OWN = {
-    CATALOGUE.transmitter(PumpCommand).can_id,
-    CATALOGUE.transmitter(ControllerStatus).can_id,
-    CATALOGUE.transmitter(Heartbeat, Address.CONTROLLER).can_id,
-    CATALOGUE.transmitter(AddressClaim, Address.CONTROLLER).can_id,
+    CATALOGUE.codec(PumpCommand).can_id,
+    CATALOGUE.codec(ControllerStatus).can_id,
+    CATALOGUE.codec(Heartbeat, Address.CONTROLLER).can_id,
+    CATALOGUE.codec(AddressClaim, Address.CONTROLLER).can_id,
 }
 
 
