@@ -13,11 +13,18 @@ with quietly_interruptible():
     from rich.console import Console
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
+    from firmware_sim.external_drive import ExternalDrive
     from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
     from firmware_sim.scenario import Scenario
-    from firmware_sim.ship_side import build_ship_side
+    from firmware_sim.ship_side import NODE_NAMES, build_ship_side
     from firmware_sim.truth import TRUTH, TruthRecorder
-    from utank_hil.analysis.motion.statistics import pump_statistics, roll_statistics
+    from utank_hil.analysis.motion.statistics import (
+        PumpStatistics,
+        RollStatistics,
+        pump_statistics,
+        roll_statistics,
+    )
+    from utank_hil.arrays import FloatArray
     from utank_hil.canbus import SocketCanPort
     from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
     from utank_hil.commands.tables import print_table
@@ -43,24 +50,72 @@ def firmware_sim(
         int | None, typer.Option(min=0, help="Of waves and noise, instead of the scenario's.")
     ] = None,
     duration: Duration = None,
-    operator: Annotated[
-        bool, typer.Option(help="Let the scenario's operator act, or leave the panel to others.")
-    ] = True,
+    without: Annotated[
+        str,
+        typer.Option(
+            metavar="NODES",
+            help="Emulated nodes to leave out, with hardware in their place: some of "
+            f"{','.join(NODE_NAMES)}.",
+        ),
+    ] = "",
     json_: Json = False,
 ) -> None:
     """Play ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
 
-    With [bold]utank-hil run[/bold] on the same bus this is a bench.
+    With [bold]utank-hil run[/bold] on the same bus this is a bench. Hardware on the bus takes the
+    place of nodes that are left out; without the drive, the ship's pump gives the pressure that the
+    real drive reports.
 
-    [bold]Example:[/bold] firmware-sim configs/scenarios/storm.yaml --bus vcan0 --duration 120
+    [bold]Example:[/bold] firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
     loaded = load(scenario, Scenario)
     length_s = loaded.duration_s if duration is None else duration
-    statistics = LoopStatistics()
     ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
     table = Table(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
-    nodes: list[Node] = [*ship.nodes] if operator else [ship.sensors, ship.drive]
-    nodes.append(TruthRecorder(ship.plant, table, RECORD_NS))
+    try:
+        nodes = ship.without([name.strip() for name in without.split(",") if name.strip()])
+    except ValueError as error:
+        fail(f"--without: {error}")
+    statistics = LoopStatistics()
+    _run(
+        [*nodes, TruthRecorder(ship.plant, table, RECORD_NS)],
+        bus,
+        loaded.name,
+        length_s,
+        statistics,
+    )
+    if len(table.rows) == 0:
+        fail("ended before the first sample")
+    roll, pump = _figures(table.rows)
+    external = next((node for node in nodes if isinstance(node, ExternalDrive)), None)
+    if json_:
+        summary = {
+            "duration_s": len(table.rows) * RECORD_S,
+            "roll": asdict(roll),
+            "pump": asdict(pump),
+            "refused_commands": None if external else ship.drive.refused,
+            "reported_pressure_share": external and external.reported_share,
+            "loop": statistics.summary(),
+        }
+        sys.stdout.write(json.dumps(summary) + "\n")
+        return
+    console = Console(highlight=False)
+    print_table(console, timing_table({"ship": statistics}))
+    drive = (
+        f"pressure reported in {external.reported_share:.1%} of the time"
+        if external
+        else f"{ship.drive.refused} commands refused"
+    )
+    console.print(
+        f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "
+        f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; {drive}"
+    )
+
+
+def _run(
+    nodes: list[Node], bus: str, name: str, length_s: float, statistics: LoopStatistics
+) -> None:
+    """Run the nodes on the bus in real time."""
     try:
         port = SocketCanPort(bus, heard_by(nodes))
     except OSError as error:
@@ -69,36 +124,23 @@ def firmware_sim(
         with stop_on_signals() as stop, real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
-            notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
+            emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
+            notes.print(
+                f"{name} on {bus}, emulated: {emulated or 'no node, nothing is sent'}; "
+                "Ctrl-C ends it."
+            )
             RealTimeLoop(nodes, port, statistics=statistics).run(stop, round(length_s * SECOND_NS))
     finally:
         port.close()
-    rows = table.rows
-    if len(rows) == 0:
-        fail("ended before the first sample")
-    roll = roll_statistics(rows[:, TRUTH.index("true_roll_rad")])
-    pump = pump_statistics(
-        rows[:, TRUTH.index("true_pressure_pa")],
-        rows[:, TRUTH.index("true_shaft_power_w")],
-        rows[:, TRUTH.index("true_level_m")],
+
+
+def _figures(rows: FloatArray) -> tuple[RollStatistics, PumpStatistics]:
+    """Statistics of the truth, rows of columns `TRUTH`."""
+    roll_rad, level_m, pressure_pa, power_w = (
+        rows[:, TRUTH.index(f"true_{name}")]
+        for name in ("roll_rad", "level_m", "pressure_pa", "shaft_power_w")
     )
-    if json_:
-        summary = {
-            "duration_s": len(rows) * RECORD_S,
-            "roll": asdict(roll),
-            "pump": asdict(pump),
-            "refused_commands": ship.drive.refused,
-            "loop": statistics.summary(),
-        }
-        sys.stdout.write(json.dumps(summary) + "\n")
-        return
-    console = Console(highlight=False)
-    print_table(console, timing_table({"ship": statistics}))
-    console.print(
-        f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "
-        f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; "
-        f"{ship.drive.refused} commands refused"
-    )
+    return roll_statistics(roll_rad), pump_statistics(pressure_pa, power_w, level_m)
 
 
 def main() -> None:

@@ -102,12 +102,20 @@ class Plant:
             Whether the motor is on; if not, the rotor turns freely.
         """
         self._state[kernel.SETPOINT] = setpoint_pa
-        self._state[kernel.ENABLED] = enabled
+        self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
 
     def brake_pump(self) -> None:
         """Take the pressure away as fast as the motor can, past the loop's lag and rate limit."""
         self.drive_pump(0.0, enabled=True)
         self._state[kernel.REFERENCE] = 0.0
+
+    def impose_pressure(self, pressure_pa: float) -> None:
+        """Hold the pressure rise of a pump outside the emulation.
+
+        The emulated rotor turns freely meanwhile, and `pump_power_w` is the hydraulic power.
+        """
+        self._state[kernel.SETPOINT] = pressure_pa
+        self._state[kernel.MODE] = kernel.IMPOSED
 
     @property
     def roll_rad(self) -> float:

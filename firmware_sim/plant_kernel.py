@@ -19,11 +19,14 @@ STEPS = round(TICK_S / STEP_S)
 # entries of the state vector
 ROLL, ROLL_RATE, LEVEL, LEVEL_RATE = range(4)
 SPEED, REFERENCE, INTEGRAL, PRESSURE, TORQUE, POWER, LIMITED = range(4, 11)  # PumpState
-SETPOINT, ENABLED = 11, 12
+SETPOINT, MODE = 11, 12
 MOMENTS = slice(13, 17)  # wave moment at t - 1, t, t + 1 and t + 2 ticks
 MOMENT_NOW = 14
 ENERGY = 17  # taken by the shaft since the start, J
 STATES = 18
+
+# values of MODE: the rotor turns freely, follows the set-point, or the set-point is the pressure
+FREE, DRIVEN, IMPOSED = 0, 1, 2
 
 State = tuple[float, float, float, float]
 
@@ -83,10 +86,13 @@ def advance_tick(
     # not STEPS: numba's cache would keep the number of an earlier tick
     for step in range(len(weights) // 2):
         flow_m3_s = model[0, 6] * x[3]
-        if state[ENABLED] > 0.5:
+        if state[MODE] == DRIVEN:
             pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, pump_coefficients)
         else:
             pump = pump_coast(pump, flow_m3_s, STEP_S, pump_coefficients)
+        if state[MODE] == IMPOSED:
+            pressure_pa, power_w = state[SETPOINT], state[SETPOINT] * flow_m3_s
+            pump = PumpState(pump.speed_rad_s, 0.0, 0.0, pressure_pa, 0.0, power_w, False)
         energy_j += pump.power_w * STEP_S
         middle = _interpolated(weights, 2 * step + 1, moments)
         last = _interpolated(weights, 2 * step + 2, moments)

@@ -1,9 +1,9 @@
 """The sensor node: motion sensor, tank level gauges, high-level switches and pump pressure."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from utank_hil.canbus import (
     SensorPump,
     SensorTank,
     Switch,
+    Transmitter,
 )
 from utank_hil.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
@@ -28,18 +29,20 @@ NOISE_BLOCK = 4096
 _GOOD = Quality.GOOD
 _CLOSED, _OPEN = Switch.ON, Switch.OFF
 
+_M = TypeVar("_M", bound=tuple[Any, ...])
+
 
 @dataclass(frozen=True, slots=True)
 class SensorErrors:
-    """What the sensors add to the truth; noise is white and Gaussian, given as standard deviation.
+    """Errors of the sensors; noise is white and Gaussian, given as standard deviation.
 
     Attributes
     ----------
     roll_noise_rad, roll_rate_noise_rad_s : float
         Noise of the motion sensor.
     motion_delay_ms : float
-        Age of the motion sensor's sample when it is sent, a whole number of its 10 ms cycles; a
-        second at most, the longest delay that a law can be designed for.
+        Age of the motion sensor's sample when it is sent, a multiple of its 10 ms cycle. At most
+        1000, the longest delay that a law can be designed for.
     level_noise_m : float
         Noise of each level gauge.
     pressure_noise_pa : float
@@ -47,12 +50,12 @@ class SensorErrors:
     high_level_m : float
         Level above still water at which a reservoir's high-level switch closes.
     roll_bias_rad : float
-        Steady error of the motion sensor's roll, which is mounted askew by so much; 0.2 at most.
+        Constant error of the roll, such as that of a sensor mounted at an angle; 0.2 at most.
 
     Raises
     ------
     ValueError
-        If a value is out of its range, or the delay no whole number of cycles.
+        If a value is out of its range, or the delay is not a multiple of the cycle.
     """
 
     roll_noise_rad: NotNegative = 2e-4
@@ -79,7 +82,7 @@ def _standard_normal(seed: int) -> Iterator[float]:
 
 
 class SensorNode:
-    """Measures the plant and sends what it measured.
+    """Measures the plant and sends the measurements in the cycles of the catalogue.
 
     Parameters
     ----------
@@ -111,60 +114,56 @@ class SensorNode:
         self._draw = _standard_normal(seed).__next__
         delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
-        self._motion_sender = catalogue.transmitter(SensorMotion)
-        self._tank_sender = catalogue.transmitter(SensorTank)
-        self._pump_sender = catalogue.transmitter(SensorPump)
-        self._tank_ticks = self._tank_sender.cycle_ns // TICK_NS
-        self._pump_ticks = self._pump_sender.cycle_ns // TICK_NS
+        self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
+        # the noise is drawn in this order: a new message goes last
+        self._publish(catalogue.transmitter(SensorMotion), self._measure_motion)
+        self._publish(catalogue.transmitter(SensorTank), self._measure_tank)
+        self._publish(catalogue.transmitter(SensorPump), self._measure_pump)
         self._housekeeping = Housekeeping(Address.SENSORS, catalogue, configuration_version)
         self._ticks = 0
 
+    def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
+        """Send what `measure` returns, once in the message's cycle."""
+        ticks = transmitter.cycle_ns // self.period_ns
+        self._messages.append((ticks, transmitter.frame, measure))
+
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Sensors listen to nobody."""
+        """Sensors listen to no message."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Measure, and send what is due."""
-        plant, errors, draw = self._plant, self._errors, self._draw
+        plant = self._plant
         plant.advance(now_ns)
         self._motion.append((plant.roll_rad, plant.roll_rate_rad_s))
-        roll_rad, rate_rad_s = self._motion[0]
-        frames = [
-            self._motion_sender.frame(
-                SensorMotion(
-                    roll_rad + errors.roll_bias_rad + errors.roll_noise_rad * draw(),
-                    rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
-                    _GOOD,
-                )
-            )
-        ]
-        if self._ticks % self._tank_ticks == 0:
-            frames.append(self._tank_frame(plant.level_m))
-        if self._ticks % self._pump_ticks == 0:
-            frames.append(
-                self._pump_sender.frame(
-                    SensorPump(
-                        plant.pressure_pa + errors.pressure_noise_pa * draw(),
-                        plant.flow_m3_s,
-                        _GOOD,
-                    )
-                )
-            )
+        frames: list[Frame] = []
+        for ticks, frame, measure in self._messages:
+            if self._ticks % ticks == 0:
+                frames.append(frame(measure()))
         frames.extend(self._housekeeping.frames(now_ns))
         self._ticks += 1
         return frames
 
-    def _tank_frame(self, level_m: float) -> Frame:
-        noise_m, limit_m, draw = (
-            self._errors.level_noise_m,
-            self._errors.high_level_m,
-            self._draw,
+    def _measure_motion(self) -> SensorMotion:
+        errors, draw = self._errors, self._draw
+        roll_rad, rate_rad_s = self._motion[0]
+        return SensorMotion(
+            roll_rad + errors.roll_bias_rad + errors.roll_noise_rad * draw(),
+            rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
+            _GOOD,
         )
-        return self._tank_sender.frame(
-            SensorTank(
-                -level_m + noise_m * draw(),
-                level_m + noise_m * draw(),
-                _CLOSED if -level_m > limit_m else _OPEN,
-                _CLOSED if level_m > limit_m else _OPEN,
-                _GOOD,
-            )
+
+    def _measure_tank(self) -> SensorTank:
+        level_m, draw = self._plant.level_m, self._draw
+        noise_m, limit_m = self._errors.level_noise_m, self._errors.high_level_m
+        return SensorTank(
+            -level_m + noise_m * draw(),
+            level_m + noise_m * draw(),
+            _CLOSED if -level_m > limit_m else _OPEN,
+            _CLOSED if level_m > limit_m else _OPEN,
+            _GOOD,
         )
+
+    def _measure_pump(self) -> SensorPump:
+        plant = self._plant
+        noise_pa = self._errors.pressure_noise_pa * self._draw()
+        return SensorPump(plant.pressure_pa + noise_pa, plant.flow_m3_s, _GOOD)

@@ -1,15 +1,22 @@
-"""The ship's side put together from a scenario."""
+"""The ship's side of the bus, built from a scenario."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Final
 
 from firmware_sim.drive import PumpDrive
+from firmware_sim.external_drive import ExternalDrive
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
 from utank_hil.canbus import load_catalogue
+from utank_hil.runtime import Node
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
 SECOND_NS = 1_000_000_000
+
+NODE_NAMES: Final = ("sensors", "drive", "panel")
+"""The emulated nodes, in the order in which they tick; hardware may take the place of each."""
 
 # enabled at zero pressure the pump leaves the tank alone; switched off, its rotor turns with the
 # water and changes the tank
@@ -38,17 +45,42 @@ class ShipSide:
         """The nodes, in the order in which they tick."""
         return self.sensors, self.drive, self.panel
 
+    def without(self, names: Collection[str]) -> list[Node]:
+        """The nodes that are left when hardware takes the place of some.
+
+        Without the emulated drive an `ExternalDrive` moves the plant's pump.
+
+        Parameters
+        ----------
+        names : collection of str
+            Some of `NODE_NAMES`.
+
+        Raises
+        ------
+        ValueError
+            If a name is unknown.
+        """
+        for name in names:
+            if name not in NODE_NAMES:
+                raise ValueError(
+                    f"no node {name!r} to leave out; there are {', '.join(NODE_NAMES)}"
+                )
+        nodes: list[Node] = [node for node in self.nodes if node.name not in names]
+        if "drive" in names:
+            nodes.append(ExternalDrive(self.plant, load_catalogue()))
+        return nodes
+
 
 def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ...]) -> ShipSide:
-    """Ship emulator with its nodes.
+    """Build the emulated ship and its nodes.
 
     Parameters
     ----------
     scenario : Scenario
     seed : int
-        Of sea and sensor noise: the same seed, the same waves.
+        Of sea and sensor noise.
     script : tuple of TimedAction
-        What the operator does.
+        The operator's actions.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
     plant = Plant(vessel.ship, vessel.tank, vessel.pump, scenario.wave_moment(seed))

@@ -180,6 +180,16 @@ def test_missing_interface_is_named_and_ends_with_code_2(application, arguments)
     assert "Traceback" not in result.output
 
 
+@pytest.mark.parametrize("names", ["motor", "sensors,motor", "sensors,drive,panel,truth"])
+def test_unknown_node_to_leave_out_is_refused_with_those_that_there_are(names: str) -> None:
+    storm = CONFIGS / "scenarios" / "storm.yaml"
+    result = invoke(ship_app, storm, "--bus", "nowhere0", "--without", names)
+    assert result.exit_code == 2
+    unknown = names.split(",")[-1]
+    expected = f"--without: no node '{unknown}' to leave out; there are sensors, drive, panel"
+    assert expected in said(result)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

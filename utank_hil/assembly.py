@@ -23,7 +23,7 @@ from utank_hil.runtime.controller_node import (
     EventSink,
     Measure,
 )
-from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 from utank_hil.tick import TICK_S
@@ -31,20 +31,26 @@ from utank_hil.tick import TICK_S
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
 
-_MEASUREMENTS: dict[str, Callable[[Inbox, LevelObserver], float]] = {
-    "roll_rad": lambda inbox, level: inbox.roll_rad,  # noqa: ARG005
-    "roll_rate_rad_s": lambda inbox, level: inbox.roll_rate_rad_s,  # noqa: ARG005
-    "level_m": lambda inbox, level: inbox.level_m,  # noqa: ARG005
-    "level_rate_m_s": lambda inbox, level: level.rate_m_s,  # noqa: ARG005
-}
+MEASUREMENTS = (*MEASURED, "level_rate_m_s")
+"""Signals that a law may measure."""
 
 
 def measure_of(names: tuple[str, ...]) -> Measure:
-    """Function that picks the named signals as a measurement vector, shape (m,)."""
-    pick = [_MEASUREMENTS[name] for name in names]
+    """Function that picks the named signals as a measurement vector, shape (m,).
+
+    Raises
+    ------
+    ValueError
+        If a name is none of `MEASUREMENTS`.
+    """
+    for name in names:
+        if name not in MEASUREMENTS:
+            raise ValueError(f"no measurement {name!r}; there are {', '.join(MEASUREMENTS)}")
 
     def measure(inbox: Inbox, level: LevelObserver) -> FloatArray:
-        return np.array([one(inbox, level) for one in pick])
+        return np.array(
+            [level.rate_m_s if name not in MEASURED else getattr(inbox, name) for name in names]
+        )
 
     return measure
 

@@ -104,6 +104,26 @@ def test_plant_equals_a_matrix_exponential_with_the_same_moment_and_pump(enabled
     assert plant.pump_energy_j == pytest.approx(energy_j, rel=1e-6)
 
 
+def test_imposed_pressure_acts_as_it_is_and_its_work_is_the_waters() -> None:
+    plant, exact = plant_in(SWELL), ExactShip(SWELL)
+    plant.advance(0)
+    work_j, rotor = 0.0, AT_REST
+    for tick in range(1500):
+        pressure_pa = 60e3 * math.sin(0.6 * tick * 0.01)  # above the emulated pump's own limit
+        plant.impose_pressure(pressure_pa)
+        plant.advance((tick + 1) * TICK_NS)
+        for _ in range(10):
+            work_j += pressure_pa * exact.flow_m3_s * STEP_S
+            rotor = pump_coast(rotor, exact.flow_m3_s, STEP_S, VESSEL.pump.coefficients)
+            exact.step(pressure_pa)
+        assert plant.pressure_pa == pressure_pa
+        assert [plant.roll_rad, plant.level_m] == pytest.approx(exact.x[:2], abs=1e-9)
+    assert plant.pump_energy_j == pytest.approx(work_j, rel=1e-6)
+    # the rotor turned with the water, so that there is no jolt when the pressure ends
+    assert plant.pump_speed_rad_s == pytest.approx(rotor.speed_rad_s, rel=1e-6)
+    assert abs(plant.pump_speed_rad_s) > 1.0
+
+
 def mechanical_energy_j(plant: Plant) -> float:
     mass, _, stiffness = coupled_matrices(VESSEL.ship, VESSEL.tank)
     q = np.array([plant.roll_rad, plant.level_m])

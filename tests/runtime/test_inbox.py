@@ -1,10 +1,15 @@
 import math
+from collections.abc import Iterable
+from pathlib import Path
 
 import pytest
-from controller_bench import CATALOGUE, VERSION
+from controller_bench import CATALOGUE, VERSION, VESSEL
 from hypothesis import given
 from hypothesis import strategies as st
 
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import measure_of
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -26,7 +31,10 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-from utank_hil.runtime.inbox import Inbox
+from utank_hil.configuration import load_config
+from utank_hil.control import LevelObserver
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.inbox import MEASURED, Inbox
 
 NAN = math.nan
 GOOD: dict[type, tuple[object, ...]] = {
@@ -43,6 +51,12 @@ TIMES = {
     SensorPump: "pump_ns",
     DriveStatus1: "drive_ns",
     OperatorCommand: "panel_ns",
+}
+# what a law may measure: attribute of the emulated ship, and how far noise and delay may be off it
+TRUE = {
+    "roll_rad": ("roll_rad", 0.003),
+    "roll_rate_rad_s": ("roll_rate_rad_s", 0.005),
+    "level_m": ("level_m", 0.03),
 }
 
 
@@ -70,15 +84,10 @@ class Line:
         )
         self.hear(CATALOGUE.transmitter(Heartbeat, address).frame(beat))
 
-    def content(self) -> tuple[object, ...]:
-        inbox = self.inbox
-        return (
-            inbox.roll_rad, inbox.roll_rate_rad_s, inbox.port_level_m, inbox.starboard_level_m,
-            inbox.level_m, inbox.pressure_pa, inbox.high_level, inbox.drive_state,
-            inbox.drive_fault, inbox.power_w, inbox.operator, inbox.motion_ns, inbox.tank_ns,
-            inbox.pump_ns, inbox.drive_ns, inbox.echo_ns, inbox.panel_ns, inbox.address_conflict,
-            inbox.versions_match, inbox.requested_mode,
-        )  # fmt: skip
+    def content(self) -> dict[str, object]:
+        """Everything that the inbox shows but the count of frames."""
+        shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {"frames"}
+        return {name: getattr(self.inbox, name) for name in shown | {"level_m"}}
 
 
 def test_good_frames_are_kept_with_the_time_they_came() -> None:
@@ -93,9 +102,12 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert inbox.power_w == pytest.approx(20e3)
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
     assert inbox.requested_mode is Mode.ACTIVE
-    assert [getattr(inbox, name) for name in TIMES.values()] == [1010, 1020, 1030, 1040, 1060]
-    assert inbox.echo_ns == 1040
-    assert inbox.frames == 6
+    came_ns = {kind: 1010 + 10 * index for index, kind in enumerate(GOOD)}
+    assert {kind: getattr(inbox, name) for kind, name in TIMES.items()} == {
+        kind: came_ns[kind] for kind in TIMES
+    }
+    assert inbox.echo_ns == inbox.drive_ns
+    assert inbox.frames == len(GOOD)
     assert inbox.protection_valid
 
 
@@ -151,10 +163,10 @@ def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
 
 
 OWN = {
-    CATALOGUE.transmitter(PumpCommand).can_id,
-    CATALOGUE.transmitter(ControllerStatus).can_id,
-    CATALOGUE.transmitter(Heartbeat, Address.CONTROLLER).can_id,
-    CATALOGUE.transmitter(AddressClaim, Address.CONTROLLER).can_id,
+    CATALOGUE.codec(PumpCommand).can_id,
+    CATALOGUE.codec(ControllerStatus).can_id,
+    CATALOGUE.codec(Heartbeat, Address.CONTROLLER).can_id,
+    CATALOGUE.codec(AddressClaim, Address.CONTROLLER).can_id,
 }
 
 
@@ -227,3 +239,39 @@ def test_a_mode_nobody_asked_for_is_standby() -> None:
     assert line.inbox.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
     assert line.inbox.requested_mode is Mode.STANDBY
+
+
+class Listener:
+    """An inbox on the bus."""
+
+    name = "listener"
+    period_ns = 10_000_000
+
+    def __init__(self) -> None:
+        self.inbox = Inbox(CATALOGUE, VERSION)
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        self.inbox.receive(frame, now_ns)
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        return ()
+
+
+def test_emulated_sensors_are_what_a_law_measures() -> None:
+    assert list(TRUE) == list(MEASURED)
+    scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+    ship, listener = build_ship_side(scenario, 1, ()), Listener()
+    measure, level = measure_of(MEASURED), LevelObserver(VESSEL.tank, 0.02)
+    run, largest = Lockstep([ship.sensors, listener]), dict.fromkeys(MEASURED, 0.0)
+    for time_ms in range(20_000, 60_000, 250):
+        run.run_until(time_ms * 1_000_000)
+        for name, value in zip(MEASURED, measure(listener.inbox, level), strict=True):
+            attribute, off = TRUE[name]
+            assert value == pytest.approx(getattr(ship.plant, attribute), abs=off), name
+            largest[name] = max(largest[name], abs(value))
+    assert all(largest[name] > 3 * off for name, (_, off) in TRUE.items())
+
+
+def test_a_measurement_that_does_not_exist_is_refused_with_those_that_do() -> None:
+    with pytest.raises(ValueError, match="no measurement 'rol_rad'; there are roll_rad"):
+        measure_of(("level_m", "rol_rad"))

@@ -5,71 +5,19 @@ Light to import: cantools is loaded with the catalogue, python-can with `SocketC
 
 from typing import TYPE_CHECKING
 
-from utank_hil.canbus.catalogue import Catalogue, load_catalogue
-from utank_hil.canbus.enumerations import (
-    Address,
-    ControlWord,
-    DriveFault,
-    DriveState,
-    Fault,
-    Mode,
-    NodeState,
-    Quality,
-    ResetCause,
-    RetuningState,
-    Switch,
-)
-from utank_hil.canbus.exchange import Receiver, Rejection, Transmitter
-from utank_hil.canbus.frame import Frame
-from utank_hil.canbus.messages import (
-    AddressClaim,
-    ControllerStatus,
-    DriveStatus1,
-    DriveStatus2,
-    Heartbeat,
-    OperatorCommand,
-    PumpCommand,
-    SensorMotion,
-    SensorPump,
-    SensorTank,
-)
-from utank_hil.canbus.port import Port, PortError
+from utank_hil.canbus.catalogue import Catalogue as Catalogue
+from utank_hil.canbus.catalogue import load_catalogue as load_catalogue
+from utank_hil.canbus.endpoints import Receiver as Receiver
+from utank_hil.canbus.endpoints import Rejection as Rejection
+from utank_hil.canbus.endpoints import Transmitter as Transmitter
+from utank_hil.canbus.enumerations import *  # noqa: F403 - every value table
+from utank_hil.canbus.frame import Frame as Frame
+from utank_hil.canbus.messages import *  # noqa: F403 - every message
+from utank_hil.canbus.port import Port as Port
+from utank_hil.canbus.port import PortError as PortError
 
 if TYPE_CHECKING:
-    from utank_hil.canbus.socketcan import SocketCanPort
-
-__all__ = [
-    "Address",
-    "AddressClaim",
-    "Catalogue",
-    "ControlWord",
-    "ControllerStatus",
-    "DriveFault",
-    "DriveState",
-    "DriveStatus1",
-    "DriveStatus2",
-    "Fault",
-    "Frame",
-    "Heartbeat",
-    "Mode",
-    "NodeState",
-    "OperatorCommand",
-    "Port",
-    "PortError",
-    "PumpCommand",
-    "Quality",
-    "Receiver",
-    "Rejection",
-    "ResetCause",
-    "RetuningState",
-    "SensorMotion",
-    "SensorPump",
-    "SensorTank",
-    "SocketCanPort",
-    "Switch",
-    "Transmitter",
-    "load_catalogue",
-]
+    from utank_hil.canbus.socketcan import SocketCanPort as SocketCanPort
 
 
 def __getattr__(name: str) -> object:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
 from utank_hil.canbus.codec import FRAME_BYTES, Codec, Signal, compile_codec, field_kind
+from utank_hil.canbus.endpoints import Receiver, Transmitter
 from utank_hil.canbus.enumerations import Address
-from utank_hil.canbus.exchange import Receiver, Transmitter
 from utank_hil.canbus.messages import DBC_NAMES
 
 if TYPE_CHECKING:
@@ -71,6 +71,12 @@ class Catalogue:
             sender = "" if source is None else f" sent by {source.name}"
             msg = f"the catalogue has no message {message_type.__name__}{sender}"
         raise ValueError(msg)
+
+    def ids_sent_by(self, address: Address) -> frozenset[int]:
+        """Identifiers of all messages that a node sends."""
+        return frozenset(
+            codec.can_id for (_, source), codec in self._codecs.items() if source is address
+        )
 
     def transmitter(self, message_type: type[T], source: Address | None = None) -> Transmitter[T]:
         """Return a new sending end, its counter at the start; see `codec`."""

@@ -6,22 +6,24 @@ of sixteen by the counter in the low nibble of byte 1. A frame of another messag
 check even if its length and counter fit (masquerade). Source: AUTOSAR, Specification of SW-C
 End-to-End Communication Protection Library (polynomial, start value and Profile 2).
 
-The lists of the catalogue (attribute `DataIDs` of the DBC): message number n = 1, 2, ... as the
-eight bits ``2 n + parity(n)``, exclusive-or 0x06, 0x03, 0x0A, 0x11 for the counter's bits 0 to 3.
-Two messages then differ at every counter, and differ even with any one bit flipped; and the four
-constants are such that any one, two or three flipped bits of a frame are found. That is not so with
-any list: where the data ID changes with the counter, a flipped counter bit changes the ID as well,
-and careless lists let two flipped bits through. Tests hold all of this.
+The lists of the catalogue (attribute `DataIDs` of the DBC) are those of `data_ids`. Two messages
+then differ at every counter, and differ even with any one bit flipped; and the four constants are
+such that any one, two or three flipped bits of a frame are found. That is not so with any list:
+where the data ID changes with the counter, a flipped counter bit changes the ID as well, and
+careless lists let two flipped bits through. Tests hold all of this.
 
 The CRC is linear over GF(2): the CRC of a frame is the exclusive-or of what each byte contributes
 at its place. So eight bytes cost four look-ups: byte 1 with the data ID and all constants in a
 table of the message, bytes 2 to 7 in pairs in the tables `WORD_TABLES`.
 """
 
+from functools import reduce
+from operator import xor
 from typing import Final
 
 POLYNOMIAL: Final = 0x2F
 DATA_ID_COUNT: Final = 16
+_COUNTER_BITS: Final = (0x06, 0x03, 0x0A, 0x11)
 
 
 def _shifted(crc: int) -> int:
@@ -63,6 +65,21 @@ def _word_table(place: int) -> bytes:
 
 #: Contribution of bytes 2-3, 4-5 and 6-7, by their value as a little-endian word.
 WORD_TABLES: Final = (_word_table(2), _word_table(4), _word_table(6))
+
+
+def data_ids(number: int) -> bytes:
+    """Data IDs by counter of the catalogue's protected message number 1 to 127.
+
+    The number n as the eight bits ``2 n + parity(n)``, exclusive-or 0x06, 0x03, 0x0A, 0x11 for the
+    counter's bits 0 to 3.
+    """
+    code = 2 * number + number.bit_count() % 2
+    return bytes(
+        reduce(
+            xor, (change for bit, change in enumerate(_COUNTER_BITS) if counter >> bit & 1), code
+        )
+        for counter in range(DATA_ID_COUNT)
+    )
 
 
 def first_byte_table(data_ids: bytes) -> bytes:

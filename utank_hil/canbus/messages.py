@@ -1,5 +1,6 @@
-"""One typed tuple per message of the catalogue; field names are the DBC's signal names.
+"""The messages of the catalogue: one typed tuple each, declared here and in the DBC only.
 
+Field names are the DBC's signal names. `utank_hil.canbus` exports every message of this file.
 What a field's type says:
 
 * `float`: scaled to the unit in the name; NaN is "not available" on the bus, and what a value out
@@ -9,7 +10,8 @@ What a field's type says:
 * `bool`: one bit, for which there is no "not available".
 """
 
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple, TypeVar
 
 from utank_hil.canbus.enumerations import (
     ControlWord,
@@ -24,7 +26,23 @@ from utank_hil.canbus.enumerations import (
     Switch,
 )
 
+_T = TypeVar("_T", bound=type[tuple[Any, ...]])
 
+DBC_NAMES: Final[dict[type[tuple[Any, ...]], str]] = {}
+"""Message name in the DBC by type; for messages that every node sends, without the node's name."""
+
+
+def _dbc_message(name: str) -> Callable[[_T], _T]:
+    """Declare that a type is the message of this name."""
+
+    def declare(kind: _T) -> _T:
+        DBC_NAMES[kind] = name
+        return kind
+
+    return declare
+
+
+@_dbc_message("PUMP_CMD")
 class PumpCommand(NamedTuple):
     """PUMP_CMD, controller to drive, 20 ms.
 
@@ -43,6 +61,7 @@ class PumpCommand(NamedTuple):
     timeout_s: float
 
 
+@_dbc_message("DRIVE_STATUS_1")
 class DriveStatus1(NamedTuple):
     """DRIVE_STATUS_1, drive to controller, 20 ms.
 
@@ -70,6 +89,7 @@ class DriveStatus1(NamedTuple):
     power_limited: bool
 
 
+@_dbc_message("DRIVE_STATUS_2")
 class DriveStatus2(NamedTuple):
     """DRIVE_STATUS_2, drive to controller, 100 ms; power is `bus_voltage_v * current_a`.
 
@@ -100,6 +120,7 @@ class DriveStatus2(NamedTuple):
     sensor_warning: bool
 
 
+@_dbc_message("SENSOR_MOTION")
 class SensorMotion(NamedTuple):
     """SENSOR_MOTION, sensors to controller, 10 ms; roll positive starboard down."""
 
@@ -108,6 +129,7 @@ class SensorMotion(NamedTuple):
     quality: Quality | None
 
 
+@_dbc_message("SENSOR_TANK")
 class SensorTank(NamedTuple):
     """SENSOR_TANK, sensors to controller, 20 ms.
 
@@ -128,6 +150,7 @@ class SensorTank(NamedTuple):
     quality: Quality | None
 
 
+@_dbc_message("SENSOR_PUMP")
 class SensorPump(NamedTuple):
     """SENSOR_PUMP, sensors to controller, 20 ms.
 
@@ -146,6 +169,7 @@ class SensorPump(NamedTuple):
     quality: Quality | None
 
 
+@_dbc_message("CTRL_STATUS")
 class ControllerStatus(NamedTuple):
     """CTRL_STATUS, controller to all, 100 ms.
 
@@ -186,6 +210,7 @@ class ControllerStatus(NamedTuple):
     retuning: RetuningState | None = None
 
 
+@_dbc_message("OPERATOR_CMD")
 class OperatorCommand(NamedTuple):
     """OPERATOR_CMD, operator panel to controller, 200 ms and on change.
 
@@ -219,6 +244,7 @@ class OperatorCommand(NamedTuple):
     forbid_retuning: bool = False
 
 
+@_dbc_message("HEARTBEAT")
 class Heartbeat(NamedTuple):
     """HEARTBEAT_<NODE>, every node to all, 100 ms.
 
@@ -245,6 +271,7 @@ class Heartbeat(NamedTuple):
     receive_error_count: float
 
 
+@_dbc_message("ADDRESS_CLAIM")
 class AddressClaim(NamedTuple):
     """ADDRESS_CLAIM_<NODE>, every node at boot, unprotected: all 64 bits are SAE J1939-81's NAME.
 
@@ -252,18 +279,3 @@ class AddressClaim(NamedTuple):
     """
 
     name: int | None
-
-
-#: DBC name of each message; of those every node sends, without the node's name at the end.
-DBC_NAMES: Final[dict[type[tuple[object, ...]], str]] = {
-    PumpCommand: "PUMP_CMD",
-    DriveStatus1: "DRIVE_STATUS_1",
-    DriveStatus2: "DRIVE_STATUS_2",
-    SensorMotion: "SENSOR_MOTION",
-    SensorTank: "SENSOR_TANK",
-    SensorPump: "SENSOR_PUMP",
-    ControllerStatus: "CTRL_STATUS",
-    OperatorCommand: "OPERATOR_CMD",
-    Heartbeat: "HEARTBEAT",
-    AddressClaim: "ADDRESS_CLAIM",
-}

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, TypeAlias
 
+from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
-from utank_hil.canbus.exchange import BUCKET_LIMIT
 from utank_hil.runtime.observations import Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 

@@ -5,12 +5,13 @@ content is no measurement: not available, out of range, or declared bad by the s
 """
 
 import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, TypeVar
 
 from utank_hil.canbus import (
     Address,
-    AddressClaim,
     Catalogue,
-    ControllerStatus,
     DriveFault,
     DriveState,
     DriveStatus1,
@@ -19,8 +20,8 @@ from utank_hil.canbus import (
     Heartbeat,
     Mode,
     OperatorCommand,
-    PumpCommand,
     Quality,
+    Receiver,
     SensorMotion,
     SensorPump,
     SensorTank,
@@ -29,9 +30,19 @@ from utank_hil.canbus import (
 
 NEVER_HEARD_NS = -(1 << 62)
 
+MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+"""Attributes of the inbox that a law may measure."""
+
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
+
+_MATCHED: Final = (Address.DRIVE, Address.SENSORS)
+"""Nodes whose versions must equal the controller's before arming."""
+
+_M = TypeVar("_M", bound=tuple[Any, ...])
+_Accept = Callable[[Frame], tuple[Any, ...] | None]
+_Handle = Callable[[Any, int], None]
 
 
 class Inbox:
@@ -65,36 +76,19 @@ class Inbox:
 
     def __init__(self, catalogue: Catalogue, configuration_version: int) -> None:
         self._versions = (catalogue.version, configuration_version)
-        self._motion = catalogue.receiver(SensorMotion)
-        self._tank = catalogue.receiver(SensorTank)
-        self._pump = catalogue.receiver(SensorPump)
-        self._drive_1 = catalogue.receiver(DriveStatus1)
-        self._drive_2 = catalogue.receiver(DriveStatus2)
-        self._operator = catalogue.receiver(OperatorCommand)
-        self._heartbeats = {
-            address: catalogue.receiver(Heartbeat, address)
-            for address in (Address.DRIVE, Address.SENSORS)
-        }
-        self._handlers = {
-            self._motion.can_id: self._on_motion,
-            self._tank.can_id: self._on_tank,
-            self._pump.can_id: self._on_pump,
-            self._drive_1.can_id: self._on_drive_1,
-            self._drive_2.can_id: self._on_drive_2,
-            self._operator.can_id: self._on_operator,
-            **{receiver.can_id: self._on_heartbeat for receiver in self._heartbeats.values()},
-        }
-        own = (
-            catalogue.transmitter(PumpCommand),
-            catalogue.transmitter(ControllerStatus),
-            catalogue.transmitter(Heartbeat, Address.CONTROLLER),
-            catalogue.transmitter(AddressClaim, Address.CONTROLLER),
-        )
-        self._handlers.update({sender.can_id: self._on_own_identifier for sender in own})
-        self._matching: dict[int, bool] = {
-            receiver.can_id: False for receiver in self._heartbeats.values()
-        }
-        self._by_id = {receiver.can_id: receiver for receiver in self._heartbeats.values()}
+        self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
+        self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
+        self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
+        self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
+        self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
+        self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
+        self._subscribe(catalogue.receiver(OperatorCommand), self._on_operator)
+        self._matching: dict[int, bool] = {}
+        for address in _MATCHED:
+            heartbeat = catalogue.receiver(Heartbeat, address)
+            self._matching[heartbeat.can_id] = False
+            self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
+        self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
         self.pressure_pa = self.power_w = 0.0
@@ -120,26 +114,32 @@ class Inbox:
         """Whether the messages that control stands on keep arriving intact and in order."""
         return self._motion.valid and self._tank.valid and self._drive_1.valid
 
+    def _subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
+        """Hand the accepted messages of a receiver to `handle`, with the time they came."""
+        self._subscriptions[receiver.can_id] = receiver.accept, handle
+        return receiver
+
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
         self.frames += 1
-        handler = self._handlers.get(frame.can_id)
-        if handler is not None:
-            handler(frame, now_ns)
+        subscription = self._subscriptions.get(frame.can_id)
+        if subscription is not None:
+            accept, handle = subscription
+            message = accept(frame)
+            if message is not None:
+                handle(message, now_ns)
+        elif frame.can_id in self._own_ids:
+            self.address_conflict = True
 
-    def _on_motion(self, frame: Frame, now_ns: int) -> None:
-        motion = self._motion.accept(frame)
-        if motion is None or motion.quality not in _USABLE:
+    def _on_motion(self, motion: SensorMotion, now_ns: int) -> None:
+        if motion.quality not in _USABLE:
             return
         # one test for both: the sum is NaN if either is not available
         if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s):
             self.roll_rad, self.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
             self.motion_ns = now_ns
 
-    def _on_tank(self, frame: Frame, now_ns: int) -> None:
-        tank = self._tank.accept(frame)
-        if tank is None:
-            return
+    def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
         # the switches count whatever the gauges say, and a broken switch counts as closed
         self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in _USABLE:
@@ -148,44 +148,29 @@ class Inbox:
             self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
             self.tank_ns = now_ns
 
-    def _on_pump(self, frame: Frame, now_ns: int) -> None:
-        pump = self._pump.accept(frame)
-        if pump is None or pump.quality not in _USABLE:
-            return
-        if math.isfinite(pump.pressure_pa):
+    def _on_pump(self, pump: SensorPump, now_ns: int) -> None:
+        if pump.quality in _USABLE and math.isfinite(pump.pressure_pa):
             self.pressure_pa = pump.pressure_pa
             self.pump_ns = now_ns
 
-    def _on_drive_1(self, frame: Frame, now_ns: int) -> None:
-        status = self._drive_1.accept(frame)
-        if status is None:
-            return
+    def _on_drive_1(self, status: DriveStatus1, now_ns: int) -> None:
         self.drive_state = status.state
         self.drive_ns = now_ns
         if status.command_echo is not None and status.command_echo != self._echo:
             self._echo = status.command_echo
             self.echo_ns = now_ns
 
-    def _on_drive_2(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        status = self._drive_2.accept(frame)
-        if status is not None:
-            self.drive_fault = status.fault
-            self.power_w = status.bus_voltage_v * status.current_a
+    def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
+        self.drive_fault = status.fault
+        self.power_w = status.bus_voltage_v * status.current_a
 
-    def _on_operator(self, frame: Frame, now_ns: int) -> None:
-        order = self._operator.accept(frame)
-        if order is not None:
-            self.operator = order
-            asked = order.mode_request
-            self.requested_mode = Mode.STANDBY if asked is None else asked
-            self.panel_ns = now_ns
+    def _on_operator(self, order: OperatorCommand, now_ns: int) -> None:
+        self.operator = order
+        asked = order.mode_request
+        self.requested_mode = Mode.STANDBY if asked is None else asked
+        self.panel_ns = now_ns
 
-    def _on_heartbeat(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        beat = self._by_id[frame.can_id].accept(frame)
-        if beat is not None:
-            versions = (beat.catalogue_version, beat.configuration_version)
-            self._matching[frame.can_id] = versions == self._versions
-            self.versions_match = all(self._matching.values())
-
-    def _on_own_identifier(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        self.address_conflict = True
+    def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
+        versions = (beat.catalogue_version, beat.configuration_version)
+        self._matching[can_id] = versions == self._versions
+        self.versions_match = all(self._matching.values())

@@ -19,7 +19,7 @@ from utank_hil.canbus import (
     SensorMotion,
     load_catalogue,
 )
-from utank_hil.canbus.exchange import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES
+from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES
 
 CATALOGUE = load_catalogue()
 MESSAGE = SensorMotion(0.1, -0.02, Quality.GOOD)

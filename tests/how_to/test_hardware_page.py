@@ -1,0 +1,56 @@
+"""docs/how-to/hardware.md: its commands are valid; tests/socketcan/test_stand_in.py runs them."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from firmware_sim.cli import app as ship_app
+from utank_hil.canbus import Fault
+from utank_hil.cli import app
+from utank_hil.configuration import Vessel, load_config
+
+PAGE = Path("docs/how-to/hardware.md")
+TEXT = PAGE.read_text(encoding="utf-8")
+PROGRAMS = r"(?:firmware-sim|python docs|utank-hil)"
+COMMANDS = [
+    *re.findall(rf"^{PROGRAMS}.*$", TEXT, re.M),  # of the block
+    *re.findall(rf"`({PROGRAMS}[^`]* --bus [^`]*)`", TEXT),  # in sentences
+]
+APPS = {"firmware-sim": ship_app, "utank-hil": app}
+
+
+def test_the_page_has_commands() -> None:
+    assert len(COMMANDS) == 5
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_of_the_page_gets_as_far_as_the_bus(command: str) -> None:
+    program, *words = shlex.split(re.sub(r"--bus \w+", "--bus nowhere0", command))
+    for word in words:
+        if word.startswith(("configs/", "docs/")):
+            assert Path(word).is_file(), word
+    if program == "python":
+        assert words[0] == "docs/how-to/sensors.py"
+        return
+    application: typer.Typer = APPS[program]
+    result = CliRunner(env={"TERM": "dumb", "COLUMNS": "200"}).invoke(application, words)
+    assert result.exit_code == 2
+    assert "nowhere0: not found" in result.stderr
+
+
+def test_the_version_in_the_page_is_that_of_the_ship_and_the_faults_exist() -> None:
+    version = load_config("configs/ships/thesis_first.yaml", Vessel).version
+    assert f"--configuration {version}\n" in TEXT
+    table = TEXT.partition("| fault shown | cause |")[2].split("## ")[0]
+    names = re.findall(r"[A-Z_]{6,}", "".join(re.findall(r"^\|([^|]*)\|", table, re.M)))
+    assert len(names) == 6
+    assert set(names) <= set(Fault.__members__)
+
+
+def test_links_of_the_page_lead_somewhere() -> None:
+    for link in re.findall(r"\]\(([^)#]+)", TEXT):
+        assert (PAGE.parent / link).is_file(), link
