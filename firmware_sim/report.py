@@ -220,6 +220,7 @@ def endings(result: BenchResult) -> list[str]:
         for run in result.runs
         if run.fallbacks
     ]
+    said += [f"{run.name}: the law raised {run.law_error}" for run in result.runs if run.law_error]
     for run in figures(result)[1]:
         if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
             words = fault_text(Fault[run.fault])
@@ -285,6 +286,7 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
                 "bus_load": run.bus_load,
                 "refused_commands": run.refused_commands,
                 "fallbacks": run.fallbacks,
+                "law_error": run.law_error,
                 **by_name.get(run.name, {}),
                 "loop": None if run.loop is None else run.loop.statistics.summary(),
                 "retuning": _retuning_json(result, run),

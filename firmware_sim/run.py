@@ -122,7 +122,8 @@ class Run:
     retuning : tuple of RetuningEvent
         What the controller did to retune itself.
     fallbacks : int or None
-        As `ControllerNode.fallbacks`.
+    law_error : str
+        As in `ControllerNode`.
     """
 
     name: str
@@ -133,6 +134,7 @@ class Run:
     loop: LoopResult | None = None
     retuning: tuple[RetuningEvent, ...] = ()
     fallbacks: int | None = None
+    law_error: str = ""
 
     def column(self, name: str) -> FloatArray:
         """One column of `rows`, shape (n,)."""
@@ -168,6 +170,7 @@ class ControllerRun:
     loop: LoopResult
     retuning: tuple[RetuningEvent, ...]
     fallbacks: int | None = None
+    law_error: str = ""
 
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
@@ -190,6 +193,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         ship.plant.pump_energy_j,
         retuning=controller.retuning_events,
         fallbacks=controller.fallbacks,
+        law_error=controller.law_error,
     )
 
 
@@ -211,6 +215,7 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
         loop,
         controller.retuning_events,
         controller.fallbacks,
+        controller.law_error,
     )
 
 
@@ -230,7 +235,12 @@ def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
         controller, table = _controller(job, retuner, statistics)
         loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(
-        table.rows, controller.start_ns, loop, controller.retuning_events, controller.fallbacks
+        table.rows,
+        controller.start_ns,
+        loop,
+        controller.retuning_events,
+        controller.fallbacks,
+        controller.law_error,
     )
 
 
@@ -247,6 +257,7 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         controller.loop,
         controller.retuning,
         controller.fallbacks,
+        controller.law_error,
     )
 
 

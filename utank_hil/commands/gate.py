@@ -1,8 +1,12 @@
 """The gate before the bus: a law is designed, its margins are judged, it is let in or refused."""
 
 import math
+import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
@@ -11,6 +15,10 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import located
 from utank_hil.control import BuiltLaw
 from utank_hil.parameters import ParameterError
+from utank_hil.tick import TICK_S
+
+MOST_STEP_S: Final = TICK_S / 2
+STEPS_TIMED: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +32,25 @@ class JudgedLaw:
         Designed for it.
     robustness : Robustness or None
         None where there is no loop, or none that can be judged.
+    step_s : float
+        Time that a step of the law takes here, at rest.
     """
 
     config: ControllerConfig
     law: BuiltLaw
     robustness: Robustness | None
+    step_s: float
 
     @property
     def failures(self) -> tuple[str, ...]:
         """What the law misses, in words; empty for one that may be armed."""
-        unjudged = (self.law.unjudged,) if self.law.unjudged else ()
-        return unjudged + (() if self.robustness is None else self.robustness.failures())
+        found = [self.law.unjudged] if self.law.unjudged else []
+        if self.step_s > MOST_STEP_S:
+            found.append(
+                f"a step takes {1e3 * self.step_s:.1f} ms, more than half a tick, "
+                f"{1e3 * MOST_STEP_S:g} ms: the loop would miss deadlines and end at zero pressure"
+            )
+        return (*found, *(() if self.robustness is None else self.robustness.failures()))
 
     @property
     def accepted(self) -> bool:
@@ -57,8 +73,9 @@ def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
         law = build_law(config)
     except ParameterError as error:
         fail_with(located(error, path, key))
+    step_s = _step_time_s(law)
     if law.linear is None:
-        return JudgedLaw(config, law, None)
+        return JudgedLaw(config, law, None, step_s)
     try:
         found = robustness(law.linear, config.plant, law.measured)
     except (ValueError, ArithmeticError) as error:
@@ -66,7 +83,18 @@ def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
     figures = (found.nominal.radius, found.nominal.peak_sensitivity, found.worst_radius)
     if not all(map(math.isfinite, figures)):
         fail(f"{config.name}: law: its margins can't be computed: they are not finite numbers")
-    return JudgedLaw(config, law, found)
+    return JudgedLaw(config, law, found, step_s)
+
+
+def _step_time_s(law: BuiltLaw) -> float:
+    """Least time of a few steps, the cost of the law itself on a machine with other work."""
+    controller, y = law.controller(), np.zeros(len(law.measured))
+    times = []
+    for _ in range(STEPS_TIMED):
+        begin_s = time.perf_counter()
+        controller.step(y)
+        times.append(time.perf_counter() - begin_s)
+    return min(times)
 
 
 def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:

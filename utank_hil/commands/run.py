@@ -112,6 +112,7 @@ def run(
         summary = {
             "mode": node.mode.name,
             "fault": node.fault.name,
+            "law_error": node.law_error,
             "fallbacks": node.fallbacks,
             "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
             "loop": statistics.summary(),
@@ -127,6 +128,8 @@ def run(
             soft_wrap=True,
         )
     console.print(f"ended in {node.mode.name}, fault {fault_text(node.fault)}", soft_wrap=True)
+    if node.law_error:
+        console.print(f"[red]the law raised[/red] {escape(node.law_error)}", soft_wrap=True)
     if node.fallbacks:
         console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:

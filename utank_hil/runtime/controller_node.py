@@ -108,6 +108,8 @@ class ControllerNode:
     ----------
     start_ns : int
         Time of the first tick.
+    law_error : str
+        The first exception that the law raised; empty if there was none.
 
     Raises
     ------
@@ -179,7 +181,8 @@ class ControllerNode:
         self._load_since_ns = 0
         self._bus_load = 0.0
         self._law_pa = 0.0
-        self._law_failed = False
+        self._law_failed = self._law_raised = False  # raised: until the operator resets
+        self.law_error = ""
         self._command_pa = 0.0
 
     @property
@@ -298,17 +301,46 @@ class ControllerNode:
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
+        due = self._samples.due(now_ns)
+        if due:
+            self._applied[0] = self._limiter.mean_since_last_call()
+        try:
+            self._start_anew()
+            if not due:
+                return
+            self._law_pa = self._answer(now_ns)
+            if not math.isfinite(self._law_pa):
+                self._law_failed = True
+                self._controller.reset()
+            elif not self._law_raised:
+                self._law_failed = False
+        except Exception as error:  # a law may be anybody's: whatever it raises cuts the pressure
+            self._law_failed = self._law_raised = True
+            self.law_error = self.law_error or f"{type(error).__name__}: {error}"
+        if self._law_failed:
+            self._law_pa = 0.0
+        if self._retuning is not None and self._event_sink is not None:
+            for event in self._retuning.events[self._events_told :]:
+                self._event_sink(event, self.start_ns)
+                self._events_told += 1
+
+    def _start_anew(self) -> None:
+        """Reset a law that asks for it when an operator arms or resets, and one that raised."""
         seen, anew = self._seen, self._starts_anew
         # in charge nothing but disarming and arming again brings back a law that has ended
         if anew and (seen.arm_edge or seen.reset_edge) and self._supervisor.mode is not _ACTIVE:
             anew.reset()
-        if not self._samples.due(now_ns):
-            return
-        # the law hears what really left since its last answer: anti-windup and bumpless take-over
+        if self._law_raised and seen.reset_edge:
+            self._law_raised = False
+            self._controller.reset()
+
+    def _answer(self, now_ns: int) -> float:
+        """The law's pressure for the newest measurement."""
+        # the command that left since the last answer: anti-windup and bumpless take-over
         if self._answered:
-            self._applied[0] = self._limiter.mean_since_last_call()
             self._controller.applied(self._applied)
         if self._retuning is not None:
+            seen = self._seen
             self._retuning.update(
                 now_ns,
                 self._inbox.operator,
@@ -316,16 +348,7 @@ class ControllerNode:
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )
         self._answered = True
-        answer = self._controller.step(self._measure(self._inbox, self._level))
-        self._law_pa = float(answer[0])
-        self._law_failed = not math.isfinite(self._law_pa)
-        if self._law_failed:
-            self._law_pa = 0.0
-            self._controller.reset()
-        if self._retuning is not None and self._event_sink is not None:
-            for event in self._retuning.events[self._events_told :]:
-                self._event_sink(event, self.start_ns)
-                self._events_told += 1
+        return float(self._controller.step(self._measure(self._inbox, self._level))[0])
 
     def _limit(self) -> None:
         """Turn the law's pressure, or zero, into a permitted one."""

@@ -157,9 +157,13 @@ FAULTS: Final = (
     ),
     _row(
         Fault.INTERNAL,
-        "The control law gave no finite pressure.",
+        "The control law raised an error, or gave no finite pressure.",
         "Report it with the recording and the configuration; use another law until it is mended.",
-        Condition(Reaction.STOP, "the law's answer is not finite", lambda seen, _: seen.law_failed),
+        Condition(
+            Reaction.STOP,
+            "the law raises, or its answer is not finite",
+            lambda seen, _: seen.law_failed,
+        ),
     ),
     _row(
         Fault.LEVEL_LIMIT,

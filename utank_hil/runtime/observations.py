@@ -45,7 +45,7 @@ class Observations:
     overruns_in_ten : int
         Late ticks among the last ten.
     law_failed : bool
-        The law's last answer is not finite.
+        The law raised an error, or its last answer is not finite.
     command_pa : float
         Pressure last commanded.
     requested_mode : Mode
