@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +14,8 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.controller import is_whole
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.identification.acceptance import ModelLimits
 from utank_hil.parameters import ParameterError
 from utank_hil.retuning import AdaptiveController, Retuner, Work, make_pulses
-from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask, retune
 from utank_hil.runtime.controller_node import (
     ControllerNode,
     ControllerSettings,
@@ -27,6 +26,9 @@ from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 from utank_hil.tick import TICK_S
+
+if TYPE_CHECKING:
+    from utank_hil.retuning.redesign import RetuningTask
 
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
@@ -157,18 +159,31 @@ def build_controller_node(
     )
 
 
-def retuning_task(config: ControllerConfig, order: int, limits: ModelLimits) -> RetuningTask:
+def retuning_task(
+    config: ControllerConfig, order: int, roll_period_range_s: tuple[float, float]
+) -> "RetuningTask":
     """What is to be identified and designed anew: the part of a configuration that matters to it.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+    order : int
+        Of the ARX model.
+    roll_period_range_s : tuple of float
+        Of the ships that the stability booklet covers.
 
     Raises
     ------
     ValueError
         If the law is not one that can be designed anew.
     """
+    from utank_hil.identification.acceptance import ModelLimits  # here: scipy.optimize
+    from utank_hil.retuning.redesign import RetuningTask
+
     design = config.law
     if not isinstance(design, PredictiveDesign) or "roll_rad" not in design.predictor.measured:
         raise ValueError("the configuration's law must be predictive and measure roll_rad")
-    return RetuningTask(design, config.plant, order, limits)
+    return RetuningTask(design, config.plant, order, ModelLimits(roll_period_range_s))
 
 
 def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | None:
@@ -179,7 +194,9 @@ def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | Non
     settings = config.retuning
     if settings is None:
         return None
-    task = retuning_task(config, settings.order, ModelLimits(settings.roll_period_range_s))
+    from utank_hil.retuning.redesign import LEAST_GAIN, retune  # here: scipy.optimize
+
+    task = retuning_task(config, settings.order, settings.roll_period_range_s)
     task = replace(task, least_gain=LEAST_GAIN)
     predictor = task.design.predictor
     rows = round(settings.identification_s / predictor.sample_time_s)

@@ -20,7 +20,6 @@ from utank_hil.commands.identified import (
 from utank_hil.commands.identify_report import figures, print_report
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.identification import IdentificationError
-from utank_hil.identification.acceptance import ModelLimits
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.retuning import Candidate
 from utank_hil.retuning.redesign import RetuningTask, identify, judge
@@ -111,6 +110,6 @@ def _task(config: ControllerConfig, order: int | None) -> RetuningTask:
         order = 120 if settings is None else settings.order
     period_range_s = ANY_PERIOD_S if settings is None else settings.roll_period_range_s
     try:
-        return retuning_task(config, order, ModelLimits(period_range_s))
+        return retuning_task(config, order, period_range_s)
     except ValueError as error:
         fail(error)

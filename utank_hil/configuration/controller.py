@@ -14,8 +14,8 @@ from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
-from utank_hil.identification.record_length import record_problems
 from utank_hil.parameters import Problem, refuse
+from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
 from utank_hil.runtime.safety_limits import SafetyLimits

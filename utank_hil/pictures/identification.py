@@ -14,8 +14,8 @@ from utank_hil.identification import (
     hankel_singular_values,
     stabilization,
 )
-from utank_hil.identification.record_length import first_part
 from utank_hil.pictures.style import COLORS, picture
+from utank_hil.retuning.record_length import first_part
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
 SHOWN_S = 120.0

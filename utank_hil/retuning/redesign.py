@@ -31,14 +31,14 @@ from utank_hil.identification import (
 )
 from utank_hil.identification.acceptance import ModelLimits, model_objections
 from utank_hil.identification.lag_regression import unbroken
-from utank_hil.identification.record_length import (
+from utank_hil.identification.ship_fit import ShipFit, fit_ship
+from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
+from utank_hil.retuning.record_length import (
     LAGS,
     LEAST_PREDICTIONS,
     first_part,
     record_problems,
 )
-from utank_hil.identification.ship_fit import ShipFit, fit_ship
-from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.rehearsal import RecordedWaves, Rehearsal
 
 MOST_MISSING = 0.2

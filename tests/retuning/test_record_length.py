@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.identification import okid, validate
-from utank_hil.identification.record_length import LAGS, first_part, least_samples, record_problems
+from utank_hil.retuning.record_length import LAGS, first_part, least_samples, record_problems
 
 CONFIGS = Path("configs").resolve()
 
