@@ -60,7 +60,7 @@ def firmware_sim(
     ] = "",
     json_: Json = False,
 ) -> None:
-    """Play ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
+    """Emulate ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
 
     With [bold]utank-hil run[/bold] on the same bus this is a bench. Hardware on the bus takes the
     place of nodes that are left out; without the drive, the ship's pump gives the pressure that the

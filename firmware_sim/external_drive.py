@@ -6,6 +6,7 @@ from typing import Final
 
 from firmware_sim.plant import Plant
 from utank_hil.canbus import Catalogue, DriveStatus1, Frame
+from utank_hil.tick import TICK_NS
 
 STALE_NS: Final = 60_000_000
 """Three cycles of DRIVE_STATUS_1, after which the controller too calls a drive silent."""
@@ -30,7 +31,7 @@ class ExternalDrive:
     """
 
     name = "external drive"
-    period_ns = 10_000_000
+    period_ns = TICK_NS
 
     def __init__(self, plant: Plant, catalogue: Catalogue) -> None:
         self._plant = plant

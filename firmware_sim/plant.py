@@ -1,4 +1,4 @@
-"""The ship emulator: ship, tank and pump in waves, advanced by whatever clock asks it to."""
+"""The emulated ship: ship, tank and pump in waves, integrated up to a given time."""
 
 import math
 
@@ -15,7 +15,7 @@ from utank_hil.tick import TICK_NS, TICK_S
 
 
 def _model(ship: RollShip, tank: Tank) -> FloatArray:
-    """Matrices, reservoir area and what heels the ship, as the kernel takes them."""
+    """Matrices, reservoir area and heeling accelerations in the kernel's layout, shape (4, 7)."""
     system = coupled_model(ship, tank)
     model = np.zeros((4, 7))
     model[:, :4] = system.A
@@ -28,9 +28,9 @@ def _model(ship: RollShip, tank: Tank) -> FloatArray:
 class Plant:
     """Ship, tank and pump in waves, integrated at 1 kHz.
 
-    It starts upright and at rest, at the time of the first `advance`; off-centre weight and steady
-    wind heel it from then on, and the water runs to the low side. The pump follows its set-point
-    through its own pressure loop; switched off, its rotor turns freely in the water.
+    The ship is upright and at rest at the first `advance`. Off-centre weight and steady wind heel
+    it from then on. The pump follows its set-point through its own pressure loop. Switched off, its
+    rotor turns freely in the water.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ class Plant:
         self._now_ns: int | None = None
 
     def change_ship(self, ship: RollShip, after_ns: int) -> None:
-        """Load the ship differently, some time after the start; the waves' moment stays.
+        """Set the ship's parameters from some time after the start on; the wave moment stays.
 
-        Call it before the first `advance`.
+        To be called before the first `advance`.
         """
         self._later_model = _model(ship, self._tank)
         self._change_ns = after_ns
@@ -92,12 +92,12 @@ class Plant:
         self._values = self._state.tolist()
 
     def drive_pump(self, setpoint_pa: float, *, enabled: bool) -> None:
-        """Set what the pump does from now on.
+        """Set the pump's command from now on.
 
         Parameters
         ----------
         setpoint_pa : float
-            Pressure asked for.
+            Commanded pressure.
         enabled : bool
             Whether the motor is on; if not, the rotor turns freely.
         """
@@ -105,7 +105,7 @@ class Plant:
         self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
 
     def brake_pump(self) -> None:
-        """Take the pressure away as fast as the motor can, past the loop's lag and rate limit."""
+        """Brake as fast as the motor can, without the pressure loop's lag and rate limit."""
         self.drive_pump(0.0, enabled=True)
         self._state[kernel.REFERENCE] = 0.0
 

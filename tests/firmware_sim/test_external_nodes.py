@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from foreign_nodes import (
     DATABASE,
-    MS,
     ForeignDrive,
     ForeignNode,
     ForeignPanel,
@@ -24,8 +23,8 @@ from utank_hil.configuration import load_config
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.table import Table
+from utank_hil.tick import TICK_NS
 
-TICK_NS = 10 * MS
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 RESOLUTION_PA = 8.0
 SENT = {

@@ -35,6 +35,7 @@ from utank_hil.configuration import load_config
 from utank_hil.control import LevelObserver
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.inbox import MEASURED, Inbox
+from utank_hil.tick import TICK_NS
 
 NAN = math.nan
 GOOD: dict[type, tuple[object, ...]] = {
@@ -245,7 +246,7 @@ class Listener:
     """An inbox on the bus."""
 
     name = "listener"
-    period_ns = 10_000_000
+    period_ns = TICK_NS
 
     def __init__(self) -> None:
         self.inbox = Inbox(CATALOGUE, VERSION)

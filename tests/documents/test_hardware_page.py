@@ -1,15 +1,19 @@
 """docs/how-to/hardware.md: its commands are valid; tests/socketcan/test_stand_in.py runs them."""
 
+import math
 import re
+import runpy
 import shlex
 from pathlib import Path
 
+import cantools
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from firmware_sim.cli import app as ship_app
-from utank_hil.canbus import Fault
+from utank_hil.canbus import Fault, Frame, Quality, load_catalogue
+from utank_hil.canbus.messages import DBC_NAMES
 from utank_hil.cli import app
 from utank_hil.configuration import Vessel, load_config
 
@@ -54,3 +58,20 @@ def test_the_version_in_the_page_is_that_of_the_ship_and_the_faults_exist() -> N
 def test_links_of_the_page_lead_somewhere() -> None:
     for link in re.findall(r"\]\(([^)#]+)", TEXT):
         assert (PAGE.parent / link).is_file(), link
+
+
+def test_the_stand_in_s_frames_are_accepted() -> None:
+    script = runpy.run_path("docs/how-to/sensors.py")
+    catalogue, database = load_catalogue(), cantools.database.load_file(script["DBC"])
+    assert script["catalogue_version"]() == catalogue.version
+    names = {name: kind for kind, name in DBC_NAMES.items()}
+    for name, signals in script["measurements"](3.0).items():
+        receiver, message = catalogue.receiver(names[name]), database.get_message_by_name(name)
+        for counter in (*range(1, 16), 0):
+            data = script["protected"](message, signals, counter)
+            heard = receiver.accept(Frame(message.frame_id, data))
+            assert heard is not None
+            assert heard.quality is Quality.GOOD
+        if name == "SENSOR_MOTION":
+            assert heard.roll_rad == pytest.approx(math.radians(1), abs=1e-4)
+        assert receiver.valid

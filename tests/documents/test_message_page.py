@@ -51,7 +51,7 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy2
         copy(ROOT / name, folder / name)
     apply(folder, PAGE.read_text(encoding="utf-8"))
-    run(folder, "tools.documents.catalogue")
+    run(folder, "tools.documents.write")
     return folder
 
 
@@ -74,6 +74,6 @@ def test_the_six_files_of_the_page_are_those_that_change(walked: Path) -> None:
 
 @pytest.mark.slow
 def test_the_new_message_passes_the_tests_of_the_bus_and_of_the_inbox(walked: Path) -> None:
-    run(walked, "tools.documents.catalogue", "--check")
+    run(walked, "tools.documents.write", "--check")
     of_the_bus = (f"tests/canbus/test_{name}.py" for name in ("catalogue", "codec", "e2e"))
     run(walked, "pytest", "-p", "no:cacheprovider", "tests/runtime/test_inbox.py", *of_the_bus)
