@@ -29,7 +29,7 @@ from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.analysis.capsize.survival import controlled_run
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.analysis.loop.margins import peak_sensitivity
+from utank_hil.analysis.loop.margins import radius_and_peak
 from utank_hil.arrays import FloatArray
 from utank_hil.control import (
     ClippedValve,
@@ -96,7 +96,7 @@ def growth_rows() -> Rows:
                 plant = DesignPlant(ship, tank, delay_s, lag_s).sampled(STATES, step_s)
                 row[f"{timing}: 1/s"] = math.log(closed_loop_radius(law, plant)) / step_s
                 if timing == late and row[f"{timing}: 1/s"] < 0:
-                    row["peak sensitivity then"] = peak_sensitivity(law, plant)[0]
+                    row["peak sensitivity then"] = radius_and_peak(law, plant)[1]
             found[f"{boat}, {form}"] = row
     return found
 

@@ -58,7 +58,9 @@ class JudgedLaw:
         return self.config.accept_low_margins or not self.failures
 
 
-def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
+def judge(
+    config: ControllerConfig, path: Path, key: str = "", *, with_delay_margin: bool = True
+) -> JudgedLaw:
     """Design the law of a configuration and judge its loop, or end the command with exit code 2.
 
     Parameters
@@ -68,6 +70,8 @@ def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
         The file it was read from, to name the place of what is wrong.
     key : str
         Where in that file it stands; empty for the file as a whole.
+    with_delay_margin : bool
+        As in `margins`.
     """
     try:
         law = build_law(config)
@@ -77,7 +81,9 @@ def judge(config: ControllerConfig, path: Path, key: str = "") -> JudgedLaw:
     if law.linear is None:
         return JudgedLaw(config, law, None, step_s)
     try:
-        found = robustness(law.linear, config.plant, law.measured)
+        found = robustness(
+            law.linear, config.plant, law.measured, with_delay_margin=with_delay_margin
+        )
     except (ValueError, ArithmeticError) as error:
         fail(f"{config.name}: law: its margins can't be computed: {error}")
     figures = (found.nominal.radius, found.nominal.peak_sensitivity, found.worst_radius)
@@ -99,7 +105,7 @@ def _step_time_s(law: BuiltLaw) -> float:
 
 def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
     """The law of a configuration, judged; a refused one ends the command with exit code 2."""
-    judged = judge(config, path, key)
+    judged = judge(config, path, key, with_delay_margin=False)
     for failure in judged.failures:
         notes.print(f"[yellow]{config.name}, margins:[/yellow]", failure, soft_wrap=True)
     if not judged.accepted:

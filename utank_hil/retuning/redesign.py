@@ -218,7 +218,7 @@ def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> 
     plant = found.plant(task)
     design, measured = task.design, task.design.predictor.measured
     law = design.law(plant)
-    report = robustness(law, plant, measured)
+    report = robustness(law, plant, measured, with_delay_margin=False)
     waves = RecordedWaves(record, plant, measured, law.sample_time_s)
     trial = waves.rehearse(law)
     before = None

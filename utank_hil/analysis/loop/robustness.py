@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.analysis.loop.closed_loop import closed_loop_radius
-from utank_hil.analysis.loop.margins import Margins, margins, peak_sensitivity, stability_grid
+from utank_hil.analysis.loop.margins import Margins, margins, radius_and_peak, stability_grid
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.linear import pump_model
@@ -78,6 +77,8 @@ def robustness(
     law: LinearLaw,
     plant: DesignPlant,
     measured: tuple[str, ...],
+    *,
+    with_delay_margin: bool = True,
 ) -> Robustness:
     """Judge a law on its ship, late, and on a grid of ships, pump gains and delays.
 
@@ -87,10 +88,14 @@ def robustness(
     plant : DesignPlant
     measured : tuple of str
         Outputs the law sees.
+    with_delay_margin : bool
+        As in `margins`; no requirement needs it.
     """
     delay_s, lag_s = plant.delay_s, plant.lag_s
     model = plant.model(measured)
-    late = sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
+    late_radius, late_peak = radius_and_peak(
+        law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
+    )
     variants = list(_variants(plant.ship))
     systems = [pump_model(variant, plant.tank, measured) for _, _, variant in variants]
     extra_s = (0.0, EXTRA_DELAY_S)
@@ -100,9 +105,9 @@ def robustness(
     when, which, gain = np.unravel_index(int(radii.argmax()), radii.shape)
     period_scale, inertia_scale, _ = variants[which]
     return Robustness(
-        nominal=margins(law, model, delay_s, lag_s),
-        late_radius=closed_loop_radius(law, late),
-        late_peak_sensitivity=peak_sensitivity(law, late)[0],
+        nominal=margins(law, model, delay_s, lag_s, with_delay_margin=with_delay_margin),
+        late_radius=late_radius,
+        late_peak_sensitivity=late_peak,
         worst_radius=float(radii[when, which, gain]),
         worst_period_scale=period_scale,
         worst_inertia_scale=inertia_scale,
