@@ -15,7 +15,7 @@ from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_a
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.identification.acceptance import ModelLimits
 from utank_hil.parameters import ParameterError
-from utank_hil.retuning import AdaptiveController, Retuner, Work, make_pulses
+from utank_hil.retuning import AdaptiveController, RetuneFunction, Retuner, make_pulses
 from utank_hil.retuning.redesign import LEAST_GAIN, RetuningTask, retune
 from utank_hil.runtime.controller_node import (
     ControllerNode,
@@ -171,7 +171,7 @@ def retuning_task(config: ControllerConfig, order: int, limits: ModelLimits) -> 
     return RetuningTask(design, config.plant, order, limits)
 
 
-def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | None:
+def retuner_work(config: ControllerConfig) -> tuple[RetuneFunction, tuple[int, int]] | None:
     """The retuner's work for a configuration and the shape of its longest record, if it has any.
 
     The work may be handed to another process.
