@@ -1,4 +1,4 @@
-"""The picture of an identification: does the model hold on data it has not seen."""
+"""Figure of an identification: validation of the model on data that it was not fitted to."""
 
 import math
 from pathlib import Path
@@ -15,7 +15,7 @@ from utank_hil.identification import (
     stabilization,
 )
 from utank_hil.pictures.style import COLORS, picture
-from utank_hil.retuning.record_length import first_part
+from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
 SHOWN_S = 120.0
@@ -32,10 +32,10 @@ def draw_identification(
     ----------
     record : ndarray, shape (N, 1 + m)
     found : Identification
-        Of that record.
+        Result for that record.
     task : RetuningTask
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
 
     Returns
@@ -46,7 +46,7 @@ def draw_identification(
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx
     step_s = arx.sample_time_s
-    split = first_part(len(record))
+    split = estimation_samples(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
     basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)

@@ -5,15 +5,16 @@ from dataclasses import dataclass
 import control
 import numpy as np
 import pytest
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.control import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL, WashoutLaw, design_pd
+from utank_hil.control import DesignPlant, WashoutLaw, design_pd
 from utank_hil.control.gain import GainLaw
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.transfer import state_space_response
 
@@ -92,8 +93,11 @@ def test_a_direct_path_that_destabilizes_is_judged_unstable():
     assert growth(without, plant) < 1 < growth(with_path, plant)
     assert margins(without, system, DELAY_S, LAG_S).radius < 1
     assert margins(with_path, system, DELAY_S, LAG_S).radius > 1
-    assert robustness(without, SHIP, TANK, RATE).nominal.radius < 1
-    assert "unstable on its own ship" in robustness(with_path, SHIP, TANK, RATE).failures()[0]
+    assert robustness(without, DesignPlant(SHIP, TANK), RATE).nominal.radius < 1
+    assert (
+        "unstable on its own ship"
+        in robustness(with_path, DesignPlant(SHIP, TANK), RATE).failures()[0]
+    )
     # the same matrices in the loop's count
     assert closed_loop_radius(MatrixLaw(without.model), plant) < 1
     assert closed_loop_radius(MatrixLaw(with_path.model), plant) > 1
@@ -157,9 +161,9 @@ def test_direct_paths_that_leave_the_command_undetermined_are_an_error():
     ("law", "measured"),
     [
         (design_pd(SHIP, TANK), ("level_m", "level_rate_m_s")),
-        (GPC_ROLL.law(SHIP, TANK), GPC_ROLL.predictor.measured),
-        (DPC_ROLL_LEVEL.law(SHIP, TANK), DPC_ROLL_LEVEL.predictor.measured),
-        (LQG_ROLL_RATE_LEVEL.law(SHIP, TANK), LQG_ROLL_RATE_LEVEL.predictor.measured),
+        (GPC_ROLL.law(DesignPlant(SHIP, TANK)), GPC_ROLL.predictor.measured),
+        (DPC_ROLL_LEVEL.law(DesignPlant(SHIP, TANK)), DPC_ROLL_LEVEL.predictor.measured),
+        (LQG_ROLL_RATE_LEVEL.law(DesignPlant(SHIP, TANK)), LQG_ROLL_RATE_LEVEL.predictor.measured),
     ],
     ids=["pd", "gpc", "dpc", "lqg"],
 )

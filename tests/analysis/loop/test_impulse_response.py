@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop import impulse_response
 from utank_hil.analysis.loop.closed_loop import closed_loop_eigenvalues, closed_loop_radius
@@ -16,21 +17,18 @@ from utank_hil.analysis.loop.impulse_response import (
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.control import (
-    DPC_ROLL_LEVEL,
-    GPC_ROLL,
-    LQG_ROLL_RATE_LEVEL,
     PD_MEASURED,
     ConstrainedDesign,
+    DesignPlant,
     FeedbackLinearization,
     PassiveController,
     SeaModel,
     design_pd,
 )
-from utank_hil.control.predictive.design import pump_model
 from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
@@ -47,10 +45,13 @@ LEAD_LAG = StateSpaceLaw(
 )
 LAWS = {
     "pd": (design_pd(SHIP, TANK), PD_MEASURED),
-    "gpc": (GPC_ROLL.law(SHIP, TANK), GPC_ROLL.predictor.measured),
-    "dpc": (DPC_ROLL_LEVEL.law(SHIP, TANK), DPC_ROLL_LEVEL.predictor.measured),
-    "lqg": (LQG_ROLL_RATE_LEVEL.law(SHIP, TANK), LQG_ROLL_RATE_LEVEL.predictor.measured),
-    "constrained": (CONSTRAINED.law(SHIP, TANK), CONSTRAINED.measured),
+    "gpc": (GPC_ROLL.law(DesignPlant(SHIP, TANK)), GPC_ROLL.predictor.measured),
+    "dpc": (DPC_ROLL_LEVEL.law(DesignPlant(SHIP, TANK)), DPC_ROLL_LEVEL.predictor.measured),
+    "lqg": (
+        LQG_ROLL_RATE_LEVEL.law(DesignPlant(SHIP, TANK)),
+        LQG_ROLL_RATE_LEVEL.predictor.measured,
+    ),
+    "constrained": (CONSTRAINED.law(DesignPlant(SHIP, TANK)), CONSTRAINED.measured),
     "lead-lag": (LEAD_LAG, ("roll_rate_rad_s",)),
 }
 
@@ -110,7 +111,7 @@ def test_it_is_the_law_that_was_stepped(name):
 def test_robustness_takes_it_as_any_law():
     own, measured = LAWS["gpc"]
     found, expected = (
-        robustness(law, SHIP, TANK, measured)
+        robustness(law, DesignPlant(SHIP, TANK), measured)
         for law in (impulse_response_law(own.controller, measured), own)
     )
     assert found.failures() == expected.failures() == ()
@@ -119,7 +120,7 @@ def test_robustness_takes_it_as_any_law():
 
 
 def test_of_a_static_nonlinear_law_it_is_the_slope_at_rest():
-    law = FeedbackLinearization(SHIP, TANK, 0.5, 0.3, 3.0, 3.8)
+    law = FeedbackLinearization(0.5, 0.3, 3.0, 3.8, ship=SHIP, tank=TANK)
     found = impulse_response_law(law.controller, STATES)
     slope = slope_at_rest(law.controller, 4)
     z = np.exp(1j * np.array([0.001, 0.05]))
