@@ -15,7 +15,7 @@ from utank_hil.configuration.controller import is_whole
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.parameters import ParameterError
-from utank_hil.retuning import AdaptiveController, Retuner, Work, make_pulses
+from utank_hil.retuning import AdaptiveController, RetuneFunction, Retuner, make_pulses
 from utank_hil.runtime.controller_node import (
     ControllerNode,
     ControllerSettings,
@@ -186,7 +186,7 @@ def retuning_task(
     return RetuningTask(design, config.plant, order, ModelLimits(roll_period_range_s))
 
 
-def retuner_work(config: ControllerConfig) -> tuple[Work, tuple[int, int]] | None:
+def retuner_work(config: ControllerConfig) -> tuple[RetuneFunction, tuple[int, int]] | None:
     """The retuner's work for a configuration and the shape of its longest record, if it has any.
 
     The work may be handed to another process.

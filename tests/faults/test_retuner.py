@@ -173,7 +173,7 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
         configured.controller.step = good  # type: ignore[method-assign]
     voyage.run(100)
     assert voyage.states == [IDENTIFY, DESIGN, TRIAL, REFUSED]
-    assert adaptive.laws.in_charge is configured
+    assert adaptive.laws.active is configured
     assert (voyage.node.mode, voyage.node.fault) == (Mode.ACTIVE, Fault.NONE)
     assert np.isfinite(voyage.pressures()).all()
 

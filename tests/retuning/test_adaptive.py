@@ -17,13 +17,13 @@ from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX
 from utank_hil.retuning import Candidate, Refusal
-from utank_hil.retuning.incoming import FILL_AT_ONCE, FILL_SAMPLES
-from utank_hil.retuning.law_succession import FADE_SAMPLES
+from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
+from utank_hil.retuning.law_bank import FADE_SAMPLES
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
 
-KEPT = FILL_SAMPLES + FILL_AT_ONCE
+KEPT = WARM_UP_SAMPLES + WARM_UP_CHUNK
 
 
 def candidate_with(**gains: FloatArray) -> Candidate:
@@ -118,13 +118,13 @@ def test_new_law_takes_over_without_a_bump_from_a_memory_filled_with_the_past() 
 
 def test_memory_is_filled_a_piece_at_a_sample_and_the_answers_are_faded_over() -> None:
     rig = Rig(ToyRetuner(candidate_of(2e5)), roll=lambda k, u: 0.01)
-    rig.run(2 * FILL_SAMPLES)
+    rig.run(2 * WARM_UP_SAMPLES)
     steady = rig.commands[-1]
     rig.press(retune=True)
     rig.run_until(DESIGN)
     begin = rig.samples
     rig.run_until(TRIAL)
-    assert rig.samples - begin == pytest.approx(FILL_SAMPLES / FILL_AT_ONCE, rel=0.1)
+    assert rig.samples - begin == pytest.approx(WARM_UP_SAMPLES / WARM_UP_CHUNK, rel=0.1)
     at = rig.samples - 1
     rig.run(4 * FADE_SAMPLES)
     steps = np.abs(np.diff(rig.commands[at - 1 : at + 4 * FADE_SAMPLES]))

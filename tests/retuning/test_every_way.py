@@ -11,7 +11,7 @@ from retuning_toys import QUIET, SETTINGS, Rig, ToyRetuner, candidate_of, model_
 from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX, PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, Refusal
-from utank_hil.retuning.law_succession import LawInService
+from utank_hil.retuning.law_bank import MonitoredLaw
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 BUSY = (IDENTIFY, DESIGN, TRIAL)
@@ -70,13 +70,13 @@ class EveryWay(RuleBasedStateMachine):
         self.laws = self.rig.controller.laws
         self.configured = self.laws.accepted
         self.accepted = [self.configured]  # by the events alone: the way back, newest last
-        self.on_trial: LawInService | None = None
+        self.on_trial: MonitoredLaw | None = None
         self.seen = 0
 
     def step(self) -> None:
         """One sample, and what may have changed in it."""
         rig, controller = self.rig, self.rig.controller
-        before, was_on_trial, state = self.laws.in_charge, self.laws.on_trial, controller.state
+        before, was_on_trial, state = self.laws.active, self.laws.on_trial, controller.state
         rig.run(1)
         answer = rig.commands[-1]
         assert np.isfinite(answer)
@@ -95,7 +95,7 @@ class EveryWay(RuleBasedStateMachine):
                 # out of a trial it is the one before that comes back, else the one before that
                 if self.on_trial is None:
                     self.accepted = self.accepted[:1]
-                    assert before is not self.laws.in_charge
+                    assert before is not self.laws.active
                 self.on_trial = None
             elif event.state in (IDLE, REFUSED):
                 self.on_trial = None
@@ -119,10 +119,10 @@ class EveryWay(RuleBasedStateMachine):
         if button == "undo" and self.rig.samples > 1:
             assert controller.state not in BUSY
             if state is TRIAL:
-                assert self.laws.in_charge is way_back[-1]
+                assert self.laws.active is way_back[-1]
             elif len(way_back) == 2:
                 assert on_trial is None
-                assert self.laws.in_charge is way_back[0]
+                assert self.laws.active is way_back[0]
         self.step()
 
     @rule(
@@ -186,10 +186,10 @@ class EveryWay(RuleBasedStateMachine):
     def law_in_charge_is_the_accepted_one_or_the_one_on_trial(self) -> None:
         controller = self.rig.controller
         assert self.laws.accepted is self.accepted[-1]
-        assert self.laws.in_charge is (self.on_trial or self.accepted[-1])
+        assert self.laws.active is (self.on_trial or self.accepted[-1])
         if controller.state is not TRIAL:
             assert self.laws.on_trial is None
-            assert self.laws.in_charge in self.accepted
+            assert self.laws.active in self.accepted
 
     @invariant()
     def busy_only_in_charge_and_permitted(self) -> None:
@@ -208,7 +208,7 @@ class EveryWay(RuleBasedStateMachine):
         self.roll_rad = 0.02
         self.run(60)
         assert self.rig.controller.state not in BUSY
-        assert self.laws.in_charge is self.accepted[-1]
+        assert self.laws.active is self.accepted[-1]
         answers: list[float] = []
         step = self.laws.accepted.controller.step
         self.laws.accepted.controller.step = (  # type: ignore[method-assign]

@@ -16,7 +16,7 @@ from retuning_toys import (
 )
 
 from utank_hil.canbus import RetuningState
-from utank_hil.retuning.law_succession import FADE_SAMPLES
+from utank_hil.retuning.law_bank import FADE_SAMPLES
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
@@ -116,11 +116,11 @@ def test_undo_goes_back_even_while_the_next_identification_runs(moment: Retuning
     if moment is TRIAL:
         rig.run_until(TRIAL)
         rig.press(undo=True)
-        assert rig.controller.laws.in_charge is first
+        assert rig.controller.laws.active is first
         rig.run(1)  # the button is let go
     rig.press(undo=True)
     assert rig.controller.state is UNDONE
-    assert rig.controller.laws.in_charge is configured
+    assert rig.controller.laws.active is configured
 
 
 def test_undo_before_any_law_was_accepted_gives_up_what_goes_on() -> None:
@@ -190,7 +190,7 @@ def test_reset_while_on_trial_takes_the_law_back(after: str) -> None:
         rig.engaged = False
         rig.run(3)
         rig.engaged = True
-    assert rig.controller.laws.in_charge is configured
+    assert rig.controller.laws.active is configured
     rig.run(200)
     assert rig.commands[-1] == pytest.approx(steady, rel=1e-3)
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.retuning.trial import LEAST, Effort, MovingEffort, worsening
+from utank_hil.retuning.trial import NOISE_FLOOR, MovingWindow, WindowStatistics, worsening
 
-BEFORE = Effort(0.02, 1e4, 2e4)
+BEFORE = WindowStatistics(0.02, 1e4, 2e4)
 
 
 @given(
@@ -21,33 +21,33 @@ def test_effort_is_that_of_the_latest_samples(
     rng = np.random.default_rng(seed)
     rolls = heel_rad + 0.05 * rng.standard_normal(samples)
     pressures = steady_pa + 1e4 * rng.standard_normal(samples)
-    moving = MovingEffort(window)
-    assert moving.effort == Effort(0.0, 0.0, 0.0)
+    moving = MovingWindow(window)
+    assert moving.statistics == WindowStatistics(0.0, 0.0, 0.0)
     for k, (roll, pressure) in enumerate(zip(rolls, pressures, strict=True), start=1):
         moving.add(roll, pressure)
         part = slice(max(0, k - window), k)
-        effort = moving.effort
-        assert effort.roll_rad == pytest.approx(rolls[part].std(), abs=1e-7)
-        assert effort.pressure_pa == pytest.approx(pressures[part].std(), abs=1e-2)
-        assert effort.pressure_rms_pa == pytest.approx(
+        statistics = moving.statistics
+        assert statistics.roll_rad == pytest.approx(rolls[part].std(), abs=1e-7)
+        assert statistics.pressure_pa == pytest.approx(pressures[part].std(), abs=1e-2)
+        assert statistics.pressure_rms_pa == pytest.approx(
             np.sqrt(np.mean(pressures[part] ** 2)), abs=1e-2
         )
         assert moving.full == (k >= window)
         assert moving.samples == k
     moving.clear()
-    assert moving.effort == Effort(0.0, 0.0, 0.0)
+    assert moving.statistics == WindowStatistics(0.0, 0.0, 0.0)
 
 
 def test_a_storm_leaves_nothing_behind_in_the_sums() -> None:
     rng = np.random.default_rng(1)
-    moving = MovingEffort(100)
+    moving = MovingWindow(100)
     for roll in 0.3 + 0.2 * rng.standard_normal(100_000):
         moving.add(roll, 1e5 * roll)
     calm = 1e-3 * rng.standard_normal(100)
     for roll in calm:
         moving.add(roll, 1e5 * roll)
-    assert moving.effort.roll_rad == pytest.approx(calm.std(), rel=1e-4)
-    assert moving.effort.pressure_pa == pytest.approx(1e5 * calm.std(), rel=1e-4)
+    assert moving.statistics.roll_rad == pytest.approx(calm.std(), rel=1e-4)
+    assert moving.statistics.pressure_pa == pytest.approx(1e5 * calm.std(), rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -63,12 +63,12 @@ def test_a_storm_leaves_nothing_behind_in_the_sums() -> None:
 def test_worsening_beyond_a_factor_is_named(
     roll: float, pressure: float, steady: float, words: tuple[str, ...]
 ) -> None:
-    after = Effort(0.02 * roll, 1e4 * pressure, 2e4 * steady)
+    after = WindowStatistics(0.02 * roll, 1e4 * pressure, 2e4 * steady)
     found = worsening(BEFORE, after, 1.25, 2.0)
     assert len(found) == len(words)
     assert all(word in reason for word, reason in zip(words, found, strict=True))
 
 
 def test_what_the_sensors_hardly_tell_is_no_worsening() -> None:
-    assert worsening(Effort(0.0, 0.0, 0.0), LEAST, 1.25, 2.0) == ()
-    assert worsening(Effort(0.0, 0.0, 0.0), Effort(1e-3, 0.0, 0.0), 1.25, 2.0)
+    assert worsening(WindowStatistics(0.0, 0.0, 0.0), NOISE_FLOOR, 1.25, 2.0) == ()
+    assert worsening(WindowStatistics(0.0, 0.0, 0.0), WindowStatistics(1e-3, 0.0, 0.0), 1.25, 2.0)

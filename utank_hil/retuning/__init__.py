@@ -1,10 +1,14 @@
-"""Retuning while running: what of it lives in the controller's process, and the way to the rest."""
+"""Retuning in service: identify the ship, redesign the law, and exchange it while the loop runs.
+
+Exports what the controller's process needs. Identification and design (`redesign`) run in a process
+of their own and are not imported here.
+"""
 
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
 from utank_hil.retuning.answer import Answer, Candidate, ModelSummary, Refusal
-from utank_hil.retuning.process import RetunerProcess
 from utank_hil.retuning.pulses import make_pulses
-from utank_hil.retuning.retuner import Retuner, SimulatedRetuner, Work
+from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner
+from utank_hil.retuning.retuner_process import RetunerProcess
 from utank_hil.retuning.settings import RetuningSettings
 
 __all__ = [
@@ -13,11 +17,11 @@ __all__ = [
     "Candidate",
     "ModelSummary",
     "Refusal",
+    "RetuneFunction",
     "Retuner",
     "RetunerProcess",
     "RetuningEvent",
     "RetuningSettings",
     "SimulatedRetuner",
-    "Work",
     "make_pulses",
 ]

@@ -1,7 +1,6 @@
-"""What comes of an identification: a candidate for the law, or a refusal with reasons.
+"""The retuner's answer: a candidate law, or a refusal with reasons.
 
-Both cross from one process to another as plain bytes; reading them executes nothing and accepts
-nothing that is not exactly one of the two.
+Both pass between processes as plain bytes. Decoding executes no code and rejects anything else.
 """
 
 import math
@@ -16,29 +15,29 @@ from utank_hil.control.washout import WashoutLaw
 
 _CANDIDATE: Final = b"CANDIDAT"
 _REFUSAL: Final = b"REFUSAL "
-_LONGEST: Final = 2000  # samples of past or future that a law or model may have
+_LONGEST: Final = 2000  # samples, of a law's or model's memory and of a horizon
 _REASONS_BYTES: Final = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class ModelSummary:
-    """What was identified, and what the law promises, in figures.
+    """The identified ship, and the law's predicted performance.
 
     Attributes
     ----------
     roll_period_s : float
-        Of the ship without tank water.
+        Natural roll period of the ship without tank water.
     period_deviation : float
-        Standard deviation of the period, as a part of it.
+        Relative standard deviation of that period.
     inertia_kg_m2, stiffness_nm_rad, damping_nms_rad : float
-        Of the ship.
+        Roll inertia, stiffness and linear damping of the ship.
     tank_damping_ratio : float
     held_out_fit : float
-        Least one-step fit of an output on data not used.
+        Worst one-step fit of an output on validation data.
     peak_sensitivity : float
-        Of the law on the identified ship.
+        Peak of the sensitivity function on the identified ship.
     roll_below_passive : float
-        Share by which the law makes the roll of the recorded waves less than the passive tank.
+        Relative reduction of the roll RMS in the recorded waves, against the passive tank.
     """
 
     roll_period_s: float
@@ -54,15 +53,15 @@ class ModelSummary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A law that passed every check, with the model it predicts with.
+    """A law that passed every check of the retuner, with its prediction model.
 
     Attributes
     ----------
     law : PredictiveLaw
     washout_rad_s : float
-        0 for none.
+        Corner frequency of the washout; 0 for none.
     model : ARX
-        What its predictions are judged by.
+        Prediction model, for the change monitor.
     summary : ModelSummary
     """
 
@@ -78,12 +77,12 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """No law: why.
+    """No new law.
 
     Attributes
     ----------
     reasons : tuple of str
-        At least one.
+        Why, in words; one or more.
     """
 
     reasons: tuple[str, ...]
@@ -93,7 +92,7 @@ Answer = Candidate | Refusal
 
 
 def answer_bytes(answer: Answer) -> bytes:
-    """An answer as bytes for another process."""
+    """Encode an answer for another process; long reasons are cut."""
     if isinstance(answer, Refusal):
         return _REFUSAL + "\n".join(answer.reasons).encode(errors="replace")[:_REASONS_BYTES]
     law, model = answer.law, answer.model
@@ -124,12 +123,12 @@ def answer_bytes(answer: Answer) -> bytes:
 
 
 def read_answer(data: bytes) -> Answer:
-    """The answer in `data`.
+    """Decode what `answer_bytes` encoded.
 
     Raises
     ------
     ValueError
-        If it holds anything else.
+        If `data` is anything else.
     """
     kind, content = data[:8], data[8:]
     if kind == _REFUSAL:
@@ -158,7 +157,7 @@ def read_answer(data: bytes) -> Answer:
 
 
 class _Values:
-    """Finite numbers, taken one after the other."""
+    """A cursor over an array of finite numbers."""
 
     def __init__(self, values: FloatArray) -> None:
         if not np.isfinite(values).all():
@@ -182,7 +181,7 @@ class _Values:
         return int(value)
 
     def array(self, *shape: int) -> FloatArray:
-        """The next numbers as an array of its own."""
+        """The next numbers as a new array of this shape."""
         return self.take(math.prod(shape)).reshape(shape).copy()
 
     def end(self) -> None:

@@ -1,4 +1,4 @@
-"""The latest samples of command and outputs, as the law saw them."""
+"""History of commands and outputs, as the law received them."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from utank_hil.arrays import FloatArray
 
 
 class SampleHistory:
-    """Rows (command, outputs...), oldest first, the newest `capacity` of them.
+    """The latest `capacity` rows (command, outputs...), oldest first.
 
-    Rows lie in a buffer of twice the capacity, so that the latest are always one piece of memory;
-    every `capacity` samples they are moved to its front.
+    The buffer has twice the capacity, so that the latest rows are always contiguous. Every
+    `capacity` samples they are moved to its front.
 
     Parameters
     ----------
@@ -32,16 +32,16 @@ class SampleHistory:
         self.count = 0
 
     def add(self, command_pa: float, y: FloatArray, *, fresh: bool) -> None:
-        """Take a sample.
+        """Append a sample.
 
         Parameters
         ----------
         command_pa : float
             Mean command since the sample before.
         y : ndarray, shape (m,)
-            Outputs, held from before if nothing was measured.
+            Outputs; the last ones if nothing was measured.
         fresh : bool
-            Whether it was measured.
+            Whether `y` is a new measurement.
         """
         if self._end == len(self._rows):
             kept = self.capacity - 1
@@ -56,7 +56,7 @@ class SampleHistory:
         self.count += 1
 
     def latest(self, samples: int) -> FloatArray:
-        """The latest rows, at most `samples`; a view, good until the next `add`."""
+        """The latest rows, at most `samples`; a view, valid until the next `add`."""
         return self._rows[max(0, self._end - min(samples, self.capacity)) : self._end]
 
     def record(self, samples: int) -> FloatArray:

@@ -1,10 +1,9 @@
-"""One message in shared memory: read whole or not at all, and never waited for.
+"""A mailbox for one message in shared memory; neither end ever waits.
 
 Layout, in 8-byte words: number of the message, its length in bytes, its CRC-32, the writer's
-heartbeat; then the bytes. The writer stores the number last. A reader looks at nothing else until
-it is the number it waits for, and believes the bytes when their CRC, started from the number, fits:
-a message half written or scribbled over is no message. The heartbeat is a time that the writer
-stores again and again while it lives.
+heartbeat; then the payload. The writer stores the number last. A reader polls for the number that
+it expects and accepts the payload if its CRC-32, started from the number, is right. So a message
+that is half written or damaged is not read.
 """
 
 import multiprocessing
@@ -16,12 +15,12 @@ _HEADER_WORDS: Final = 4
 
 
 class Mailbox:
-    """Either end of it; goes to a spawned process as an argument.
+    """Both ends of the mailbox; may be an argument of a spawned process.
 
     Parameters
     ----------
     capacity : int
-        Bytes of the longest message, at least.
+        Bytes of the longest message, 1 or more.
 
     Raises
     ------
@@ -33,7 +32,7 @@ class Mailbox:
         if capacity < 1:
             raise ValueError(f"a mailbox needs a capacity of a byte or more, got {capacity}")
         size = 8 * _HEADER_WORDS + capacity + -capacity % 8
-        # an anonymous mapping: gone with the last process that holds it, however that ends
+        # an anonymous mapping: freed with the last process that holds it, even a killed one
         self._memory = multiprocessing.get_context("spawn").RawArray(c_char, size)
         self.__setstate__(self._memory)
 
@@ -48,31 +47,31 @@ class Mailbox:
 
     @property
     def number(self) -> int:
-        """Number of the message that is in it, 0 if none ever was."""
+        """Number of the present message, 0 before the first."""
         return self._words[0]
 
     @property
     def beat_ns(self) -> int:
-        """The writer's latest heartbeat, 0 if there never was one."""
+        """Time of the writer's latest heartbeat in ns, 0 before the first."""
         return self._words[3]
 
     def beat(self, now_ns: int) -> None:
-        """Store a heartbeat: a time on a clock that both ends read."""
+        """Store a heartbeat; both ends must read the same clock."""
         self._words[3] = now_ns
 
     def post(self, number: int, data: bytes) -> None:
-        """Put a message in, over the one that was there.
+        """Replace the message.
 
         Parameters
         ----------
         number : int
-            Other than that of the message before; not 0.
+            Different from the last message's, and not 0.
         data : bytes
 
         Raises
         ------
         ValueError
-            If it is too long.
+            If the message is longer than the capacity.
         """
         if len(data) > len(self._bytes):
             raise ValueError(f"{len(data)} bytes are too long for a mailbox of {len(self._bytes)}")
@@ -82,7 +81,7 @@ class Mailbox:
         self._words[0] = number
 
     def read(self, number: int) -> bytes | None:
-        """Message of that number; None while it is not there, not complete, or damaged."""
+        """Message of this number; None if it is absent, incomplete or damaged."""
         words = self._words
         if words[0] != number or not 0 <= words[1] <= len(self._bytes):
             return None

@@ -1,4 +1,4 @@
-"""The pulses that an identification gives, made once before the loop begins."""
+"""The excitation of an identification, computed once before the loop begins."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from utank_hil.retuning.settings import RetuningSettings
 
 
 def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:
-    """Pulses of the chosen kind within pressure and rate, and within roll and level on this ship.
+    """Excitation of the chosen kind, within the limits of pressure, rate, roll and level.
 
-    Roll and level are those that the pulses alone cause in still water. The level limit
-    applies to the sum of waves, law and pulses, at every command; this is only its first guard.
+    Roll and level are predicted for the pulses alone, in still water on the given plant. In service
+    the limiter applies the level limit to the sum of waves, law and pulses.
 
     Returns
     -------
@@ -23,24 +23,28 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
     ValueError
         If the signal does not fit the sample time, such as a band beyond its Nyquist frequency.
     """
-    # scipy.optimize: not for every start
+    # imports scipy.optimize: slow, and needed with retuning only
     from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
     limits = plant.limits
-    within = PumpLimits(
+    pump_limits = PumpLimits(
         pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
     )
-    how_long_s, seed = settings.identification_s, settings.seed
+    duration_s, seed = settings.identification_s, settings.seed
     match settings.excitation.kind:
         case "random_pulses":
-            pulses = random_pulses(how_long_s, within, seed, settings.pulse_hold_s, sample_time_s)
+            pulses = random_pulses(
+                duration_s, pump_limits, seed, settings.pulse_hold_s, sample_time_s
+            )
         case "prbs":
-            pulses = prbs(how_long_s, within, seed, settings.pulse_hold_s[0], sample_time_s)
+            pulses = prbs(duration_s, pump_limits, seed, settings.pulse_hold_s[0], sample_time_s)
         case "multisine":
-            pulses = multisine(how_long_s, within, seed, settings.excitation.band, sample_time_s)
+            pulses = multisine(
+                duration_s, pump_limits, seed, settings.excitation.band, sample_time_s
+            )
         case "chirp":
-            pulses = chirp(how_long_s, within, settings.excitation.band, sample_time_s)
+            pulses = chirp(duration_s, pump_limits, settings.excitation.band, sample_time_s)
     sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
     model = ARX.from_state_space(sampled, len(sampled.A))
-    room = np.array([settings.added_roll_rad, limits.level_m])
-    return pulses * response_scale(pulses, model, room)
+    response_limits = np.array([settings.added_roll_rad, limits.level_m])
+    return pulses * response_scale(pulses, model, response_limits)

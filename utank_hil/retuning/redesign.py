@@ -1,8 +1,8 @@
-"""From a record to a law for the ship as she is now, or to the reasons why there is none.
+"""From a record to a law for the present ship, or to the reasons why there is none.
 
-This is the whole of the retuner's work: identify on the first part of the record, judge the model
-on the rest and against physics, design, and judge the law on the ship that was found, around her,
-and in the recorded waves.
+The retuner's whole computation. It identifies on the first part of the record and validates the
+model on the rest and against physical limits. It then designs a law and checks its margins on the
+identified ship, its robustness to deviations, and its performance in the recorded waves.
 """
 
 import dataclasses
@@ -39,40 +39,40 @@ from utank_hil.retuning.record_length import (
     first_part,
     record_problems,
 )
-from utank_hil.retuning.rehearsal import RecordedWaves, Rehearsal
+from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
 
 MOST_MISSING = 0.2
-"""Part of the samples that may be missing."""
+"""Largest share of missing samples."""
 LEAST_MOTION = (10.0, 1e-6)
-"""Spread of the command in Pa, and of each output in its unit, below which nothing happened."""
+"""Least peak-to-peak value of the command in Pa, and of each output in its unit."""
 OFFSET = 0
-"""Degree of the polynomial beside the model: a steady heel, or a sensor's bias, is no motion."""
+"""Degree of the polynomial disturbance: takes up a steady heel and the bias of a sensor."""
 LARGEST = 1e9
-"""No command or output of a ship is as large in SI units."""
+"""Bound on commands and outputs in SI units; larger values mean a wrong unit."""
 LEAST_GAIN = 0.05
-"""Part by which a new law rolls less than the configured one in the recorded waves: what a
-rehearsal hardly tells apart is not worth a swap."""
+"""Least relative reduction of the roll against the configured law: less is within the error of the
+simulation in the recorded waves."""
 ROLL_PART = 1.02
-"""Of the passive tank's roll, in the recorded waves: no law may be worse."""
+"""Largest roll in the recorded waves, relative to the passive tank's."""
 EFFORT_PART = 0.9
-"""Of the pump's greatest pressure, root mean square in the recorded waves."""
+"""Largest pressure RMS in the recorded waves, relative to the pump's greatest pressure."""
 
 
 @dataclass(frozen=True, slots=True)
 class RetuningTask:
-    """What the retuner is told once, before any record.
+    """What the retuner needs besides the record.
 
     Attributes
     ----------
     design : PredictiveDesign
-        How laws are made.
+        Design method of the laws.
     plant : DesignPlant
-        As configured: where the search begins.
+        The configured plant: start of the fit.
     order : int
-        Of the ARX model.
+        Order of the ARX model.
     limits : ModelLimits
     least_gain : float or None
-        Part by which a law must roll less than the configured one; None: they are not compared.
+        Least relative reduction of the roll against the configured law; None: not compared.
     """
 
     design: PredictiveDesign
@@ -84,15 +84,15 @@ class RetuningTask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """What was found in a record.
+    """Result of an identification.
 
     Attributes
     ----------
     okid : OkidResult
     wave_frequencies_rad_s : tuple of float
-        Of regular waves; empty in an irregular sea.
+        Frequencies of regular waves; empty in an irregular sea.
     validation : Validation
-        On held-out data.
+        On the second part of the record.
     fit : ShipFit
     """
 
@@ -102,24 +102,24 @@ class Identification:
     fit: ShipFit
 
     def plant(self, task: RetuningTask) -> DesignPlant:
-        """The configured plant with the ship and tank that were found."""
+        """The configured plant with the identified ship and tank."""
         return dataclasses.replace(task.plant, ship=self.fit.ship, tank=self.fit.tank)
 
 
 def retune(record: FloatArray, task: RetuningTask) -> Answer:
-    """Identify, design, judge.
+    """Identify the ship, design a law and check it.
 
     Parameters
     ----------
     record : ndarray, shape (N, 1 + m)
-        Mean command since the sample before, and the outputs that `task.design` names, at its
+        Mean command since the last sample, and the measured outputs of `task.design`, at its
         sample time. Outputs that are not finite are gaps.
     task : RetuningTask
 
     Returns
     -------
     Candidate or Refusal
-        Never an exception for what the record holds.
+        A refusal, not an exception, for a record that determines no model.
     """
     record = np.where(np.isfinite(record), record, np.nan)
     try:
@@ -130,23 +130,23 @@ def retune(record: FloatArray, task: RetuningTask) -> Answer:
 
 
 def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
-    """Design for what `identify` found in a record, and judge: the rest of `retune`."""
+    """Judge the result of `identify`, design a law and check it: the second half of `retune`."""
     objections = model_objections(found.validation, found.fit, task.limits)
     if objections:
         return Refusal(objections)
     try:
-        return _designed(record, found, task)
-    except ValueError as error:  # a design's demands on the ship, or an equation's (LinAlgError)
+        return _design_and_check(record, found, task)
+    except ValueError as error:  # the design fails for this ship; LinAlgError is one too
         return Refusal((str(error),))
 
 
 def identify(record: FloatArray, task: RetuningTask) -> Identification:
-    """Identify ship and tank on the first part of a record and validate on the rest.
+    """Identify ship and tank on the first part of a record and validate on the second.
 
     Raises
     ------
     ValueError
-        If the record has another number of columns than the task's signals.
+        If the number of columns does not match the task's signals.
     IdentificationError
         If it does not determine a model.
     """
@@ -169,11 +169,11 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         reasons = (f"{names[name]} {reason}" for name, reason in problems)
         raise IdentificationError("; ".join(reasons))
     split = first_part(len(record))
-    _refuse_empty(record[:split])
-    _refuse_empty(record[split:])
+    _refuse_unusable(record[:split])
+    _refuse_unusable(record[split:])
     stretches = [stop - start for start, stop in unbroken(record[split:])]
-    lost = max(task.order, LAGS)  # predictions, at the start and after every gap
-    predictions = sum(max(0, length - lost) for length in stretches)
+    skipped = max(task.order, LAGS)  # without a prediction, at the start and after every gap
+    predictions = sum(max(0, length - skipped) for length in stretches)
     if predictions < LEAST_PREDICTIONS:
         raise IdentificationError(
             f"gaps leave {predictions} predictions on held-out data, {LEAST_PREDICTIONS} are "
@@ -194,8 +194,8 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
     return Identification(result, waves, validation, fit)
 
 
-def _refuse_empty(part: FloatArray) -> None:
-    """Refuse a part of a record in which nothing is to be seen."""
+def _refuse_unusable(part: FloatArray) -> None:
+    """Refuse a part of a record with too many gaps, wrong units, or signals that do not move."""
     here = np.asarray(np.isfinite(part).all(axis=1))
     if len(part) == 0 or np.mean(~here) > MOST_MISSING:
         raise IdentificationError("too much of the record is missing: are the sensors alive?")
@@ -213,29 +213,29 @@ def _refuse_empty(part: FloatArray) -> None:
         )
 
 
-def _designed(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
-    """A law for the ship that was found, if it passes."""
+def _design_and_check(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
+    """A law for the identified ship, if it passes every check."""
     plant = found.plant(task)
     design, measured = task.design, task.design.predictor.measured
     law = design.law(plant)
     report = robustness(law, plant, measured, with_delay_margin=False)
     waves = RecordedWaves(record, plant, measured, law.sample_time_s)
-    trial = waves.rehearse(law)
+    trial = waves.simulate(law)
     before = None
     if task.least_gain is not None:
-        before = waves.rehearse(design.law(task.plant))
-    objections = (*report.failures(), *_rehearsal_objections(trial, before, task))
+        before = waves.simulate(design.law(task.plant))
+    objections = (*report.failures(), *_performance_objections(trial, before, task))
     if objections:
         return Refusal(objections)
     return Candidate(
-        *_parts(law),
+        *_split_washout(law),
         wave_arx(design.predictor, plant),
         _summary(found, report, trial),
     )
 
 
-def _rehearsal_objections(
-    trial: Rehearsal, before: Rehearsal | None, task: RetuningTask
+def _performance_objections(
+    trial: RmsResponse, before: RmsResponse | None, task: RetuningTask
 ) -> tuple[str, ...]:
     found = []
     if (
@@ -248,10 +248,10 @@ def _rehearsal_objections(
             f"the configured one {math.degrees(before.roll_rad):.2f}: less than "
             f"{task.least_gain:.0%} to gain"
         )
-    if not trial.roll_rad <= ROLL_PART * trial.passive_rad:
+    if not trial.roll_rad <= ROLL_PART * trial.passive_roll_rad:
         found.append(
             f"in the recorded waves the law rolls {math.degrees(trial.roll_rad):.2f} degrees RMS, "
-            f"the passive tank {math.degrees(trial.passive_rad):.2f}"
+            f"the passive tank {math.degrees(trial.passive_roll_rad):.2f}"
         )
     if not trial.pressure_pa <= EFFORT_PART * task.plant.limits.pressure_pa:
         found.append(
@@ -261,15 +261,15 @@ def _rehearsal_objections(
     return tuple(found)
 
 
-def _parts(law: LinearLaw) -> tuple[PredictiveLaw, float]:
-    """The predictive law within, and its washout."""
+def _split_washout(law: LinearLaw) -> tuple[PredictiveLaw, float]:
+    """The predictive law and the corner frequency of its washout, 0 for none."""
     if isinstance(law, WashoutLaw) and isinstance(law.law, PredictiveLaw):
         return law.law, law.corner_rad_s
     assert isinstance(law, PredictiveLaw)
     return law, 0.0
 
 
-def _summary(found: Identification, report: Robustness, trial: Rehearsal) -> ModelSummary:
+def _summary(found: Identification, report: Robustness, trial: RmsResponse) -> ModelSummary:
     ship = found.fit.ship
     return ModelSummary(
         roll_period_s=2 * math.pi / ship.natural_frequency_rad_s,
@@ -280,5 +280,7 @@ def _summary(found: Identification, report: Robustness, trial: Rehearsal) -> Mod
         tank_damping_ratio=found.fit.tank.damping_ratio,
         held_out_fit=float(np.min(found.validation.one_step_fit)),
         peak_sensitivity=report.nominal.peak_sensitivity,
-        roll_below_passive=1 - trial.roll_rad / trial.passive_rad if trial.passive_rad else 0.0,
+        roll_below_passive=1 - trial.roll_rad / trial.passive_roll_rad
+        if trial.passive_roll_rad
+        else 0.0,
     )

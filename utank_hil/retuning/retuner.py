@@ -1,4 +1,4 @@
-"""Who identifies and designs: what the controller sees of it, and the one for simulated time."""
+"""The retuner's interface to the controller, and an implementation for simulated time."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -6,55 +6,55 @@ from typing import Protocol
 from utank_hil.arrays import FloatArray
 from utank_hil.retuning.answer import Answer, answer_bytes, read_answer
 
-Work = Callable[[FloatArray], Answer]
-"""From a record, rows of (command, outputs...) at the law's sample time, to an answer."""
+RetuneFunction = Callable[[FloatArray], Answer]
+"""From a record, shape (N, 1 + m), rows (command, outputs...), to an answer."""
 
 
 class Retuner(Protocol):
-    """Takes records and gives answers, some time later or never."""
+    """Takes records and gives answers, some time later or never; the loop is not kept waiting."""
 
     @property
     def alive(self) -> bool:
-        """Whether a record would be worked off; known at once."""
+        """Whether a request would be answered."""
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
-        """Hand over a record under a number of its own; returns at once."""
+        """Request an answer for a record, under a new number."""
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        """The answer to that number, None as long as there is none; returns at once."""
+        """The answer to request `number`, None while there is none."""
 
 
 class SimulatedRetuner:
-    """Does the work at once and hands the answer out later: the same run, the same answer.
+    """Computes the answer at once and delivers it after a fixed latency: runs are reproducible.
 
     Parameters
     ----------
-    work : callable
+    retune : RetuneFunction
     latency_s : float
-        Simulated time that the work takes.
+        Simulated time from request to answer.
 
     Attributes
     ----------
     alive : bool
-        Always.
+        Always True.
     """
 
     alive = True
 
-    def __init__(self, work: Work, latency_s: float) -> None:
-        self._work = work
+    def __init__(self, retune: RetuneFunction, latency_s: float) -> None:
+        self._retune = retune
         self._latency_ns = round(latency_s * 1e9)
         self._number = 0
         self._ready_ns = 0
         self._answer = b""
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
-        """Do the work."""
-        self._answer = answer_bytes(self._work(record))
+        """Compute the answer."""
+        self._answer = answer_bytes(self._retune(record))
         self._number, self._ready_ns = number, now_ns + self._latency_ns
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        """Hand the answer out when its time has come."""
+        """The answer, once the latency is over."""
         if number != self._number or now_ns < self._ready_ns:
             return None
         return read_answer(self._answer)

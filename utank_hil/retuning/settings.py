@@ -1,4 +1,4 @@
-"""What a configuration says about retuning."""
+"""Settings of retuning in a controller's configuration."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,8 +8,7 @@ from utank_hil.dynamics.ship import RollLimit
 from utank_hil.parameters import Positive, Range, range_problems, refuse
 
 EARLIEST_VERDICT_S: Final = 30.0
-"""A few rolls: what a trial tells before is chance."""
-
+"""Shortest time after which a trial is judged: a few roll periods."""
 
 _SWEPT: Final = ("multisine", "chirp")
 _BAND_RAD_S: Final = (0.2, 1.2)
@@ -17,20 +16,20 @@ _BAND_RAD_S: Final = (0.2, 1.2)
 
 @dataclass(frozen=True, slots=True)
 class Excitation:
-    """What the pump gives while the ship is identified: key ``excitation`` of the section.
+    """Excitation signal of an identification: key ``excitation`` of the section.
 
     Attributes
     ----------
     kind : str
-        Of `utank_hil.identification`: ``random_pulses``, or ``prbs`` (full pressure one way or the
-        other, drawn anew after each shortest pulse), ``multisine`` or ``chirp``.
+        A function of `utank_hil.identification.excitation`; the clock of ``prbs`` is the shortest
+        pulse of `RetuningSettings.pulse_hold_s`.
     band_rad_s : tuple of float or None
-        Frequencies of multisine and chirp; None: 0.2 to 1.2 rad/s.
+        Frequency band of multisine and chirp; None: 0.2 to 1.2 rad/s.
 
     Raises
     ------
     ValueError
-        If a value is out of its range, or a band is given that is not used.
+        If a value is out of its range, or a band is given for another kind.
     """
 
     kind: Literal["random_pulses", "prbs", "multisine", "chirp"] = "random_pulses"
@@ -48,7 +47,7 @@ class Excitation:
 
     @property
     def band(self) -> tuple[float, float]:
-        """The band in use."""
+        """The frequency band, with its default."""
         return self.band_rad_s or _BAND_RAD_S
 
 
@@ -62,7 +61,7 @@ class RetuningSettings:
         Shortest and longest natural roll period of the ship's stability booklet; a model outside
         it is refused.
     order : int
-        Of the identified ARX model.
+        Order of the identified ARX model.
     identification_s : float
         Time for which pulses are given and recorded.
     pulse_pa : float
@@ -70,29 +69,28 @@ class RetuningSettings:
     pulse_hold_s : tuple of float
         Shortest and longest pulse.
     excitation : Excitation
-        What kind of signal the pulses are.
+        Signal type of the pulses.
     alone : bool
         Give the pulses without the law's pressure instead of adding them to it.
     added_roll_rad : float
         Greatest roll that the pulses alone may cause in still water, on the configured ship.
     roll_limit_rad : float
-        Roll at which identification is given up; at most what `SafetyLimits` may allow.
+        Roll at which an identification is aborted; at most the largest of `SafetyLimits`.
     every_s : float or None
-        Retune by itself so long after the last time; None: never on schedule.
+        Time between two scheduled retunings; None: no schedule.
     change_factor : float or None
-        Retune by itself when the running model's prediction errors, compared with the roll, have
-        changed by this factor since it was taken into service; None: not watched.
+        Retune when the ratio of the model's prediction error to the roll has changed by this
+        factor since the law was accepted (`ChangeMonitor`); None: not monitored.
     trial_s : float
-        Time for which a new law is on trial, and the old one's is remembered for comparison: from
-        `EARLIEST_VERDICT_S` to an hour, beyond which a sea is not the same any more.
+        Length of a trial and of the old law's window that it is compared with: from
+        `EARLIEST_VERDICT_S` to one hour, in which a sea may be taken as stationary.
     roll_factor, effort_factor : float
-        A new law is taken back when roll or pressure, root mean square over the trial, exceed the
-        old law's by this factor.
+        A law on trial is dropped when its roll or pressure RMS exceeds the old law's by this
+        factor.
     answer_within_s : float
-        Longest time identification and design may take, ten minutes at most: they take seconds,
-        and what hangs is not to go unnoticed.
+        Timeout of identification and design, 600 s at most; they take seconds.
     seed : int
-        Of the pulses.
+        Seed of the pulses.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Is the new law better than the old one: roll and pressure before and after."""
+"""Comparison of a law on trial with the law before: roll and pressure over equal windows."""
 
 import math
 from typing import Final, NamedTuple
@@ -6,18 +6,17 @@ from typing import Final, NamedTuple
 import numpy as np
 
 
-class Effort(NamedTuple):
-    """What some time took.
+class WindowStatistics(NamedTuple):
+    """Roll and pressure over a window.
 
     Attributes
     ----------
     roll_rad : float
-        Standard deviation: a steady heel, the same with either law, would hide how much more she
-        rolls.
+        Standard deviation. A steady heel, the same with either law, would mask a change in roll.
     pressure_pa : float
         Standard deviation.
     pressure_rms_pa : float
-        Root mean square, with the steady part: that costs power, and may heel her.
+        Root mean square, with the steady part, which costs power and may heel the ship.
     """
 
     roll_rad: float
@@ -25,12 +24,12 @@ class Effort(NamedTuple):
     pressure_rms_pa: float
 
 
-LEAST: Final = Effort(1e-4, 100.0, 100.0)
-"""A few steps of the sensors: so much is nothing to compare with."""
+NOISE_FLOOR: Final = WindowStatistics(1e-4, 100.0, 100.0)
+"""A few quantization steps of the sensors: smaller baselines count as this."""
 
 
-class MovingEffort:
-    """Effort over the latest samples, from running sums.
+class MovingWindow:
+    """Roll and pressure of the latest samples, as running sums.
 
     Parameters
     ----------
@@ -40,7 +39,7 @@ class MovingEffort:
     Attributes
     ----------
     samples : int
-        Taken since the start or the last `clear`.
+        Samples since the start or the last `clear`.
     """
 
     def __init__(self, samples: int) -> None:
@@ -48,18 +47,18 @@ class MovingEffort:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Discard all samples."""
         self.samples = 0
         self._roll = self._roll_square = 0.0
         self._pressure = self._pressure_square = 0.0
 
     def add(self, roll_rad: float, pressure_pa: float) -> None:
-        """Take a sample."""
+        """Append a sample; the oldest leaves a full window."""
         row = self._rows[self.samples % len(self._rows)]
         if self.full:
-            self._count(float(row[0]), float(row[1]), -1.0)
+            self._add_to_sums(float(row[0]), float(row[1]), -1.0)
         row[0], row[1] = roll_rad, pressure_pa
-        self._count(roll_rad, pressure_pa, 1.0)
+        self._add_to_sums(roll_rad, pressure_pa, 1.0)
         self.samples += 1
 
     @property
@@ -68,16 +67,16 @@ class MovingEffort:
         return self.samples >= len(self._rows)
 
     @property
-    def effort(self) -> Effort:
-        """Over what is in the window; zero if nothing is."""
+    def statistics(self) -> WindowStatistics:
+        """Statistics of the samples in the window; zero if there are none."""
         count = max(1, min(self.samples, len(self._rows)))
-        return Effort(
+        return WindowStatistics(
             _deviation(self._roll, self._roll_square, count),
             _deviation(self._pressure, self._pressure_square, count),
             math.sqrt(max(0.0, self._pressure_square / count)),
         )
 
-    def _count(self, roll_rad: float, pressure_pa: float, sign: float) -> None:
+    def _add_to_sums(self, roll_rad: float, pressure_pa: float, sign: float) -> None:
         self._roll += sign * roll_rad
         self._roll_square += sign * roll_rad * roll_rad
         self._pressure += sign * pressure_pa
@@ -85,10 +84,10 @@ class MovingEffort:
 
 
 def worsening(
-    before: Effort, after: Effort, roll_factor: float, effort_factor: float
+    before: WindowStatistics, after: WindowStatistics, roll_factor: float, effort_factor: float
 ) -> tuple[str, ...]:
-    """What got worse by more than the factors, in words; empty if nothing did."""
-    before = Effort(*map(max, before, LEAST))
+    """What is worse by more than the factors, in words; empty if nothing is."""
+    before = WindowStatistics(*map(max, before, NOISE_FLOOR))
     found = []
     if after.roll_rad > roll_factor * before.roll_rad:
         found.append(

@@ -1,8 +1,8 @@
-"""The two processes of the retuner: the one that works off orders, and the one that keeps it alive.
+"""The retuner's two processes: a worker that answers requests, and a watchdog that restarts it.
 
-What was ordered and what is answered stands in the mailboxes alone: an order is open while its
-number is not the answer's. So a new worker knows what there is to do, and an order that its worker
-did not survive is answered by the keeper and not tried again.
+The mailboxes hold the only state: a request is open while its number differs from the answer's. So
+a new worker finds an open request by itself. A request that killed its worker is refused by the
+watchdog and not tried again.
 """
 
 import os
@@ -16,35 +16,39 @@ import numpy as np
 
 from utank_hil.retuning.answer import Refusal, answer_bytes
 from utank_hil.retuning.mailbox import Mailbox
-from utank_hil.retuning.retuner import Work
+from utank_hil.retuning.retuner import RetuneFunction
 
-_LOOK_S: Final = 0.1
-_PAUSE_S: Final = 1.0  # before a worker that has ended is replaced
+_POLL_S: Final = 0.1
+_RESTART_DELAY_S: Final = 1.0  # after a worker has ended
 _NICENESS: Final = 10
 _SECOND_NS: Final = 1_000_000_000
 
 
-def keep(
-    work: Work, orders: Mailbox, answers: Mailbox, parent_pid: int, hangs_after_s: float
+def run_watchdog(
+    retune: RetuneFunction,
+    requests: Mailbox,
+    answers: Mailbox,
+    parent_pid: int,
+    hangs_after_s: float,
 ) -> None:
-    """Keep a worker alive until the parent is gone; the whole life of the keeper."""
-    os.setpgid(0, 0)  # Ctrl-C is for the loop, which ends this group
+    """Main function of the watchdog: run a worker until the parent is gone."""
+    os.setpgid(0, 0)  # out of reach of Ctrl-C: the loop ends this group
     os.nice(_NICENESS)
-    keeper_pid = os.getpid()
+    watchdog_pid = os.getpid()
     while os.getppid() == parent_pid:
-        worker_pid = os.fork()  # this process has one thread and holds nothing but the mailboxes
+        worker_pid = os.fork()  # safe: one thread, and no resources but the mailboxes
         if worker_pid == 0:
             try:
-                serve(work, orders, answers, keeper_pid)
+                run_worker(retune, requests, answers, watchdog_pid)
             except BaseException:
                 traceback.print_exc(file=sys.stderr)
             finally:
                 os._exit(1)
         end = _watch(worker_pid, answers, parent_pid, hangs_after_s)
-        number = orders.number
+        number = requests.number
         if end is not None and number != answers.number:
             answers.post(number, answer_bytes(Refusal((f"the retuner {end}, and was restarted",))))
-        time.sleep(_PAUSE_S)
+        time.sleep(_RESTART_DELAY_S)
 
 
 def _watch(worker_pid: int, answers: Mailbox, parent_pid: int, hangs_after_s: float) -> str | None:
@@ -59,7 +63,7 @@ def _watch(worker_pid: int, answers: Mailbox, parent_pid: int, hangs_after_s: fl
         if silent_ns > hangs_after_s * _SECOND_NS:
             _kill(worker_pid)
             return f"was busy for more than {hangs_after_s:g} s"
-        time.sleep(_LOOK_S)
+        time.sleep(_POLL_S)
     _kill(worker_pid)
     return None
 
@@ -69,23 +73,25 @@ def _kill(pid: int) -> None:
     os.waitpid(pid, 0)
 
 
-def serve(work: Work, orders: Mailbox, answers: Mailbox, keeper_pid: int) -> None:
-    """Work off orders until the keeper is gone; the whole life of a worker."""
-    while os.getppid() == keeper_pid:
+def run_worker(
+    retune: RetuneFunction, requests: Mailbox, answers: Mailbox, watchdog_pid: int
+) -> None:
+    """Main function of a worker: answer requests until the watchdog is gone."""
+    while os.getppid() == watchdog_pid:
         answers.beat(time.monotonic_ns())
-        number = orders.number
-        data = orders.read(number) if number != answers.number else None
+        number = requests.number
+        data = requests.read(number) if number != answers.number else None
         if data is None:
-            time.sleep(_LOOK_S)
+            time.sleep(_POLL_S)
         else:
-            _work_off(work, number, data, answers)
+            _answer_request(retune, number, data, answers)
 
 
-def _work_off(work: Work, number: int, data: bytes, answers: Mailbox) -> None:
-    """Answer an order; work that fails is a refusal, and tells where in the error output."""
+def _answer_request(retune: RetuneFunction, number: int, data: bytes, answers: Mailbox) -> None:
+    """Answer a request; an exception becomes a refusal, with its traceback on standard error."""
     try:
         values = np.frombuffer(data)
-        answers.post(number, answer_bytes(work(values[1:].reshape(-1, int(values[0])))))
+        answers.post(number, answer_bytes(retune(values[1:].reshape(-1, int(values[0])))))
     except Exception as error:
         traceback.print_exc(file=sys.stderr)
         refusal = Refusal((f"the retuner failed: {type(error).__name__}: {error}",))

@@ -1,13 +1,13 @@
-"""The retuner as a process of its own: records go there and answers come back through mailboxes.
+"""The retuner in processes of its own: records go out and answers come back through mailboxes.
 
-The controller's loop writes one mailbox and looks at one number of the other; that is all that
-connects them. The process may hang, die or write nonsense: the number never comes, or its message
-is refused, and the controller goes on with the law it has. There are two of them:
+The controller's loop writes one mailbox and polls one number of the other. There is no other
+connection, so the loop never waits. If the retuner hangs, dies or writes nonsense, the number never
+arrives or the message is refused, and the controller keeps its law. There are two processes:
 
-    keeper   started before the loop; forks the worker, and forks it anew when it has died or hangs
-    worker   beats its heart between orders, and works them off
+    watchdog   started before the loop; forks the worker, again whenever it has died or hangs
+    worker     stores heartbeats while idle, and answers requests
 
-Neither needs the loop for that, nor the loop them: it asks for a heartbeat before it begins.
+A retuning begins only while the worker's heartbeat is recent.
 """
 
 import multiprocessing
@@ -24,46 +24,49 @@ from utank_hil.closing import Closing
 from utank_hil.one_thread import one_thread_each
 from utank_hil.retuning.answer import Answer, Refusal, read_answer
 from utank_hil.retuning.mailbox import Mailbox
-from utank_hil.retuning.retuner import Work
-from utank_hil.retuning.worker import keep
+from utank_hil.retuning.retuner import RetuneFunction
+from utank_hil.retuning.worker import run_watchdog
 
 _ANSWER_BYTES: Final = 1 << 20
 _START_S: Final = 30.0
-_ALIVE_NS: Final = 5_000_000_000  # a nice process on a busy machine may have to wait for its turn
+_ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
 _HANGS_S: Final = 600.0
 _END_S: Final = 2.0
 
 
 class RetunerProcess(Closing):
-    """A `Retuner` in a process of its own; start it before the loop.
+    """A `Retuner` in processes of its own; start it before the loop.
 
-    It is ready when the constructor returns. If it does not come up, the constructor returns too,
-    after half a minute: the loop goes on with the law it has, and refuses to begin.
+    It is ready when the constructor returns. If it does not start within half a minute, the
+    constructor returns as well; `alive` is then False and no retuning begins.
 
     Parameters
     ----------
-    work : callable
+    retune : RetuneFunction
         Importable in another process (a function, or a `functools.partial` of one).
     longest_record : tuple of int
         Rows and columns of the longest record.
     hangs_after_s : float
-        A worker that is busy for longer is killed, and another takes its place.
+        A worker that is busy for longer is killed and replaced.
 
     Attributes
     ----------
     pid : int
-        Of the keeper, and of the process group that both are in.
+        Process id of the watchdog, and id of the process group of both.
     """
 
     def __init__(
-        self, work: Work, longest_record: tuple[int, int], hangs_after_s: float = _HANGS_S
+        self,
+        retune: RetuneFunction,
+        longest_record: tuple[int, int],
+        hangs_after_s: float = _HANGS_S,
     ) -> None:
         rows, columns = longest_record
-        self._orders = Mailbox(8 * (rows * columns + 1))
+        self._requests = Mailbox(8 * (rows * columns + 1))
         self._answers = Mailbox(_ANSWER_BYTES)
         self._process = multiprocessing.get_context("spawn").Process(
-            target=keep,
-            args=(work, self._orders, self._answers, os.getpid(), hangs_after_s),
+            target=run_watchdog,
+            args=(retune, self._requests, self._answers, os.getpid(), hangs_after_s),
             daemon=True,
         )
         with one_thread_each():
@@ -77,15 +80,15 @@ class RetunerProcess(Closing):
 
     @property
     def alive(self) -> bool:
-        """Whether the worker's heart beats."""
+        """Whether the worker's heartbeat is recent."""
         return abs(time.monotonic_ns() - self._answers.beat_ns) < _ALIVE_NS
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:  # noqa: ARG002
-        """Hand over a record."""
-        self._orders.post(number, np.float64(record.shape[1]).tobytes() + record.tobytes())
+        """Post a record."""
+        self._requests.post(number, np.float64(record.shape[1]).tobytes() + record.tobytes())
 
     def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
-        """The answer, if it is there; what is not an answer counts as a refusal."""
+        """The answer, if it has arrived; a message that cannot be decoded is a refusal."""
         data = self._answers.read(number)
         if data is None:
             return None
@@ -99,7 +102,7 @@ class RetunerProcess(Closing):
         if self._closed:
             return
         self._closed = True
-        with suppress(ProcessLookupError):  # the keeper has not made the group yet, or all are gone
+        with suppress(ProcessLookupError):  # no group yet, or no process left
             os.killpg(self.pid, signal.SIGKILL)
         self._process.kill()
         self._process.join(_END_S)

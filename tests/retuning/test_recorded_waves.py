@@ -10,7 +10,7 @@ from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.linear import STATES, coupled_model, state_matrices
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.retuning.rehearsal import RecordedWaves, tank_motion
+from utank_hil.retuning.recorded_waves import RecordedWaves, tank_motion
 
 MEASURED = ("roll_rad", "level_m")
 PLANT = sample(pump_model(CONFIGURED, TANK, MEASURED), 0.2, DELAY_S, LAG_S)
@@ -42,12 +42,12 @@ def _waves(
 
 
 @pytest.mark.parametrize("pressure_pa", [0.0, 1e4])
-def test_rehearsed_roll_is_that_of_the_frequency_response(pressure_pa: float) -> None:
+def test_simulated_roll_is_that_of_the_frequency_response(pressure_pa: float) -> None:
     model = coupled_model(CONFIGURED, TANK)
     passive = closed_loop_response(None, model, MEASURED, OMEGA)[0][0, 0]
     motions, pressure = closed_loop_response(LAW, model, MEASURED, OMEGA, DELAY_S, LAG_S)
-    result = _waves(_record(pressure_pa), UNLIMITED).rehearse(LAW)
-    assert result.passive_rad == pytest.approx(1e7 * abs(passive) / np.sqrt(2), rel=0.01)
+    result = _waves(_record(pressure_pa), UNLIMITED).simulate(LAW)
+    assert result.passive_roll_rad == pytest.approx(1e7 * abs(passive) / np.sqrt(2), rel=0.01)
     assert result.roll_rad == pytest.approx(1e7 * abs(motions[0, 0]) / np.sqrt(2), rel=0.02)
     assert result.pressure_pa == pytest.approx(1e7 * abs(pressure[0]) / np.sqrt(2), rel=0.02)
 
@@ -55,9 +55,9 @@ def test_rehearsed_roll_is_that_of_the_frequency_response(pressure_pa: float) ->
 def test_pressure_limit_holds_and_a_gap_is_bridged() -> None:
     record = _record(0.0)
     record[2000:2010] = np.nan
-    result = _waves(record, PumpLimits(pressure_pa=100.0)).rehearse(LAW)
+    result = _waves(record, PumpLimits(pressure_pa=100.0)).simulate(LAW)
     assert result.pressure_pa <= 100.0
-    assert result.roll_rad == pytest.approx(result.passive_rad, rel=0.05)
+    assert result.roll_rad == pytest.approx(result.passive_roll_rad, rel=0.05)
 
 
 def _sailed(
@@ -105,7 +105,7 @@ def _storm_nm(ship: RollShip, seed: int) -> FloatArray:
     ("period_s", "outputs", "size", "limits_matter"),
     [(7.5, 1, 1.0, False), (7.5, 2, 1.8, False), (12.57, 1, 1.8, True), (10.0, 2, 1.4, True)],
 )
-def test_rehearsal_through_the_limits_foretells_the_voyage(
+def test_simulation_through_the_limits_predicts_the_voyage(
     period_s: float, outputs: int, size: float, limits_matter: bool
 ) -> None:
     ship, measured = ship_of(period_s), MEASURED[:outputs]
@@ -115,12 +115,12 @@ def test_rehearsal_through_the_limits_foretells_the_voyage(
     record = np.column_stack([np.zeros(len(passive)), passive[:, [0, 2][:outputs]]])
     law = design.law(DesignPlant(CONFIGURED, TANK))
     truth = np.sqrt(np.mean(_sailed(ship, law, measured, moment_nm)[300:, 0] ** 2))
-    assert _waves(record, PumpLimits(), ship, measured).rehearse(law).roll_rad == pytest.approx(
+    assert _waves(record, PumpLimits(), ship, measured).simulate(law).roll_rad == pytest.approx(
         truth, rel=0.01
     )
     free = (
         _waves(record, PumpLimits(rate_pa_s=1e9, level_m=1e3), ship, measured)
-        .rehearse(law)
+        .simulate(law)
         .roll_rad
     )
     assert bool(free < 0.9 * truth) is limits_matter

@@ -11,7 +11,7 @@ import pytest
 from retuning_toys import candidate_of
 
 from utank_hil.arrays import FloatArray
-from utank_hil.retuning import Answer, Candidate, Refusal, RetunerProcess, Work
+from utank_hil.retuning import Answer, Candidate, Refusal, RetuneFunction, RetunerProcess
 
 RECORD = np.arange(12.0).reshape(6, 2)
 SHAPE = (100, 2)
@@ -52,7 +52,7 @@ def answers_with_too_much(record: FloatArray) -> Answer:
 
 
 @contextmanager
-def running(work: Work, hangs_after_s: float = 600.0) -> Iterator[RetunerProcess]:
+def running(work: RetuneFunction, hangs_after_s: float = 600.0) -> Iterator[RetunerProcess]:
     with RetunerProcess(work, SHAPE, hangs_after_s) as retuner:
         yield retuner
     assert not _alive(retuner.pid)

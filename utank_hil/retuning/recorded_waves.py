@@ -1,10 +1,9 @@
-"""What a law would have done in recorded waves: the record replayed with another law.
+"""Simulation of a law in the waves of a record.
 
-What the pump did to the outputs is taken off the record with the ship's model; what is left came
-from the waves. The loop is then closed anew on model and waves, through the limiter that stands
-between law and pump: in a storm it decides more than the law does. The level it looks at follows
-from the roll, measured or not: the water moves by the tank's own equation, the ship's motion being
-its input.
+The pump's part of the outputs is computed with the ship's model and subtracted; the rest is due to
+the waves. The loop is then closed on model and waves, with the limiter between law and pump, which
+decides more than the law in a storm. The limiter's level is computed from the roll with the tank's
+equation of motion, whether the level was measured or not.
 """
 
 import math
@@ -21,44 +20,44 @@ from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
-COMMANDS: Final = 10
-"""In a sample time of 0.2 s: the limiter's brake on the level does not wait for the next sample."""
+SUBSTEPS: Final = 10
+"""Limiter steps in a sample time of the law: the level barrier acts between samples as well."""
 _WATER: Final = [STATES.index("level_m"), STATES.index("level_rate_m_s")]
-_SETTLING_S: Final = 60.0  # in which the model forgets that it began at rest
-_HIGHEST_RAD_S: Final = 2.5  # above it there are no waves, and differentiation finds noise
+_SETTLING_S: Final = 60.0  # transient of the start at rest; left out of the RMS
+_HIGHEST_RAD_S: Final = 2.5  # above: no waves, and differentiation amplifies noise
 
 
-class Rehearsal(NamedTuple):
-    """Root mean square over the record.
+class RmsResponse(NamedTuple):
+    """Root mean squares over the record.
 
     Attributes
     ----------
-    passive_rad : float
-        Roll with the pump at zero.
+    passive_roll_rad : float
+        Roll with the pump at zero pressure.
     roll_rad : float
         Roll with the law.
     pressure_pa : float
-        Pressure of the law, limited.
+        Pressure of the law, after the limiter.
     """
 
-    passive_rad: float
+    passive_roll_rad: float
     roll_rad: float
     pressure_pa: float
 
 
 class RecordedWaves:
-    """The waves of a record, to rehearse laws in.
+    """The wave-induced part of a record, as a disturbance to simulate laws with.
 
     Parameters
     ----------
     record : ndarray, shape (N, 1 + m)
         Command and outputs; gaps are NaN.
     plant : DesignPlant
-        Of the record.
+        Ship, tank, loop and limits at the time of the record.
     measured : tuple of str
-        The outputs by name, ``roll_rad`` among them.
+        Names of the outputs, ``roll_rad`` among them.
     sample_time_s : float
-        Of the record.
+        Sample time of the record.
     """
 
     def __init__(
@@ -71,33 +70,33 @@ class RecordedWaves:
         self._limits, self._tank = plant.limits, plant.tank
         self._measured = [STATES.index(name) for name in measured]
         self._roll = measured.index("roll_rad")
-        self._plant = plant.sampled(STATES, sample_time_s / COMMANDS)
+        self._plant = plant.sampled(STATES, sample_time_s / SUBSTEPS)
         slow = plant.sampled(STATES, sample_time_s)
-        pushed = _response(slow, np.nan_to_num(record[:, 0]))[:, self._measured]
-        waves = record[:, 1:] - pushed
-        # through a gap the waves are taken as they were
+        pump_response = _response(slow, np.nan_to_num(record[:, 0]))[:, self._measured]
+        waves = record[:, 1:] - pump_response
+        # gaps hold the last value
         here = np.isfinite(waves).all(axis=1)
         last = np.maximum.accumulate(np.where(here, np.arange(len(waves)), 0))
         waves = np.nan_to_num(waves[last])
         self._waves = waves - waves.mean(axis=0)
         roll_rad = self._waves[:, self._roll]
-        self._levels = tank_motion(plant.ship, plant.tank, roll_rad, sample_time_s, COMMANDS)
+        self._levels = tank_motion(plant.ship, plant.tank, roll_rad, sample_time_s, SUBSTEPS)
         self._first = min(round(_SETTLING_S / sample_time_s), len(record) // 2)
 
-    def rehearse(self, law: LinearLaw) -> Rehearsal:
-        """Let a law of one input meet the waves.
+    def simulate(self, law: LinearLaw) -> RmsResponse:
+        """Simulate the closed loop of a law in the waves.
 
         Parameters
         ----------
         law : LinearLaw
-            For the record's outputs at its sample time.
+            For the record's outputs at its sample time, with one command.
         """
         plant, controller = self._plant, law.controller()
         limiter = CommandLimiter(self._limits, self._tank, plant.dt)
         state = np.zeros(len(plant.A))
         sums = np.zeros(2)
         for k, (waves, levels) in enumerate(
-            zip(self._waves, self._levels.reshape(len(self._waves), COMMANDS, 2), strict=True)
+            zip(self._waves, self._levels.reshape(len(self._waves), SUBSTEPS, 2), strict=True)
         ):
             applied = np.full(1, limiter.mean_since_last_call())
             y = (plant.C @ state + plant.D[:, 0] * limiter.command_pa)[self._measured] + waves
@@ -112,7 +111,7 @@ class RecordedWaves:
                 sums += y[self._roll] ** 2, applied[0] ** 2
         samples = max(1, len(self._waves) - self._first)
         roll_square, pressure_square = (sums / samples).tolist()
-        return Rehearsal(
+        return RmsResponse(
             float(np.sqrt(np.mean(self._waves[self._first :, self._roll] ** 2))),
             math.sqrt(roll_square),
             math.sqrt(pressure_square),
@@ -120,22 +119,23 @@ class RecordedWaves:
 
 
 def tank_motion(
-    ship: RollShip, tank: Tank, roll_rad: FloatArray, sample_time_s: float, finer: int = 1
+    ship: RollShip, tank: Tank, roll_rad: FloatArray, sample_time_s: float, substeps: int = 1
 ) -> FloatArray:
-    """Level and its rate that a roll drives in the passive tank, shape (N finer, 2).
+    """Level (m) and level rate (m/s) of the passive tank for a given roll, shape (N substeps, 2).
 
-    The second row of the coupled equations, with the first's motion given, in the frequency domain;
-    true after the tank's own swing has died away. Between the samples it is the band-limited
-    interpolation.
+    The level's equation of the linear model, solved in the frequency domain: the steady-state
+    response, without the transient. Between samples it is the band-limited interpolation.
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     s = 2j * np.pi * np.fft.rfftfreq(len(roll_rad), sample_time_s)
-    driven, own = (
+    coupling, level_dynamics = (
         mass[1, column] * s**2 + damping[1, column] * s + stiffness[1, column] for column in (0, 1)
     )
-    level = np.where(np.abs(s) < _HIGHEST_RAD_S, -driven / own * np.fft.rfft(roll_rad), 0.0)
-    samples = finer * len(roll_rad)
-    return np.column_stack([finer * np.fft.irfft(part, samples) for part in (level, s * level)])
+    level = np.where(
+        np.abs(s) < _HIGHEST_RAD_S, -coupling / level_dynamics * np.fft.rfft(roll_rad), 0.0
+    )
+    samples = substeps * len(roll_rad)
+    return np.column_stack([substeps * np.fft.irfft(part, samples) for part in (level, s * level)])
 
 
 def _response(plant: LinearModel, command: FloatArray) -> FloatArray:

@@ -1,0 +1,112 @@
+"""Admission of a candidate law before its trial: bounds on its gains, and warm-up of its memory."""
+
+from typing import Final
+
+import numpy as np
+
+from utank_hil.control import LinearLaw
+from utank_hil.retuning.answer import Candidate
+from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.law_bank import MonitoredLaw
+
+WARM_UP_SAMPLES: Final = 1000
+"""Past samples that a new law is stepped through: more than the memory of any law or washout."""
+WARM_UP_CHUNK: Final = 50
+"""Samples of the warm-up done in one sample time."""
+GAIN_FACTOR: Final = 30.0
+"""Largest gains of a candidate, relative to the configured law's."""
+
+
+class Admission:
+    """Conditions on a candidate: the same signals and sample time, and bounded gains.
+
+    Bounded gains mean bounded commands. The law feeds back the applied commands, which the pump's
+    limit bounds, and the outputs.
+
+    Parameters
+    ----------
+    configured : LinearLaw
+        Reference for the bounds on the gains.
+    history : SampleHistory
+        Samples for the warm-up and for the candidate's prediction model.
+    roll : int
+        Index of the roll among the outputs.
+    """
+
+    def __init__(self, configured: LinearLaw, history: SampleHistory, roll: int) -> None:
+        self._history = history
+        self._roll = roll
+        self._sample_time_s = configured.sample_time_s
+        on_commands, outputs = _gains(configured)
+        self._most_on_commands = GAIN_FACTOR * max(1.0, on_commands)
+        self._most_on_outputs = GAIN_FACTOR * outputs
+
+    def admit(self, candidate: Candidate) -> "WarmUp | str":
+        """Warm-up of the candidate's law, or the reason why it is not admitted."""
+        outputs, model = self._history.outputs, candidate.model
+        if candidate.law.output_gains.shape[1:] != (1, outputs):
+            return "the law is for other signals"
+        if (model.outputs, model.inputs) != (outputs, 1):
+            return "the law's model is for other signals"
+        if model.order > self._history.capacity:
+            return (
+                f"the law's model looks back {model.order} samples, {self._history.capacity} are "
+                "kept"
+            )
+        try:
+            law = candidate.whole_law()
+        except ValueError as error:
+            return str(error)
+        if law.sample_time_s != self._sample_time_s:
+            return f"the law's sample time is {law.sample_time_s} s"
+        on_commands, on_outputs = _gains(law)
+        if not (on_commands <= self._most_on_commands and on_outputs <= self._most_on_outputs):
+            return "the law's gains are out of bounds"
+        service = MonitoredLaw(law.controller(), ChangeMonitor(model, self._roll))
+        return WarmUp(service, self._history)
+
+
+class WarmUp:
+    """Steps a new law through past samples, a chunk at each sample time.
+
+    Parameters
+    ----------
+    law : MonitoredLaw
+    history : SampleHistory
+
+    Attributes
+    ----------
+    law : MonitoredLaw
+    """
+
+    def __init__(self, law: MonitoredLaw, history: SampleHistory) -> None:
+        self.law = law
+        self._history = history
+        self._stepped = max(0, history.count - WARM_UP_SAMPLES)
+
+    @property
+    def done(self) -> bool:
+        """Whether the law has been stepped through all samples."""
+        return self._stepped == self._history.count
+
+    def advance(self) -> None:
+        """Step the law through the next chunk."""
+        controller, missing = self.law.controller, self._history.count - self._stepped
+        rows = self._history.latest(missing)[:WARM_UP_CHUNK]
+        for row in rows:
+            controller.applied(row[:1])
+            controller.step(row[1:])
+        self._stepped += len(rows)
+
+
+def _gains(law: LinearLaw) -> tuple[float, float]:
+    """Sums of a law's absolute gains on past commands and on outputs.
+
+    `matrices` gives predictive laws in observer form, with or without a washout. The command is the
+    first state there, so the first column of A holds the gains on past commands.
+    """
+    model = law.matrices()
+    with np.errstate(over="ignore", invalid="ignore"):
+        on_commands, outputs = float(np.abs(model.A[:, 0]).sum()), float(np.abs(model.B).sum())
+    return on_commands, outputs

@@ -1,0 +1,139 @@
+"""A bank of laws that run in parallel, with bumpless transfer from one active law to the next.
+
+    accepted   the last law that passed its trial; at first the configured one
+    on trial   active in place of the accepted law, until it is kept or dropped
+    previous   the law accepted before: the operator's undo goes back to it
+    fading     the law that was active until the latest switch
+
+Every law of the bank is stepped and receives the applied command, so that its memory is up to date
+when it becomes active. At a switch the command is faded from the old law's to the new one's.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control import Controller
+from utank_hil.retuning.change_monitor import ChangeMonitor
+
+FADE_SAMPLES: Final = 15
+_NOTHING: Final = np.zeros(1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MonitoredLaw:
+    """A law's controller, with the monitor of how well its model fits the ship."""
+
+    controller: Controller
+    monitor: ChangeMonitor
+
+
+class LawBank:
+    """The laws of one retuning controller.
+
+    Parameters
+    ----------
+    configured : MonitoredLaw
+        First accepted law.
+
+    Attributes
+    ----------
+    accepted : MonitoredLaw
+    on_trial, previous : MonitoredLaw or None
+    """
+
+    def __init__(self, configured: MonitoredLaw) -> None:
+        self.accepted = configured
+        self.on_trial: MonitoredLaw | None = None
+        self.previous: MonitoredLaw | None = None
+        self._fading: MonitoredLaw | None = None
+        self._fade = FADE_SAMPLES
+        self._stepped: tuple[MonitoredLaw, ...] = (configured,)
+
+    @property
+    def active(self) -> MonitoredLaw:
+        """The law whose command is used."""
+        return self.accepted if self.on_trial is None else self.on_trial
+
+    def try_out(self, law: MonitoredLaw) -> None:
+        """Make a law active, on trial."""
+        self.on_trial = law
+        self._fade_from(self.accepted)
+
+    def keep(self) -> None:
+        """Accept the law on trial."""
+        assert self.on_trial is not None
+        self.previous, self.accepted, self.on_trial = self.accepted, self.on_trial, None
+        self._collect()
+
+    def drop(self) -> None:
+        """Go back from the law on trial to the accepted one."""
+        dropped, self.on_trial = self.on_trial, None
+        self._fade_from(dropped)
+
+    def undo(self) -> None:
+        """Go back from the accepted law to the one before it."""
+        assert self.previous is not None
+        undone, self.accepted, self.previous = self.accepted, self.previous, None
+        self._fade_from(undone)
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Step every law; return the command of the active one, faded after a switch.
+
+        A law on trial is dropped at once, without a fade, when its command is not finite. A fade
+        ends at once when the command of the law faded from is not finite.
+        """
+        active = self.active
+        command = accepted = outgoing = _NOTHING
+        for law in self._stepped:
+            output = law.controller.step(y, reference)
+            if law is active:
+                command = output
+            if law is self.accepted:
+                accepted = output
+            if law is self._fading:
+                outgoing = output
+        if self.on_trial is not None and not math.isfinite(command[0]):
+            self.on_trial = None
+            self._stop_fading()
+            return accepted
+        if self._fading is not None and not math.isfinite(outgoing[0]):
+            self._stop_fading()
+        if self._fading is not None:
+            self._fade += 1
+            command = outgoing + self._fade / FADE_SAMPLES * (command - outgoing)
+            if self._fade == FADE_SAMPLES:
+                self._stop_fading()
+        return command
+
+    def applied(self, u: FloatArray) -> None:
+        """Give every law the command that was applied."""
+        for law in self._stepped:
+            law.controller.applied(u)
+
+    def reset(self) -> None:
+        """Reset every law, and drop a law on trial."""
+        self.on_trial = None
+        self._stop_fading()
+        for law in self._stepped:
+            law.controller.reset()
+
+    def _fade_from(self, outgoing: MonitoredLaw | None) -> None:
+        """Begin a fade to the active law; if that law was fading out, reverse its fade."""
+        back = self._fading is self.active
+        self._fade = FADE_SAMPLES - self._fade if back else 0
+        self._fading = outgoing if self._fade < FADE_SAMPLES else None
+        self._collect()
+
+    def _stop_fading(self) -> None:
+        self._fading = None
+        self._fade = FADE_SAMPLES
+        self._collect()
+
+    def _collect(self) -> None:
+        """Collect the laws to step, each once."""
+        every = (self.accepted, self.on_trial, self.previous, self._fading)
+        self._stepped = tuple({id(law): law for law in every if law is not None}.values())
