@@ -1,12 +1,11 @@
-"""The CAN bus of lockstep: one frame at a time, lowest identifier first, exact time on the wire.
+"""Simulated CAN bus for lockstep: bit timing and arbitration.
 
-What is modelled: bit rate, arbitration by identifier, frames that can't be interrupted, bit
-stuffing, intermission. Every waiting frame of every node takes part in every arbitration, as in a
-controller with a mailbox a message: no frame waits behind a less urgent one of its own node. Frames
-of equal identifier go in the order they were queued. Transmit queues have no limit.
+Modelled: bit rate, arbitration by identifier, non-preemptive transmission, bit stuffing and
+intermission. Every queued frame of every node takes part in every arbitration, as in a CAN
+controller with one mailbox per message. Frames of equal identifier are sent in queueing order.
+Transmit queues are unbounded.
 
-What is not: errors and retransmission, and the collision of two nodes that send one identifier at
-the same time.
+Not modelled: errors, retransmission, and collisions of two nodes that send the same identifier.
 """
 
 from array import array
@@ -20,25 +19,25 @@ from utank_hil.canbus.frame import Frame
 from utank_hil.runtime.wire_time import INTERMISSION_BITS, frame_bits
 
 WINDOW_NS: Final = 1_000_000_000
-"""Bus load is measured over windows of this length."""
+"""Length of the windows of the bus load."""
 
 
 @dataclass(frozen=True, slots=True)
 class BusStatistics:
-    """What the bus carried from time 0 on.
+    """Traffic on the bus since time 0.
 
     Attributes
     ----------
     frames : int
-        Frames that began.
+        Frames whose transmission has begun.
     load : float
-        Fraction of the time in which the bus was taken.
+        Bus load, 0 to 1.
     window_loads : tuple of float
-        The same in each complete window of 1 s, oldest first.
+        Bus load of each complete window of 1 s, oldest first.
     delay_p50_ns, delay_p99_ns, delay_max_ns : int
-        Time from queueing to the start of frame, over all frames; exact; 0 without frames.
+        Percentiles of the queueing delay, up to the start of frame; exact; 0 without frames.
     waiting : int
-        Frames queued that have not begun.
+        Frames in the queue.
     """
 
     frames: int
@@ -75,8 +74,8 @@ class SimulatedBus:
         self._waiting: list[tuple[int, int, Frame, int, int, int]] = []
         self._order = count()
         self._in_flight: tuple[int, int, Frame] | None = None
-        self._free_ns = 0  # the bus is, or was last, taken until then
-        self._new_delays_ns: list[int] = []  # counted when a window closes: together is faster
+        self._free_ns = 0  # end of the latest transmission
+        self._new_delays_ns: list[int] = []  # counted in bulk when a window closes, which is faster
         self._delays: Counter[int] = Counter()
         self._window_end_ns = WINDOW_NS
         self._window_busy_ns = 0
@@ -84,12 +83,12 @@ class SimulatedBus:
         self._window_loads = array("d")
 
     def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """Let a frame take part in arbitration from `now_ns` on; times must not go back.
+        """Queue a frame for transmission from `now_ns` on; calls must be in order of time.
 
         Raises
         ------
         ValueError
-            If the frame is none that CAN can carry.
+            If the identifier or the payload is too long for CAN.
         """
         duration_ns = frame_bits(frame) * self._bit_ns
         heappush(
@@ -99,12 +98,12 @@ class SimulatedBus:
             self._free_ns = now_ns
 
     def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
-        """Let the bus work until `before_ns`.
+        """Advance the bus to `before_ns`.
 
         Returns
         -------
         list of tuple of (time in ns, sender, frame)
-            The frames whose last bit is over, at that time, before `before_ns`; oldest first.
+            Frames that ended before `before_ns`, with the time of their last bit; oldest first.
         """
         arrived = []
         waiting, in_flight = self._waiting, self._in_flight
@@ -127,7 +126,7 @@ class SimulatedBus:
         return arrived
 
     def _close_windows(self, start_ns: int, end_ns: int) -> None:
-        """Close every window that is over at `end_ns`; the bus is taken from `start_ns` to then."""
+        """Close every window that ends by `end_ns`; the bus is busy from `start_ns` to `end_ns`."""
         while self._window_end_ns <= end_ns:
             in_window_ns = max(0, self._window_end_ns - start_ns)
             busy_ns = self._window_busy_ns + in_window_ns
@@ -141,7 +140,7 @@ class SimulatedBus:
         self._new_delays_ns.clear()
 
     def statistics(self, now_ns: int) -> BusStatistics:
-        """Return what the bus carried until `now_ns`, the time up to which it has worked."""
+        """Return the statistics at `now_ns`, the time to which the bus was advanced."""
         self._close_windows(now_ns, now_ns)
         busy_ns = self._busy_before_ns + self._window_busy_ns - max(0, self._free_ns - now_ns)
         return BusStatistics(
@@ -155,7 +154,7 @@ class SimulatedBus:
         )
 
     def _delay_percentile_ns(self, fraction: float) -> int:
-        """Return the smallest delay that at least this fraction of the frames did not exceed."""
+        """Return the smallest delay not exceeded by at least this fraction of the frames."""
         wanted = fraction * self._delays.total()
         passed = 0
         for delay_ns in sorted(self._delays):

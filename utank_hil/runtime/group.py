@@ -1,4 +1,4 @@
-"""Nodes that one runner drives: which are due, who hears whom, and whose fault an error is."""
+"""The nodes of one runner: schedule, routing of frames, and errors that name the node."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -11,10 +11,10 @@ from utank_hil.runtime.hooks import LinkObserver, Stoppable
 from utank_hil.runtime.node import Node, Selective
 
 OUTSIDE: Final = -1
-"""The sender of a frame that comes from no node of the group."""
+"""Sender index of a frame from outside the group."""
 
 Send = Callable[[int, Frame, int], None]
-"""Called with (sender's index, frame, time in nanoseconds)."""
+"""Called as (sender's index, frame, time in ns)."""
 
 Receive = Callable[[Frame, int], None]
 """A node's `receive`."""
@@ -31,11 +31,11 @@ class NodeGroup:
     Attributes
     ----------
     names : tuple of str
-        The nodes' names, indexed by sender.
+        Names by sender index.
     base_period_ns : int
         Greatest common divisor of the nodes' periods.
     next_tick_ns : int
-        When the next node is due.
+        Time at which the next node is due.
 
     Raises
     ------
@@ -58,8 +58,8 @@ class NodeGroup:
         self._nodes = tuple(nodes)
         self._periods_ns = tuple(node.period_ns for node in nodes)
         self.base_period_ns: Final = gcd(*self._periods_ns)
-        # Methods are bound once, and who hears what of whom is looked up: this is the hot path of
-        # lockstep. The last sender is no node, so that OUTSIDE = -1 finds it.
+        # Bound methods and listeners are tabulated: this is the hot path of lockstep. The tables'
+        # last entry belongs to OUTSIDE = -1.
         self._ticks = tuple(node.tick for node in nodes)
         senders = range(len(nodes) + 1)
         named = {can_id for node in nodes if isinstance(node, Selective) for can_id in node.hears}
@@ -70,7 +70,7 @@ class NodeGroup:
         self.start(0)
 
     def _who_hears(self, can_id: int | None, sender: int) -> tuple[tuple[int, Receive], ...]:
-        """Find who hears this identifier of this sender; None is one that no node names."""
+        """Listeners to this identifier of this sender; None stands for one that no node lists."""
         return tuple(
             (index, node.receive)
             for index, node in enumerate(self._nodes)
@@ -78,20 +78,20 @@ class NodeGroup:
         )
 
     def start(self, now_ns: int) -> None:
-        """Put every node's grid at `now_ns`: all are due then, and every period after it."""
+        """Start every node's grid at `now_ns`: all are due then, and every period after it."""
         self._due_ns = [now_ns] * len(self._nodes)
         self.next_tick_ns = now_ns
 
     def tick(self, now_ns: int, send: Send) -> None:
-        """Tick every node that is due, once, and hand its frames to `send`.
+        """Tick every due node once and pass its frames to `send`.
 
-        A node that should have been ticked earlier is ticked now and is then due at the next point
-        of its own grid: late ticks are dropped, not caught up, and do not shift the grid.
+        An overdue node is ticked once and is next due at the next point of its own grid: missed
+        ticks are dropped and do not shift the grid.
 
         Raises
         ------
         NodeError
-            If a node raises, or hands out a frame that `send` refuses.
+            If a node raises, or `send` refuses its frame.
         """
         due_ns = self._due_ns
         index = 0
@@ -108,7 +108,7 @@ class NodeGroup:
         self.next_tick_ns = min(due_ns)
 
     def deliver(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """Hand one frame to every node that hears it but its sender.
+        """Deliver a frame to every node that hears it, except its sender.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class NodeGroup:
             raise NodeError(self.names[index], "receive", now_ns, error) from error
 
     def link_error(self, now_ns: int, reason: str) -> None:
-        """Tell every node that wants to know that the bus can't be reached.
+        """Notify every `LinkObserver` that the bus can't be reached.
 
         Raises
         ------
@@ -141,14 +141,14 @@ class NodeGroup:
                     raise NodeError(node.name, "link_error", now_ns, error) from error
 
     def stop(self, now_ns: int, send: Send) -> None:
-        """Ask every node that has last frames for them, and hand them to `send`.
+        """Stop every `Stoppable` node and pass its last frames to `send`.
 
         Raises
         ------
         NodeError
-            If a node raises; the others have been asked all the same.
+            If a node raises; the others are stopped nevertheless.
         """
-        with ExitStack() as everyone:  # calls every one, last entered first, whoever raises
+        with ExitStack() as everyone:  # runs every callback even if one raises, last entered first
             for index in reversed(range(len(self._nodes))):
                 everyone.callback(self._stop_one, index, now_ns, send)
 

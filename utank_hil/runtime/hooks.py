@@ -1,4 +1,4 @@
-"""What a node may have besides `receive` and `tick`; only the real-time runner asks for it."""
+"""Optional interfaces of a node, used by the real-time runner only."""
 
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
@@ -8,19 +8,19 @@ from utank_hil.canbus.frame import Frame
 
 @runtime_checkable
 class LinkObserver(Protocol):
-    """A node that wants to know when its bus can't be reached."""
+    """A node that is notified when the bus can't be reached."""
 
     def link_error(self, now_ns: int, reason: str) -> None:
-        """Learn that a frame could not be sent, or that the bus could not be read, just now.
+        """Handle a frame that could not be sent, or a bus that could not be read.
 
-        Called within the tick in which it happened: before the nodes are ticked if the bus could
-        not be read, after `tick` returned the frame if it could not be sent.
+        Called in the same tick: a receive error before the nodes are ticked, a send error after
+        `tick` has returned the frame.
         """
 
 
 @runtime_checkable
 class Stoppable(Protocol):
-    """A node that has something to say before the process ends."""
+    """A node that sends last frames before the process ends."""
 
     def stop(self, now_ns: int) -> Iterable[Frame]:
-        """Return the last frames to send; asked once, however the run ended."""
+        """Return the last frames to send; called once, however the run ends."""

@@ -1,4 +1,4 @@
-"""What every node sends of itself: address claim at boot, then heartbeats."""
+"""Frames that every node sends: address claim at boot, then heartbeats."""
 
 import math
 
@@ -21,7 +21,7 @@ class Housekeeping:
     Parameters
     ----------
     address : Address
-        Whose.
+        The node's address.
     catalogue : Catalogue
     configuration_version : int
         Hash of the configuration, to be equal on all nodes before arming.
@@ -37,7 +37,7 @@ class Housekeeping:
         self._beats = Schedule(self._heartbeat.cycle_ns)
 
     def frames(self, now_ns: int, *, faulted: bool = False) -> list[Frame]:
-        """Return what is due at `now_ns`, mostly nothing."""
+        """Return the frames due at `now_ns`, usually none."""
         if not self._beats.due(now_ns):
             return []
         if self._boot_ns is None:
@@ -51,7 +51,7 @@ class Housekeeping:
         return self._heartbeat.frame(
             Heartbeat(
                 state=NodeState.FAULT if faulted else NodeState.OPERATIONAL,
-                reset_cause=None,  # nothing tells a process why it was started
+                reset_cause=None,  # unknown to a process
                 uptime_s=uptime_s,
                 catalogue_version=self._catalogue_version,
                 configuration_version=self._configuration_version,

@@ -1,9 +1,8 @@
-"""Nodes on a simulated bus in simulated time: one thread, the same trace for the same seeds.
+"""Runs nodes on a simulated bus in simulated time: one thread, the same trace for the same seeds.
 
-At one instant the nodes that are due tick first, in the order given; then frames that arrive are
-delivered; then the bus arbitrates. So a frame handed out at one tick reaches the others, at the
-earliest, for their next tick, as it does on a real bus. Nobody waits for anybody: a node that
-hands out nothing is simply silent.
+At each instant the due nodes tick first, in the order given; then arrived frames are delivered;
+then the bus arbitrates. So a frame sent in one tick reaches other nodes at their next tick at the
+earliest, as on a real bus. No node waits for another: a silent node does not stop the run.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,25 +13,25 @@ from utank_hil.runtime.group import NodeGroup
 from utank_hil.runtime.node import Node
 
 Trace = Callable[[int, str, Frame], None]
-"""Called with (time in nanoseconds, sender's name, frame) at the end of every frame."""
+"""Called as (time in ns, sender's name, frame) at the end of every frame."""
 
 
 class Lockstep:
-    """Drive nodes in simulated time, from 0.
+    """Runs nodes in simulated time, from 0.
 
     Parameters
     ----------
     nodes : sequence of Node
         Names must differ. All tick at 0 and every `period_ns` after it.
     bus : SimulatedBus, optional
-        A new one; 250 kbit/s unless given.
+        By default a new one of 250 kbit/s.
     trace : callable, optional
-        Sees every frame as it arrives, before the nodes do, as a logger on the bus would.
+        Receives every frame before the nodes do, like a logger on the bus.
 
     Attributes
     ----------
     now_ns : int
-        Everything before this time has happened.
+        Simulated time; every event before it has happened.
     bus : SimulatedBus
         The bus between the nodes.
 
@@ -51,9 +50,9 @@ class Lockstep:
         self.now_ns = 0
 
     def run_until(self, time_ns: int) -> None:
-        """Let everything happen that happens before `time_ns`.
+        """Run every event before `time_ns`.
 
-        Running in slices is the same as running in one go, so a bench may look in between.
+        The result does not depend on how a run is divided into calls.
 
         Raises
         ------

@@ -1,7 +1,7 @@
-"""What lives on the bus: a plain object that is handed frames and the time, and hands back frames.
+"""Interface of a node: a plain object that receives frames and the time, and returns frames.
 
-A node opens no socket, reads no clock, starts no thread and never sleeps. That is what lets the
-lockstep runner and the real-time runner drive the very same object.
+A node opens no socket, reads no clock, starts no thread and never sleeps. So the lockstep runner
+and the real-time runner can run the same object.
 """
 
 from collections.abc import Iterable
@@ -11,14 +11,14 @@ from utank_hil.canbus.frame import Frame
 
 
 class Node(Protocol):
-    """Anything that lives on the CAN bus.
+    """A participant on the CAN bus.
 
     Attributes
     ----------
     name : str
-        Names the node in traces and statistics.
+        Name in traces and statistics.
     period_ns : int
-        Time between two ticks, in nanoseconds.
+        Time between two ticks.
     """
 
     name: str
@@ -28,27 +28,27 @@ class Node(Protocol):
         """Take one frame from the bus, received at `now_ns` (monotonic clock, nanoseconds)."""
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Do one period's work and return the frames to send, in order."""
+        """Run one period and return the frames to send, in order."""
 
 
 @runtime_checkable
 class Selective(Protocol):
-    """A node that says what it hears; one that does not say hears everything.
+    """A node with an acceptance filter; a node without one receives every frame.
 
-    The runner need not hand it other frames, nor the kernel other frames to its process. So a node
-    that watches for strangers, or counts what is on the bus, has no such list.
+    Runner and kernel need not deliver other frames. A node that detects unknown identifiers or
+    measures the bus load must not have a filter.
 
     Attributes
     ----------
     hears : frozenset of int
-        Identifiers; a runner asks once, before the first tick.
+        Identifiers to receive; read once, before the first tick.
     """
 
     hears: frozenset[int]
 
 
 def heard_by(nodes: Iterable[Node]) -> frozenset[int] | None:
-    """Return the identifiers that a group of nodes hears, None if one of them hears everything."""
+    """Return the joint acceptance filter of some nodes, None if one of them has none."""
     heard: frozenset[int] = frozenset()
     for node in nodes:
         if not isinstance(node, Selective):

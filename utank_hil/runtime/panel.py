@@ -17,7 +17,7 @@ from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
-"""How long a button that works by its edge stays pressed: longer than two lost messages."""
+"""How long an edge-triggered button stays pressed: longer than two lost messages."""
 
 
 class Action(Enum):
@@ -40,10 +40,10 @@ _EDGES = (Action.STOP, Action.RESET, Action.RETUNE, Action.UNDO)
 
 @dataclass(frozen=True, slots=True)
 class TimedAction:
-    """A button pressed at a time after the panel first hears of a controller that is ready.
+    """A button press at a time after the panel first receives the status of a ready controller.
 
-    Not after the panel's own start: on a real bus a controller may be started later, and a button
-    pressed before would be no rising edge to it.
+    The panel's own start is no reference: a controller that starts later would miss the rising edge
+    of an earlier press.
 
     Raises
     ------
@@ -67,12 +67,12 @@ class OperatorPanel:
     configuration_version : int
         Sent in the heartbeat.
     script : iterable of TimedAction
-        Buttons to press by themselves, for benches.
+        Scheduled button presses, for benches.
 
     Attributes
     ----------
     status : ControllerStatus or None
-        What the controller last said of itself.
+        Latest status of the controller.
     """
 
     name = "panel"
@@ -106,7 +106,7 @@ class OperatorPanel:
         self._pressed.append(action)
 
     def receive(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
-        """Listen to the controller's status."""
+        """Take the controller's status."""
         if frame.can_id == self._listener.can_id:
             self.status = self._listener.accept(frame) or self.status
 

@@ -1,9 +1,9 @@
-"""What the loop process asks of the operating system, and what it was given (Linux).
+"""Real-time settings of the loop process, requested from Linux and reported.
 
-Each measure answers a cause of late ticks that was measured: other processes (SCHED_FIFO), page
-faults (mlockall), deep CPU sleep states (/dev/cpu_dma_latency), the garbage collector, and other
-Python threads, which hold the interpreter for 5 ms at a time. A measure that is refused is
-reported, and the loop runs without it.
+Each setting removes a measured cause of late ticks: other processes (SCHED_FIFO), page faults
+(mlockall), deep CPU sleep states (/dev/cpu_dma_latency), the garbage collector, and other Python
+threads, which hold the interpreter for 5 ms at a time. A refused setting is reported, and the loop
+runs without it.
 """
 
 import ctypes
@@ -29,16 +29,15 @@ _CPU_DMA_LATENCY: Final = Path("/dev/cpu_dma_latency")
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One thing that was asked of the operating system.
+    """One real-time setting.
 
     Attributes
     ----------
     name : str
-        What was asked for.
     granted : bool
         Whether it is in force.
     detail : str
-        What is in force, or why it is not and what would help.
+        Value in force, or the reason and the remedy.
     """
 
     name: str
@@ -48,15 +47,15 @@ class Measure:
 
 @dataclass(frozen=True, slots=True)
 class SchedulingReport:
-    """What the loop process was granted at its start.
+    """Real-time settings of the loop process at its start.
 
     Attributes
     ----------
     measures : tuple of Measure
-        In the order asked.
+        In the order of the requests.
     native_threads : int
-        Threads of the process that are not Python's (of a linear-algebra library, say); they do
-        not hold the interpreter.
+        Threads that are not Python's, such as those of a linear-algebra library; they do not hold
+        the interpreter.
     """
 
     measures: tuple[Measure, ...]
@@ -64,7 +63,7 @@ class SchedulingReport:
 
     @property
     def granted(self) -> bool:
-        """Whether everything is in force."""
+        """Whether every setting is in force."""
         return all(measure.granted for measure in self.measures)
 
     def lines(self) -> list[str]:
@@ -77,20 +76,20 @@ class SchedulingReport:
 
 @contextmanager
 def real_time_scheduling(priority: int = PRIORITY) -> Iterator[SchedulingReport]:
-    """Make this process fit for the loop while the context lasts, as far as it is permitted to.
+    """Apply the real-time settings for the duration of the context, as far as permitted.
 
-    Enter it when everything is imported and built: what exists then is kept out of the garbage
-    collector, which stays off. The end of the context undoes everything.
+    Enter it when everything is imported and built: existing objects are frozen, and the garbage
+    collector stays off. Leaving the context restores the former settings.
 
     Parameters
     ----------
     priority : int
-        Of SCHED_FIFO, 1 to 99.
+        SCHED_FIFO priority, 1 to 99.
 
     Raises
     ------
     RuntimeError
-        If there is another Python thread: it would cost ticks, and no permission mends that.
+        If there is another Python thread: it would delay ticks whatever the permissions.
     ValueError
         If the priority is out of range.
     """
@@ -128,7 +127,7 @@ def _fifo(undo: ExitStack, priority: int) -> Measure:
     name = "SCHED_FIFO"
     found = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        # Children start without it: a stuck one could not be ended on a busy machine.
+        # Not for children: a stuck real-time child could not be ended on a busy machine.
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except PermissionError:
         limit, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
@@ -142,7 +141,7 @@ def _fifo(undo: ExitStack, priority: int) -> Measure:
 def _restore_scheduler(policy: int, param: os.sched_param) -> None:
     try:
         os.sched_setscheduler(0, policy, param)
-    except PermissionError:  # without CAP_SYS_NICE, reset-on-fork can't be taken back
+    except PermissionError:  # without CAP_SYS_NICE, reset-on-fork stays set
         os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, param)
 
 

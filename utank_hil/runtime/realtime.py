@@ -1,7 +1,7 @@
-"""Nodes on a real bus in real time: one process, one thread, an absolute grid.
+"""Runs nodes on a real bus in real time: one process, one thread, absolute deadlines.
 
-The tick does no I/O but the port's, takes no lock, logs nothing. Deadlines lie on one grid, laid at
-the start of the run: a late tick neither shifts the grid nor is caught up.
+The tick does no I/O except the port's, takes no lock and logs nothing. Deadlines lie on a grid that
+is fixed at the start of the run: a late tick does not shift it, and skipped ticks are not made up.
 """
 
 import os
@@ -24,27 +24,26 @@ def _never() -> bool:
 
 
 class RealTimeLoop:
-    """Drive nodes on one port.
+    """Runs nodes on one port.
 
-    At every point of the grid: frames that arrived are handed to every node, the nodes that are
-    due tick in the order given and their frames go out, then each frame that went out is handed to
-    the other nodes of the group, which a real bus would not bring back to this socket.
+    At every grid point, arrived frames are delivered to every node. Then the due nodes tick in the
+    order given, and their frames are sent. Last, each sent frame is delivered to the other nodes of
+    the group, because the socket does not receive its own frames.
 
     Parameters
     ----------
     nodes : sequence of Node
         Names must differ. The grid's step is the greatest common divisor of their periods.
     port : Port, optional
-        The bus; without one the group talks among itself.
+        The bus; without one the nodes exchange frames among themselves only.
     statistics : LoopStatistics, optional
-        Counted into; new unless given.
+        Where ticks, latencies and frames are counted; new by default.
     clock : Clock, optional
-        The monotonic clock unless given.
+        By default the monotonic clock.
 
     Attributes
     ----------
     statistics : LoopStatistics
-        What was counted.
 
     Raises
     ------
@@ -69,21 +68,21 @@ class RealTimeLoop:
     def run(self, stop: Callable[[], bool] = _never, duration_ns: int | None = None) -> None:
         """Run until `stop()` is true or the time is up; then let the nodes send their last frames.
 
-        Nodes are handed the time of the grid's point, not of the wake-up, so that what they
-        integrate and differentiate does not see the jitter.
+        Nodes receive the time of the grid point, not of the wake-up, so that jitter does not enter
+        what they integrate or differentiate.
 
         Parameters
         ----------
         stop : callable
-            Asked before every tick.
+            Called before every tick.
         duration_ns : int, optional
-            Ticks at the start and at every grid point less than this later; those of them that
-            passed without a tick are counted as skipped, however late the last one was.
+            Length of the run: it ticks at the start and at every grid point before its end. Points
+            without a tick count as skipped.
 
         Raises
         ------
         NodeError
-            If a node raises; `stop` of those that have it is called all the same.
+            If a node raises; the nodes' `stop` is called nevertheless.
         """
         clock, statistics, period_ns = self._clock, self.statistics, self._group.base_period_ns
         statistics.real_time = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in _REAL_TIME
@@ -97,7 +96,7 @@ class RealTimeLoop:
                     break
                 woken_ns = clock.now_ns()
                 late_ns = woken_ns - deadline_ns
-                # Woken after one or more further points: this is the tick of the latest of them.
+                # If further points have passed, this tick is that of the latest one.
                 deadline_ns += self._skip((min(woken_ns, end_ns - 1) - deadline_ns) // period_ns)
                 self._tick(deadline_ns)
                 done_ns = clock.now_ns()
@@ -105,13 +104,13 @@ class RealTimeLoop:
                 statistics.lateness.add(late_ns)
                 statistics.duration.add(done_ns - woken_ns)
                 deadline_ns += period_ns
-                # Points that passed while the tick ran: wait for the first that has not.
+                # Points that passed during the tick are skipped.
                 deadline_ns += self._skip(-((deadline_ns - min(done_ns, end_ns)) // period_ns))
         finally:
             self._group.stop(clock.now_ns(), self._send)
 
     def _skip(self, points: int) -> int:
-        """Count grid points that passed without a tick; return their time, 0 if there is none."""
+        """Count skipped grid points; return their duration in ns, 0 if there are none."""
         if points <= 0:
             return 0
         self.statistics.overruns += 1
@@ -128,7 +127,7 @@ class RealTimeLoop:
             group.deliver(sender, frame, now_ns)
 
     def _receive(self, now_ns: int) -> Sequence[Frame]:
-        """Return what has arrived; an unreadable bus is counted, told to the nodes, and empty."""
+        """Return arrived frames; on a bus error count it, notify the nodes, return none."""
         if self._port is None:
             return ()
         try:
@@ -141,7 +140,7 @@ class RealTimeLoop:
         return frames
 
     def _send(self, sender: int, frame: Frame, now_ns: int) -> None:
-        """Send a frame now, and keep it for the rest of the group if the bus took it."""
+        """Send a frame, and keep it for the rest of the group if the bus accepted it."""
         if self._port is not None:
             try:
                 self._port.send(frame)

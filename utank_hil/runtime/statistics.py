@@ -22,7 +22,7 @@ def _bin_of(value_ns: int) -> int:
 
 
 def _largest_in(index: int) -> int:
-    """Return the largest value that falls into a bin, the inverse of `_bin_of`."""
+    """Return the largest value in a bin, the inverse of `_bin_of`."""
     if index < 2 * _STEPS:
         return index
     shift = index // _STEPS - 1
@@ -32,16 +32,15 @@ def _largest_in(index: int) -> int:
 class Histogram:
     """Distribution of durations over fixed, logarithmically spaced bins.
 
-    Adding is a few integer operations and one count in an array laid out at the start: no memory
-    is taken however long the loop runs. A percentile is at most 1/32 above the true one and never
-    below it; the maximum is exact.
+    Adding takes a few integer operations and allocates no memory. A percentile is at most 1/32
+    above the true one and never below it; the maximum is exact.
 
     Attributes
     ----------
     counts : ndarray of int64, shape (bins,)
         Durations in each bin.
     last_ns, max_ns : int
-        The latest and the longest duration; 0 if there is none.
+        Latest and longest duration; 0 if there is none.
     """
 
     __slots__ = ("counts", "last_ns", "max_ns")
@@ -59,7 +58,7 @@ class Histogram:
             self.max_ns = value_ns
 
     def percentile_ns(self, fraction: float) -> int:
-        """Return the duration that this fraction (0 to 1) did not exceed; 0 if there is none."""
+        """Return the quantile for a fraction of 0 to 1; 0 if nothing was counted."""
         cumulative = np.cumsum(self.counts)
         wanted = max(fraction * float(cumulative[-1]), 1.0)
         index = int(np.searchsorted(cumulative, wanted))
@@ -78,24 +77,23 @@ class Histogram:
 
 @dataclass(slots=True)
 class LoopStatistics:
-    """What the real-time loop counts, for whoever shows it.
+    """Counters of the real-time loop.
 
     Attributes
     ----------
     lateness : Histogram
-        From the deadline to the start of the tick.
+        Latency from the deadline to the start of the tick.
     duration : Histogram
-        From the start of the tick to its end.
+        Execution time of the tick.
     ticks : int
         Ticks of the loop's base period that were run.
     overruns : int
-        Occasions on which at least one point of the grid passed without its tick.
+        Occasions on which one or more grid points were skipped.
     skipped : int
-        Points of the grid that passed so.
+        Grid points without a tick.
     frames_sent, frames_received : int
-        Frames that the port took, and handed out.
     send_errors, receive_errors : int
-        `PortError`s.
+        `PortError` exceptions of the port.
     real_time : bool
         Whether the operating system ran the loop with a real-time policy.
     """

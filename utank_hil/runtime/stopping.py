@@ -1,4 +1,4 @@
-"""Ending a loop from outside: SIGINT and SIGTERM set a flag, the loop ends between two ticks."""
+"""Stop by signal: SIGINT and SIGTERM set a flag, and the loop ends between two ticks."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -8,9 +8,9 @@ from types import FrameType
 
 @contextmanager
 def stop_on_signals() -> Iterator[Callable[[], bool]]:
-    """Catch SIGINT and SIGTERM; give a function that says whether one has come.
+    """Handle SIGINT and SIGTERM; yield a function that returns whether one has arrived.
 
-    The handlers found are put back at the end. Main thread only, as Python demands of handlers.
+    The former handlers are restored at the end. Main thread only, as Python requires.
     """
     stopped = False
 

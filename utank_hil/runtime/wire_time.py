@@ -1,19 +1,18 @@
-"""How many bits a CAN frame takes on the wire, stuff bits counted exactly.
+"""Length of a CAN frame on the wire in bits, with the exact number of stuff bits.
 
 ISO 11898-1: after five equal bits the transmitter inserts one of the opposite value, from start of
 frame to the end of the CRC sequence, and an inserted bit counts towards the next five. So the
-length depends on every bit of the frame, the computed CRC included:
+length depends on every bit of the frame, including the CRC:
 
     start of frame 1, identifier 11, SRR 1, IDE 1, identifier 18, RTR 1, r1 r0 2, DLC 4,
     data 8n, CRC 15                                                        (stuffed, 54 + 8n bits)
     CRC delimiter 1, acknowledge slot 1 and delimiter 1, end of frame 7    (10 bits)
     intermission 3                                  (belongs to the frame: the bus is not free yet)
 
-Eight data bytes make 131 bits without and at most 160 bits with stuffing. The header of an
-identifier is walked bit by bit once and remembered; data and CRC go a byte a step through tables
-small enough to stay in the processor's cache, because this is the largest single cost of a
-simulated frame. (Tables of sixteen bits a step need half the steps, and twice the time: each step
-waits for memory.)
+Eight data bytes make 131 bits without and at most 160 bits with stuffing. This is the largest
+single cost of a simulated frame. So the header of an identifier is processed bit by bit once and
+cached, and data and CRC go bytewise through tables small enough for the processor's cache.
+(Tables for sixteen bits take twice the time, because they miss the cache.)
 """
 
 from functools import lru_cache
@@ -28,7 +27,7 @@ _CRC_POLYNOMIAL: Final = 0x4599
 _HEADER_BITS: Final = 39
 
 Row = list[tuple["Row", int]]
-"""From one state of the stuffing rule, for each byte: the row to go on with, and the stuff bits."""
+"""Of one state of the stuffing rule, by byte: the row of the next state, and the stuff bits."""
 
 # State of the stuffing rule: 5 * (last bit) + (number of equal bits so far, 0 to 4).
 _STATES: Final = 10
@@ -51,7 +50,7 @@ def _after_bits(state: int, bits: int, length: int) -> tuple[int, int]:
 def _stuffing_rows() -> list[Row]:
     """Return the row of each state."""
     rows: list[Row] = [[] for _ in range(_STATES)]
-    # the same few pairs in all rows, so that they stay in the cache
+    # rows share the same few pairs, so that they stay in the cache
     pairs = [[(row, stuffed) for stuffed in range(3)] for row in rows]
     for state, row in enumerate(rows):
         for byte in range(256):
@@ -69,14 +68,14 @@ def _crc(register: int, bits: int, length: int) -> int:
 
 
 _ROWS: Final = _stuffing_rows()
-# The CRC is kept in the upper 15 of 16 bits, as two bytes: what they are after one more byte.
+# The CRC is held left-aligned in 16 bits, as two bytes; these tables advance them by one byte.
 _CRC_HIGH: Final = [_crc(0, byte, 8) >> 7 for byte in range(256)]
 _CRC_LOW: Final = [_crc(0, byte, 8) << 1 & 0xFF for byte in range(256)]
 
 
 @lru_cache(maxsize=4096)
 def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
-    """Return CRC and row after the DLC, and all bits but the stuff bits still to come."""
+    """Return CRC and row after the DLC, and the frame's bits except later stuff bits."""
     if not 0 <= can_id < 1 << 29:
         raise ValueError(f"can_id {can_id:#x}: not a 29-bit identifier")
     if length > 8:
@@ -90,7 +89,7 @@ def _after_header(can_id: int, length: int) -> tuple[int, int, Row, int]:
 
 
 def frame_bits(frame: Frame) -> int:
-    """Return the bits that a frame occupies the bus for, stuff bits and intermission included.
+    """Return the number of bits of a frame, with stuff bits and intermission.
 
     Parameters
     ----------
@@ -117,6 +116,6 @@ def frame_bits(frame: Frame) -> int:
         bits += stuffed
     row, stuffed = row[crc_high]
     bits += stuffed
-    # seven bits are left; the opposite of the last one fills the byte up and is never stuffed
+    # seven bits are left; padding with the complement of the last one adds no stuff bit
     _, stuffed = row[crc_low | ~crc_low >> 1 & 1]
     return bits + stuffed
