@@ -37,7 +37,7 @@ with quietly_interruptible():
         real_time_scheduling,
         stop_on_signals,
     )
-    from utank_hil.telemetry.table import Table
+    from utank_hil.telemetry.memory_log import MemoryLog
 
 app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 
@@ -71,26 +71,26 @@ def firmware_sim(
     loaded = load(scenario, Scenario)
     length_s = loaded.duration_s if duration is None else duration
     ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
-    table = Table(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
+    log = MemoryLog(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))
     try:
         nodes = ship.without([name.strip() for name in without.split(",") if name.strip()])
     except ValueError as error:
         fail(f"--without: {error}")
     statistics = LoopStatistics()
     _run(
-        [*nodes, TruthRecorder(ship.plant, table, RECORD_NS)],
+        [*nodes, TruthRecorder(ship.plant, log, RECORD_NS)],
         bus,
         loaded.name,
         length_s,
         statistics,
     )
-    if len(table.rows) == 0:
+    if len(log.rows) == 0:
         fail("ended before the first sample")
-    roll, pump = _figures(table.rows)
+    roll, pump = _figures(log.rows)
     external = next((node for node in nodes if isinstance(node, ExternalDrive)), None)
     if json_:
         summary = {
-            "duration_s": len(table.rows) * RECORD_S,
+            "duration_s": len(log.rows) * RECORD_S,
             "roll": asdict(roll),
             "pump": asdict(pump),
             "refused_commands": None if external else ship.drive.refused,

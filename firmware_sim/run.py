@@ -36,7 +36,7 @@ from utank_hil.runtime import (
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry.table import Table
+from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.tick import TICK_NS, TICK_S
 
 SECOND_NS: Final = 1_000_000_000
@@ -175,10 +175,10 @@ class ControllerRun:
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
     """Run in simulated time; the same job gives the same rows, bit for bit."""
-    ship, truth, truth_table = _ship(job)
+    ship, truth, truth_log = _ship(job)
     work = retuner_work(job.controller)
     retuner = work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
-    controller, table = _controller(job, retuner)
+    controller, log = _controller(job, retuner)
     lockstep = Lockstep(
         [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
     )
@@ -187,7 +187,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
     return Run(
         job.name,
-        _side_by_side(table.rows, truth_table.rows),
+        _side_by_side(log.rows, truth_log.rows),
         lockstep.bus.statistics(lockstep.now_ns).load,
         ship.drive.refused,
         ship.plant.pump_energy_j,
@@ -200,12 +200,12 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
 def run_in_one_process(job: Job, watch: Watch) -> Run:
     """Run in real time with all nodes in one loop and no bus but the loop itself."""
     _load_kernel(job)
-    ship, truth, truth_table = _ship(job)
+    ship, truth, truth_log = _ship(job)
     statistics = LoopStatistics()
     with _retuner(job.controller) as retuner:
-        controller, table = _controller(job, retuner, statistics)
+        controller, log = _controller(job, retuner, statistics)
         loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
-    rows = _side_by_side(table.rows, truth_table.rows)
+    rows = _side_by_side(log.rows, truth_log.rows)
     return Run(
         job.name,
         rows,
@@ -222,20 +222,20 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
 def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     """Run the ship's side on a SocketCAN interface."""
     _load_kernel(job)
-    ship, truth, truth_table = _ship(job)
+    ship, truth, truth_log = _ship(job)
     nodes: list[Node] = [*ship.nodes, truth]
     _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
-    return ShipRun(truth_table.rows, truth.start_ns, ship.drive.refused, ship.plant.pump_energy_j)
+    return ShipRun(truth_log.rows, truth.start_ns, ship.drive.refused, ship.plant.pump_energy_j)
 
 
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
     with _retuner(job.controller) as retuner:
-        controller, table = _controller(job, retuner, statistics)
+        controller, log = _controller(job, retuner, statistics)
         loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(
-        table.rows,
+        log.rows,
         controller.start_ns,
         loop,
         controller.retuning_events,
@@ -268,20 +268,20 @@ def _load_kernel(job: Job) -> None:
         plant.advance(now_ns)
 
 
-def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, Table]:
+def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
     ship = build_ship_side(job.scenario, job.seed, job.script)
-    table = Table(len(TRUTH), -(-job.ticks // RECORD_TICKS))
-    return ship, TruthRecorder(ship.plant, table, RECORD_NS), table
+    log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
 
 
 def _controller(
     job: Job, retuner: Retuner | None, statistics: LoopStatistics | None = None
-) -> tuple[ControllerNode, Table]:
-    table = Table(len(SIGNALS), job.ticks, RECORD_TICKS)
+) -> tuple[ControllerNode, MemoryLog]:
+    log = MemoryLog(len(SIGNALS), job.ticks, RECORD_TICKS)
     node = build_controller_node(
-        job.controller, job.law, retuner=retuner, statistics=statistics, sink=table.write
+        job.controller, job.law, retuner=retuner, statistics=statistics, sink=log.write
     )
-    return node, table
+    return node, log
 
 
 @contextmanager

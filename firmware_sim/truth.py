@@ -7,7 +7,7 @@ import numpy as np
 
 from firmware_sim.plant import Plant
 from utank_hil.canbus import Frame
-from utank_hil.telemetry.table import Table
+from utank_hil.telemetry.memory_log import MemoryLog
 
 TRUTH: Final = (
     "time_s",
@@ -25,7 +25,7 @@ class TruthRecorder:
     Parameters
     ----------
     plant : Plant
-    table : Table
+    log : MemoryLog
         Takes the rows, columns `TRUTH`.
     period_ns : int
         Time between two rows.
@@ -39,10 +39,10 @@ class TruthRecorder:
     name = "truth"
     hears: frozenset[int] = frozenset()
 
-    def __init__(self, plant: Plant, table: Table, period_ns: int) -> None:
+    def __init__(self, plant: Plant, log: MemoryLog, period_ns: int) -> None:
         self.period_ns = period_ns
         self._plant = plant
-        self._table = table
+        self._log = log
         self._row = np.zeros(len(TRUTH))
         self.start_ns = -1
 
@@ -63,5 +63,5 @@ class TruthRecorder:
             plant.pump_power_w,
             plant.wave_moment_nm,
         )
-        self._table.write(self._row)
+        self._log.write(self._row)
         return ()

@@ -22,7 +22,7 @@ from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
 from utank_hil.configuration import load_config
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.telemetry.table import Table
+from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.tick import TICK_NS
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
@@ -51,7 +51,7 @@ class Bench:
         self.foreign: dict[str, ForeignNode] = {name: foreign[name] for name in without}
         for node in self.foreign.values():
             node.versions = (load_catalogue().version, STORM.vessel.version)
-        self.table = Table(len(TRUTH), 10_000)
+        self.table = MemoryLog(len(TRUTH), 10_000)
         truth = TruthRecorder(self.ship.plant, self.table, TICK_NS)
         nodes = [*self.kept, *self.foreign.values(), self.controller, truth]
         self.sent: set[tuple[str, str]] = set()
@@ -166,12 +166,12 @@ def test_damaged_and_foreign_frames_do_not_move_the_pump() -> None:
 def test_without_all_nodes_nothing_is_sent_and_the_truth_is_recorded() -> None:
     ship = build_ship_side(STORM, 1, STORM.operator)
     sent: list[Frame] = []
-    table = Table(len(TRUTH), 1000)
-    nodes = [*ship.without(NODE_NAMES), TruthRecorder(ship.plant, table, TICK_NS)]
+    log = MemoryLog(len(TRUTH), 1000)
+    nodes = [*ship.without(NODE_NAMES), TruthRecorder(ship.plant, log, TICK_NS)]
     Lockstep(nodes, trace=lambda now_ns, sender, frame: sent.append(frame)).run_until(500 * TICK_NS)
     assert sent == []
-    assert len(table.rows) == 500
-    assert np.abs(table.rows[:, TRUTH.index("true_roll_rad")]).max() > 0.005
+    assert len(log.rows) == 500
+    assert np.abs(log.rows[:, TRUTH.index("true_roll_rad")]).max() > 0.005
 
 
 def test_without_nothing_is_the_whole_ship_and_an_unknown_node_is_refused() -> None:

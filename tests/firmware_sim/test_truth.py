@@ -4,15 +4,15 @@ from drive_bench import calm_plant
 
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.canbus import Frame
-from utank_hil.telemetry.table import Table
+from utank_hil.telemetry.memory_log import MemoryLog
 
 PERIOD_NS = 50_000_000
 
 
 def test_rows_are_the_plants_state_at_the_instants_of_the_grid() -> None:
     plant, twin = calm_plant(), calm_plant()
-    table = Table(len(TRUTH), 40)
-    recorder = TruthRecorder(plant, table, PERIOD_NS)
+    log = MemoryLog(len(TRUTH), 40)
+    recorder = TruthRecorder(plant, log, PERIOD_NS)
     start_ns = 123_456_789
     for each in (plant, twin):
         each.advance(start_ns)
@@ -22,7 +22,7 @@ def test_rows_are_the_plants_state_at_the_instants_of_the_grid() -> None:
         recorder.receive(Frame(0x08FF1080, bytes(8)), now_ns)
         assert list(recorder.tick(now_ns)) == []
         twin.advance(now_ns)
-        row = dict(zip(TRUTH, table.rows[index], strict=True))
+        row = dict(zip(TRUTH, log.rows[index], strict=True))
         assert row["time_s"] == pytest.approx(index * 0.05)
         assert row["true_roll_rad"] == twin.roll_rad
         assert row["true_level_m"] == twin.level_m
@@ -30,4 +30,4 @@ def test_rows_are_the_plants_state_at_the_instants_of_the_grid() -> None:
         assert row["true_shaft_power_w"] == twin.pump_power_w
         assert row["wave_moment_nm"] == twin.wave_moment_nm == 0.0
     assert recorder.start_ns == start_ns
-    assert np.abs(table.rows[-1, TRUTH.index("true_level_m")]) > 0.01
+    assert np.abs(log.rows[-1, TRUTH.index("true_level_m")]) > 0.01

@@ -16,7 +16,7 @@ from rerun.experimental import ViewerClient
 
 from utank_hil.telemetry.viewer import (
     LOOPBACK,
-    free_port,
+    free_tcp_port,
     live_url,
     rerun_binary,
     rerun_environment,
@@ -27,7 +27,7 @@ SETTLE_S = 3.0  # for loading and for the first frames; the viewer does not tell
 
 def main(source: str, picture: str, size: str = "1600x1000") -> int:
     """Start a viewer without a window, show the source, save the picture."""
-    port = free_port()
+    port = free_tcp_port()
     command = [rerun_binary(), "--headless", "--bind", LOOPBACK, "--port", str(port)]
     viewer = subprocess.Popen(
         [*command, "--window-size", size, source], env=rerun_environment() | {"RUST_LOG": "error"}

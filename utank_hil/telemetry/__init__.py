@@ -1,7 +1,7 @@
 """Telemetry: a shared-memory ring out of the loop, Rerun recordings and a live view.
 
-The ring is light and may be imported by the controller process. What needs Rerun is
-loaded when its name is first used; so is the recorder, which is also run as a module.
+The ring imports little and may be used by the controller process. Modules that need Rerun are
+imported when a name of theirs is first used; so is the recorder, which is also run as a module.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""What the viewer shows of a recording: which plots, where, and in which colours."""
+"""Layout of the Rerun viewer: plots, their places and colours."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -24,7 +24,7 @@ from utank_hil.telemetry.units import UNITS, Field, Unit, field_of
 
 HALF_WINDOW_S: Final = 60.0
 
-# Okabe and Ito's colours, told apart by colour-blind eyes, in an order that suits a dark background
+# Okabe and Ito's colour-blind safe palette, in an order for a dark background
 _PALETTE: Final = (
     (0xB0, 0xB0, 0xB0),
     (0xE6, 0x9F, 0x00),
@@ -45,10 +45,10 @@ def make_blueprint(
     columns : sequence of str
         Telemetry columns, as given to `RunLog`.
     runs : sequence of str
-        Names of the runs; with several, the colour tells the run, else the signal.
+        Names of the runs; with several, a colour stands for a run, else for a signal.
     span_s : (float, float), optional
-        First and last time of a finished recording: it gets one tab with the whole of it and one
-        that moves with the cursor. Without it the view is live and follows the newest data.
+        First and last time of a finished recording, shown in one tab as a whole and in another
+        around the cursor. By default the view is live and follows the newest data.
     """
     boundary = rr.TimeRangeBoundary
     body: rrb.Container
@@ -81,7 +81,7 @@ def _page(
     columns: Sequence[str],
     runs: Sequence[str],
 ) -> rrb.Vertical:
-    """Lay out all plots between two times: the main ones wide, the others beside, states below."""
+    """Lay out all plots of a time range: main plots left, others right, states below."""
     axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
     fields = [field_of(c) for c in columns if c not in (TIME_COLUMN, *STATE_COLUMNS)]
     groups = {unit: [field for field in fields if field.unit is unit] for unit in UNITS}
@@ -130,7 +130,7 @@ def _plot(
 
 
 def _short_labels(labels: Sequence[str]) -> list[str]:
-    """Leave out the words that all labels of a plot share: its title says them."""
+    """Drop the words that all labels of a plot share: its title has them."""
     words = [label.split() for label in labels]
     shared = set(words[0]).intersection(*words)
     return [" ".join(word for word in label if word not in shared) for label in words]
@@ -153,7 +153,7 @@ def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualize
 
 
 def _colors(run: int, runs: Sequence[str]) -> Iterator[tuple[int, int, int]]:
-    """Colour by signal, or, with several runs, by run and darker from signal to signal."""
+    """Colour by signal; with several runs by run, darker from signal to signal."""
     if len(runs) == 1:
         yield from itertools.cycle(_PALETTE[1:])
     for strength in itertools.chain((1.0, 0.6), itertools.repeat(0.35)):

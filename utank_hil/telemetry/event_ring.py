@@ -1,7 +1,7 @@
-"""Retuning events out of the loop: a telemetry ring whose rows hold text instead of numbers.
+"""Transport of retuning events out of the loop: a telemetry ring whose rows hold JSON text.
 
-Like rows, events are written in microseconds into shared memory, wait for nobody, can be read by
-several processes, and are there to be read after the writer was killed.
+As with the ring itself, a write takes microseconds and never blocks, several processes can read,
+and events survive a killed writer.
 """
 
 import json
@@ -19,9 +19,9 @@ from utank_hil.telemetry.ring import RingReader, RingWriter
 
 _TEXT_WORDS: Final = 1024
 _WORDS: Final = ("length", *(f"text_{number}" for number in range(_TEXT_WORDS)))
-_CAPACITY: Final = 64  # a retuning has four events in as many minutes; readers look every 0.5 s
+_CAPACITY: Final = 64  # a retuning has four events in four minutes; readers poll every 0.5 s
 _LONGEST_BYTES: Final = 8 * _TEXT_WORDS
-_MOST_BYTES_A_CHARACTER: Final = 6  # of JSON, for what must be escaped
+_MOST_BYTES_A_CHARACTER: Final = 6  # of an escaped character in JSON
 
 
 class EventWriter(Closing):
@@ -30,12 +30,12 @@ class EventWriter(Closing):
     Attributes
     ----------
     name : str
-        Under which readers find it.
+        Name of the ring, for readers.
 
     Raises
     ------
     RingError
-        If there is no room for it.
+        If there is no room in shared memory.
     """
 
     def __init__(self) -> None:
@@ -45,13 +45,13 @@ class EventWriter(Closing):
         self._text = self._row[1:].view(np.uint8)
 
     def write(self, event: RetuningEvent, start_ns: int) -> None:
-        """Append one event; never waits. Reasons too long for the ring are cut.
+        """Append one event; never blocks. Reasons too long for a row are cut.
 
         Parameters
         ----------
         event : RetuningEvent
         start_ns : int
-            From which readers count the event's time: that of the first telemetry row.
+            Time of the first telemetry row; readers get the time since then.
         """
         data = _encoded(event, event.reasons, start_ns)
         if len(data) > _LONGEST_BYTES:
@@ -62,12 +62,12 @@ class EventWriter(Closing):
         self._ring.write(self._row)
 
     def close(self) -> None:
-        """Tell readers that no more events will come; idempotent."""
+        """Mark the ring as closed for readers, and free it; idempotent."""
         self._ring.close()
 
 
 class EventReader(Closing):
-    """A reading end with its own cursor, which starts at the oldest event still there.
+    """A reading end with its own cursor, which starts at the oldest event.
 
     Parameters
     ----------
@@ -84,17 +84,17 @@ class EventReader(Closing):
         self._ring = RingReader(name)
 
     def read(self) -> list[RetuningEvent]:
-        """Events since the last call, oldest first, at times since the start; never waits."""
+        """Events since the last call, oldest first, `time_ns` since the start; never blocks."""
         return [_decoded(row) for row in self._ring.read()]
 
     @property
     def ended(self) -> bool:
-        """Whether no more events will be written; ask before reading."""
+        """Whether no more events will be written; check before reading."""
         return self._ring.ended
 
     @property
     def lost(self) -> int:
-        """Events overwritten before this reader got to them."""
+        """Events overwritten before they were read."""
         return self._ring.lost
 
     def close(self) -> None:
@@ -103,9 +103,9 @@ class EventReader(Closing):
 
 
 def event_text(event: RetuningEvent) -> str:
-    """What people read of an event, such as `retuning REFUSED: the record is too short`."""
-    said = f"retuning {event.state.name}"
-    return f"{said}: {'; '.join(event.reasons)}" if event.reasons else said
+    """Text of an event, such as `retuning REFUSED: the record is too short`."""
+    text = f"retuning {event.state.name}"
+    return f"{text}: {'; '.join(event.reasons)}" if event.reasons else text
 
 
 def _encoded(event: RetuningEvent, reasons: tuple[str, ...], start_ns: int) -> bytes:

@@ -1,9 +1,9 @@
-"""The recorder: a process that takes rows and events to a Rerun file and to live viewers.
+"""The recorder: a process that writes rows and events to a Rerun file and to live viewers.
 
 `RecorderProcess` starts it from a bench or from the deployed controller; `python -m
 utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
 is closed, when the ring's writer dies, or on SIGINT or SIGTERM, with all rows written. The
-controller never waits for it: what it cannot take in time is overwritten, and counted here.
+controller never waits for it: rows that it reads too late are overwritten and counted as lost.
 """
 
 import argparse
@@ -22,20 +22,20 @@ from typing import TYPE_CHECKING, Final
 from utank_hil.closing import Closing
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.ring import RingReader
-from utank_hil.telemetry.viewer import LOOPBACK, free_port, live_url, rerun_environment
+from utank_hil.telemetry.viewer import LOOPBACK, free_tcp_port, live_url, rerun_environment
 
 if TYPE_CHECKING:
     import rerun as rr
 
-BATCH_S: Final = 0.5  # every batch costs the file 1 kB; a kill loses up to two
+BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
 LIVE_RUN: Final = "live"
-_LIVE_MEMORY: Final = "64MiB"  # what a viewer that connects late can still see; bounds the memory
+_LIVE_MEMORY: Final = "64MiB"  # history for a viewer that connects late; bounds the memory
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 _FLUSH_TIMEOUT_S: Final = 5.0
 _NICENESS: Final = 5
-_FIRST_BYTES: Final = 1 << 18  # what a recording needs to begin: most of it the blueprint
-_LAST_BYTES: Final = (b"FOOT", 64)  # what the last so many bytes of a finished file hold
+_RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
+_FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
 
 
 class RecorderError(RuntimeError):
@@ -44,7 +44,7 @@ class RecorderError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class RecorderReport:
-    """What a recorder did.
+    """Result of a recording.
 
     Attributes
     ----------
@@ -58,10 +58,10 @@ class RecorderReport:
     lost: int
 
 
-def record(
+def record_ring(
     ring: str, file: Path, live_port: int | None = None, events: str | None = None
 ) -> RecorderReport:
-    """Record a ring until it ends or SIGINT or SIGTERM comes; the work of the recorder process.
+    """Record a ring until it ends, or SIGINT or SIGTERM arrives; main function of the process.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def record(
     RingError
         If there is no such ring.
     OSError
-        If the file can't be made, or there is no room for the beginning of a recording.
+        If the file can't be created, or there is no room for the beginning of a recording.
     RuntimeError
-        If the file can't be written to its end.
+        If the file can't be finished.
     """
     import rerun as rr
 
@@ -91,36 +91,38 @@ def record(
     stop = _stop_pipe()
     with ExitStack() as stack:
         reader = stack.enter_context(RingReader(ring))
-        told = None if events is None else stack.enter_context(EventReader(events))
-        _make_room(file)
+        event_reader = None if events is None else stack.enter_context(EventReader(events))
+        _reserve_file(file)
         sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(file)]
         if live_port is not None:
             sinks.append(rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY))
         recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
         recording.set_sinks(*sinks, default_blueprint=make_blueprint(reader.columns, [LIVE_RUN]))
         log = RunLog(recording, run_paths([LIVE_RUN])[0], reader.columns)
-        _say({"ready": 1})
-        recorded = noted = unheard = 0
+        _print_json({"ready": 1})
+        recorded = reported_rows = reported_events = 0
         while True:
             last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
             rows = reader.read()
-            if reader.lost > noted:
-                log.note(f"{reader.lost - noted} rows lost: the recorder was too slow")
-                noted = reader.lost
+            if reader.lost > reported_rows:
+                log.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
+                reported_rows = reader.lost
             if len(rows):
                 log.write(rows)
                 recorded += len(rows)
-            happened = [] if told is None else told.read()
-            log.write_events(happened)
-            if told is not None and told.lost > unheard:
-                log.note(f"{told.lost - unheard} events lost: the recorder was too slow")
-                unheard = told.lost
-            if len(rows) or happened:
-                _flush(recording)  # into the file, so that a kill finds it there
+            new_events = [] if event_reader is None else event_reader.read()
+            log.write_events(new_events)
+            if event_reader is not None and event_reader.lost > reported_events:
+                log.note(
+                    f"{event_reader.lost - reported_events} events lost: the recorder was too slow"
+                )
+                reported_events = event_reader.lost
+            if len(rows) or new_events:
+                _flush(recording)  # so that a kill does not lose it
             if last:
                 break
         _flush(recording)
-        recording.disconnect()  # writes the footer, and says nothing if it can't
+        recording.disconnect()  # writes the footer; reports no error
         if not _is_finished(file):
             raise RuntimeError(
                 f"its {recorded} rows are written, but not the end of the file: is the disk full?"
@@ -131,8 +133,8 @@ def record(
 class RecorderProcess(Closing):
     """A recorder in a process of its own; ready when the constructor returns.
 
-    Start it before the loop: it takes about a second, most of it Rerun's import. It runs in a
-    session of its own, so Ctrl-C in the terminal does not end it before the loop's last rows.
+    Start it before the loop: it takes about a second, mostly for importing Rerun. It runs in a
+    session of its own, so that Ctrl-C in the terminal does not end it before the loop's last rows.
 
     Parameters
     ----------
@@ -153,7 +155,7 @@ class RecorderProcess(Closing):
     Raises
     ------
     RecorderError
-        If the recorder does not come up, with its reason.
+        If the recorder does not start, with the reason.
     """
 
     def __init__(
@@ -164,7 +166,7 @@ class RecorderProcess(Closing):
             command += ["--events", events]
         self.url: str | None = None
         if live:
-            port = free_port()
+            port = free_tcp_port()
             command += ["--live-port", str(port)]
             self.url = live_url(port)
         self._report: RecorderReport | None = None
@@ -180,21 +182,21 @@ class RecorderProcess(Closing):
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
         self._output = output
-        said = json.loads(output.readline() or "{}") if ready else {}
-        if "ready" not in said:
+        reply = json.loads(output.readline() or "{}") if ready else {}
+        if "ready" not in reply:
             self._kill()
-            reason = said.get(
+            reason = reply.get(
                 "error", "it ended" if ready else f"silent for {_START_TIMEOUT_S:g} s"
             )
             raise RecorderError(f"the recorder of {file} did not start: {reason}")
 
     def stop(self) -> RecorderReport:
-        """Have the last rows written and wait for the end of the process; idempotent.
+        """Write the last rows and wait for the end of the process; idempotent.
 
         Raises
         ------
         RecorderError
-            If the process failed, with its reason, or does not end.
+            If the process failed, with the reason, or does not end.
         """
         if self._report is None:
             self._process.terminate()
@@ -204,15 +206,15 @@ class RecorderProcess(Closing):
                 self._kill()
                 raise RecorderError("the recorder did not end and was killed") from None
             with self._output:
-                said = json.loads(self._output.readline() or "{}")
+                reply = json.loads(self._output.readline() or "{}")
                 if code != 0:
-                    reason = said.get("error", f"exit code {code}")
+                    reason = reply.get("error", f"exit code {code}")
                     raise RecorderError(f"the recorder failed: {reason}")
-                self._report = RecorderReport(**said)
+                self._report = RecorderReport(**reply)
         return self._report
 
     def close(self) -> None:
-        """As `stop`."""
+        """Same as `stop`."""
         self.stop()
 
     def _kill(self) -> None:
@@ -231,16 +233,16 @@ def _main() -> None:
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
-        report = record(arguments.ring, arguments.file, arguments.live_port, arguments.events)
-        _say(asdict(report))
+        report = record_ring(arguments.ring, arguments.file, arguments.live_port, arguments.events)
+        _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
-        _say({"error": str(error)})
-        os._exit(1)  # Rerun's exit hook would wait for ever for a writer that is gone
+        _print_json({"error": str(error)})
+        os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
 
 
 def _flush(recording: "rr.RecordingStream") -> None:
-    """Wait for the writer; with no limit to that, it would be for ever when the disk is full."""
+    """Flush with a timeout: without one it would wait forever on a full disk."""
     recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
 
 
@@ -250,27 +252,27 @@ def _stop_pipe() -> int:
     os.set_blocking(written, False)
     signal.set_wakeup_fd(written)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: None)  # the pipe tells
+        signal.signal(number, lambda _number, _frame: None)  # the wake-up descriptor does the work
     return readable
 
 
-def _make_room(file: Path) -> None:
-    """Raise if the file can't be begun: Rerun would wait for ever for room for its first bytes."""
+def _reserve_file(file: Path) -> None:
+    """Reserve the first bytes, or raise: Rerun would wait forever on a full disk."""
     with file.open("wb") as begun:
-        os.posix_fallocate(begun.fileno(), 0, _FIRST_BYTES)
+        os.posix_fallocate(begun.fileno(), 0, _RESERVED_BYTES)
 
 
 def _is_finished(file: Path) -> bool:
-    """Tell whether a recording has its footer: without it, it is one that was cut off."""
-    mark, length = _LAST_BYTES
+    """Return whether a recording has its footer; a truncated one has none."""
+    mark, length = _FOOTER
     with file.open("rb") as content:
         content.seek(0, os.SEEK_END)
         content.seek(max(0, content.tell() - length))
         return mark in content.read()
 
 
-def _say(message: Mapping[str, int | str]) -> None:
-    """Tell the parent, one JSON object a line."""
+def _print_json(message: Mapping[str, int | str]) -> None:
+    """Send a message to the parent: one JSON object a line on standard output."""
     print(json.dumps(message), flush=True)
 
 

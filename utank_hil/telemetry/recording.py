@@ -1,4 +1,4 @@
-"""Whole recordings: written at once after a lockstep bench, and read back."""
+"""Rerun recordings as a whole: written after a lockstep bench, and read back."""
 
 import subprocess
 import tempfile
@@ -30,7 +30,7 @@ from utank_hil.telemetry.units import column_of
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
-_BLOCK_ROWS: Final = 8192  # the viewer loads a file by such blocks
+_BLOCK_ROWS: Final = 8192  # rows of a chunk, the unit in which the viewer loads a file
 
 
 def write_recording(
@@ -46,11 +46,11 @@ def write_recording(
     path : Path
         The `.rrd` file; written anew.
     columns : sequence of str
-        Names of the values of a row, SI units, `time_s` among them.
+        Names of a row's values, in SI units, `time_s` among them.
     runs : mapping of str to array (n, len(columns))
-        Rows of each run by its name; the first is taken for the one to compare with.
+        Rows of each run by name; the first run is the reference.
     events : mapping of str to sequence of RetuningEvent, optional
-        What retuning did in the runs that retuned; `time_ns` counts as `time_s` does.
+        Retuning events by run, `time_ns` on the clock of `time_s`.
 
     Raises
     ------
@@ -81,13 +81,13 @@ def write_recording(
 
 
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
-    """Read the runs of a recording, live ones and ones that were cut off included.
+    """Read the runs of a recording, also of a live or a truncated one.
 
     Returns
     -------
     dict
-        Columns by run and name, in SI units, each an array (n,); `time_s` to the nanosecond,
-        the others to the rounding of their change of unit.
+        Arrays (n,) by run and column, in SI units; `time_s` is exact to 1 ns, the others to the
+        rounding of their unit conversion.
 
     Raises
     ------
@@ -112,22 +112,22 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
 
 
 def _telemetry_chunks(path: Path) -> list[Chunk]:
-    """Return the chunks that hold rows; a file cut off within a message is mended on the way."""
+    """Return the chunks with rows; a file truncated within a message is repaired first."""
     try:
         return _read_chunks(path)
     except RuntimeError as error:
         if "exceeds file size" not in str(error):
             raise ValueError(f"{path}: {error}") from error
     with tempfile.TemporaryDirectory() as folder:
-        mended = Path(folder) / path.name
-        command = [rerun_binary(), "rrd", "optimize", str(path), "-o", str(mended)]
+        repaired = Path(folder) / path.name
+        command = [rerun_binary(), "rrd", "optimize", str(path), "-o", str(repaired)]
         subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
-        return _read_chunks(mended)
+        return _read_chunks(repaired)
 
 
 def _read_chunks(path: Path) -> list[Chunk]:
     with warnings.catch_warnings():
-        # what a killed recorder leaves behind; the rows are there
+        # left by a killed recorder; the rows are intact
         warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)
         reader = RrdReader(path)
     if not reader.recordings():

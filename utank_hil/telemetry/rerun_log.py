@@ -1,10 +1,9 @@
-"""Telemetry rows into a Rerun recording.
+"""Log telemetry rows to a Rerun recording.
 
 A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
-One entity instead of one a signal makes the file two to three times smaller at a live recorder's
-batch size, and the names in the file say what is in it. Mode and fault are logged once more by
-name, on change only, for the state lane and for the text log, which holds what retuning did and why
-besides.
+One entity for all signals makes the file two to three times smaller at a live recorder's batch
+size. Mode and fault are also logged by name, on change only, to a state lane and to a text log. The
+text log holds the retuning events as well.
 """
 
 import re
@@ -29,7 +28,7 @@ ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
 STATE_COLUMNS: Final = ("mode", "fault")
-"""Columns that together are the state lane of a run."""
+"""Columns that make up the state lane of a run."""
 
 _ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
 
@@ -51,7 +50,7 @@ def _state_name(mode: float, fault: float) -> str:
 
 
 def _level(mode: float, fault: float) -> rr.TextLogLevel:
-    """How loud a state is told."""
+    """Log level of a state."""
     if mode == Mode.FAULT:
         return rr.TextLogLevel.ERROR
     return rr.TextLogLevel.INFO if fault == Fault.NONE else rr.TextLogLevel.WARN
@@ -63,9 +62,9 @@ class RunLog:
     Parameters
     ----------
     recording : rerun.RecordingStream
-        Where the rows go.
+        Destination.
     path : str
-        Entity of the run, from `run_paths`.
+        Entity path of the run, from `run_paths`.
     columns : sequence of str
         Names of a row's values; `time_s` must be among them.
 
@@ -89,7 +88,7 @@ class RunLog:
             recording.log(state_path(path), style, static=True, strict=True)
 
     def write(self, rows: FloatArray) -> None:
-        """Append rows, an array (n, width); NaN is kept and leaves a gap in the plot."""
+        """Append rows, an array (n, width); NaN leaves a gap in the plot."""
         time_ns = np.rint(rows[:, self._time] * 1e9).astype("timedelta64[ns]")
         row = pa.StructArray.from_arrays(
             [pa.array(rows[:, i] * field.unit.scale) for i, field in self._fields],
@@ -120,7 +119,7 @@ class RunLog:
             self._write_text(time_ns[changed], names, [_level(*state) for state in states[changed]])
 
     def write_events(self, events: Sequence[RetuningEvent]) -> None:
-        """Log what retuning did and why; `time_ns` counts as the rows' `time_s` does."""
+        """Log retuning events; `time_ns` is on the clock of the rows' `time_s`."""
         if events:
             bad = (RetuningState.REFUSED, RetuningState.UNDONE)
             self._write_text(
@@ -151,33 +150,33 @@ class RunLog:
 
 
 def time_index(columns: Sequence[str]) -> int:
-    """Return the place of the time among the columns, which must be there (else ValueError)."""
+    """Return the index of the time column; ValueError if there is none."""
     if TIME_COLUMN not in columns:
         raise ValueError(f"telemetry needs a column {TIME_COLUMN!r}, got {tuple(columns)}")
     return columns.index(TIME_COLUMN)
 
 
 def has_state(columns: Sequence[str]) -> bool:
-    """Tell whether rows of these columns have a state lane."""
+    """Return whether these columns make a state lane."""
     return set(STATE_COLUMNS) <= set(columns)
 
 
 def run_paths(runs: Sequence[str]) -> list[str]:
-    """Return the entity of each run; numbered, because the viewer draws them in order of path."""
+    """Return the entity path of each run; the number sets the drawing order in the viewer."""
     return [f"/{i}/{rr.escape_entity_path_part(run)}" for i, run in enumerate(runs, start=1)]
 
 
 def run_of(path: str) -> str:
-    """Return the name of the run whose entity this is."""
+    """Return the run's name from its entity path."""
     escaped = path.split("/", 2)[2]
     return _ESCAPE.sub(lambda m: chr(int(m["code"], 16)) if m["code"] else m["mark"], escaped)
 
 
 def state_path(path: str) -> str:
-    """Return the entity of a run's state lane."""
+    """Return the entity path of a run's state lane."""
     return f"{path}/state"
 
 
 def log_path(path: str) -> str:
-    """Return the entity of a run's text log."""
+    """Return the entity path of a run's text log."""
     return f"{path}/log"

@@ -1,8 +1,8 @@
-"""How a telemetry column is shown: the unit people read, and the plot it belongs to.
+"""Display units and plots of telemetry columns.
 
-Columns carry SI values and name their unit (`roll_rad`); recordings hold what is plotted
-(`roll_deg`), because the viewer cannot convert. The suffix alone decides, so a column nobody has
-thought of yet finds its plot, its unit and its way back.
+Columns carry SI values and end in their unit (`roll_rad`); recordings hold the displayed values
+(`roll_deg`), because the viewer cannot convert. The suffix alone determines unit and plot, so a new
+column needs no entry here.
 """
 
 import math
@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit of the interfaces and the one it is shown in.
+    """An SI unit and its display unit.
 
     Attributes
     ----------
     suffix, shown_suffix : str
-        Ends of the column's name and of the recorded field's name.
+        Endings of the column's name and of the recorded field's name.
     scale : float
-        Shown value per SI value.
+        Displayed value per SI value.
     plot : str
-        Title of the plot that all columns of this unit share.
+        Title of the plot of all columns of this unit.
     main : bool
         Whether that plot is one of the large ones.
     """
@@ -32,7 +32,7 @@ class Unit:
     main: bool = False
 
 
-# A suffix stands before the shorter ones that end alike.
+# In order of matching: a suffix comes before any shorter one that it ends in.
 UNITS = (
     Unit("_rad_s", "_deg_s", 180 / math.pi, "Roll rate, °/s"),
     Unit("_rad", "_deg", 180 / math.pi, "Roll, °", main=True),
@@ -56,7 +56,7 @@ class Field:
     name : str
         Name in the recording, unit included.
     label : str
-        Name for people; the plot's title has the unit.
+        Label in the plot, without unit.
     unit : Unit
     """
 
@@ -66,12 +66,12 @@ class Field:
 
 
 def field_of(column: str) -> Field:
-    """Return how a column is recorded and shown.
+    """Return the recorded field of a column.
 
     Raises
     ------
     ValueError
-        If the name says that the values are not in SI units.
+        If the column's name ends in a unit that is not SI.
     """
     unit = next(unit for unit in UNITS if column.endswith(unit.suffix))
     stem = column.removesuffix(unit.suffix)
@@ -82,6 +82,6 @@ def field_of(column: str) -> Field:
 
 
 def column_of(name: str) -> tuple[str, Unit]:
-    """Return the column, and its unit, that a recorded field's name stands for."""
+    """Return the column, and its unit, of a recorded field's name."""
     unit = next(unit for unit in UNITS if name.endswith(unit.shown_suffix))
     return name.removesuffix(unit.shown_suffix) + unit.suffix, unit

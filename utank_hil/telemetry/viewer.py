@@ -19,7 +19,7 @@ class Viewer(Closing):
     Attributes
     ----------
     url : str or None
-        Where a browser finds the viewer; None if it has a window of its own.
+        Address for a browser; None if the viewer has its own window.
     """
 
     def __init__(self, process: subprocess.Popen[bytes], url: str | None) -> None:
@@ -27,7 +27,7 @@ class Viewer(Closing):
         self.url = url
 
     def wait(self) -> None:
-        """Wait until the user closes the window; for ever if the viewer is in a browser."""
+        """Wait until the user closes the window; forever if the viewer is in a browser."""
         self._process.wait()
 
     def close(self) -> None:
@@ -37,10 +37,10 @@ class Viewer(Closing):
 
 
 def open_viewer(source: Path | str) -> Viewer:
-    """Show a recording, or a live stream, in a window or else in the browser.
+    """Show a recording or a live stream in a window, or in a browser if there is no display.
 
-    Where there is no display the viewer is served on loopback, and `Viewer.url` is to be opened
-    in a browser of this machine (or through an ssh tunnel).
+    Without a display the viewer is served on loopback at `Viewer.url`, for a browser on this
+    machine or through an ssh tunnel.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def open_viewer(source: Path | str) -> Viewer:
         command += ["--port", "auto"]
         url = None
     else:
-        data_port, page_port = free_port(), free_port()
+        data_port, page_port = free_tcp_port(), free_tcp_port()
         command += ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
         data = live_url(data_port) if isinstance(source, Path) else source
         url = f"http://{LOOPBACK}:{page_port}?url={quote(data, safe='')}"
@@ -70,7 +70,7 @@ def open_viewer(source: Path | str) -> Viewer:
 
 
 def rerun_binary() -> str:
-    """Return the viewer's executable itself: the `rerun` script would leave it behind if killed."""
+    """Return the viewer's executable; the `rerun` script would leave it running if killed."""
     package = importlib.util.find_spec("rerun_cli")
     assert package is not None
     assert package.origin is not None
@@ -78,17 +78,17 @@ def rerun_binary() -> str:
 
 
 def rerun_environment() -> dict[str, str]:
-    """Return an environment in which Rerun does not call home, and reports warnings only."""
+    """Return an environment without Rerun's analytics, and with warnings only in its log."""
     return os.environ | {"CI": "1", "RUST_LOG": "warn"}
 
 
 def live_url(port: int) -> str:
-    """Return where viewers find what a process of this machine serves on a port."""
+    """Return the address of a live stream that is served on a loopback port."""
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
-def free_port() -> int:
-    """Return a port of the loopback interface that nobody listens on."""
+def free_tcp_port() -> int:
+    """Return a free TCP port of the loopback interface."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         port: int = probe.getsockname()[1]

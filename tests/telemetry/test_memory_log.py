@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.telemetry.table import Table
+from utank_hil.telemetry.memory_log import MemoryLog
 
 
 @given(
@@ -14,20 +14,20 @@ from utank_hil.telemetry.table import Table
 def test_every_nth_row_is_kept_and_nothing_beyond_the_promised_length(
     promised: int, offered: int, every: int
 ) -> None:
-    table = Table(2, promised, every)
+    log = MemoryLog(2, promised, every)
     row = np.zeros(2)
     for index in range(offered):
         row[:] = index, -index
-        table.write(row)
+        log.write(row)
     expected = np.array([(i, -i) for i in range(0, min(offered, promised), every)])
-    np.testing.assert_array_equal(table.rows, expected.reshape(-1, 2))
+    np.testing.assert_array_equal(log.rows, expected.reshape(-1, 2))
 
 
 def test_rows_are_copied_and_of_the_tables_width() -> None:
-    table = Table(3, 2)
+    log = MemoryLog(3, 2)
     row = np.ones(3)
-    table.write(row)
+    log.write(row)
     row[:] = 7.0
-    assert table.rows.tolist() == [[1.0, 1.0, 1.0]]
+    assert log.rows.tolist() == [[1.0, 1.0, 1.0]]
     with pytest.raises(ValueError, match="shape"):
-        table.write(np.ones(4))
+        log.write(np.ones(4))
