@@ -1,7 +1,8 @@
 """Closed-form response of ship and tank to sinusoidal pump pressure and wave moment, (2.22)-(2.26).
 
-Written as in the thesis, with the tank angle tau = 2 h / L and real arithmetic, so that it is
-independent of complex algebra on the matrices; slips of the print put right (docs/errata.md):
+Written as in the thesis, with the tank angle tau = 2 h / L and in real arithmetic. So it is an
+independent check of complex arithmetic on the matrices. Errors of the print are corrected
+(docs/errata.md):
 
 * every pump term carries f^2, P0 / k_hh -> f^2 P0 / k_hh (A, B, C, D and (2.25));
 * (2.24) has no mass ratio in the roll's phase: atan2(2 q b_hh / C_c, f^2 - q^2);
@@ -27,7 +28,7 @@ class HarmonicResponse(NamedTuple):
     roll_rad, roll_phase_rad : ndarray, shape (n,)
         Roll amplitude and phase, the phase in (-pi, pi].
     tank_angle_rad, level_m, tank_phase_rad : ndarray, shape (n,)
-        Amplitudes of the tank angle and of the starboard level, and the phase they share.
+        Amplitudes of the tank angle and of the starboard level, and their common phase.
     """
 
     roll_rad: FloatArray
@@ -47,9 +48,9 @@ def harmonic_response(
     wave_moment_nm: float = 0.0,
     wave_phase_rad: float = 0.0,
 ) -> HarmonicResponse:
-    """Response of the linear coupled model to sinusoidal inputs, thesis (2.22) put right.
+    """Steady response of the linear coupled model to sinusoidal inputs, thesis (2.22) corrected.
 
-    One amplitude alone gives the wave response (2.23), (2.24) or the pump response (2.25), (2.26).
+    With one amplitude zero it is the wave response (2.23), (2.24) or pump response (2.25), (2.26).
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def harmonic_response(
     HarmonicResponse
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
-    half = tank.width_m / 2  # level per tank angle; the level's row times it is a moment
+    half = tank.width_m / 2  # level per tank angle; turns the level's force into a moment
     m_tt, b_tt, k_tt = (half**2 * matrix[1, 1] for matrix in (mass, damping, stiffness))
     m_rt, k_rt = (half * matrix[0, 1] for matrix in (mass, stiffness))
     m_rr, b_rr, k_rr = (matrix[0, 0] for matrix in (mass, damping, stiffness))
@@ -90,17 +91,17 @@ def harmonic_response(
     d_real = tank_real * ship_real - tank_imag * ship_imag - mu * coupling**2
     d_imag = tank_real * ship_imag + ship_real * tank_imag
 
-    size = np.hypot(d_real, d_imag)
-    tank_angle = np.hypot(a, c) / size
+    magnitude = np.hypot(d_real, d_imag)
+    tank_angle = np.hypot(a, c) / magnitude
     return HarmonicResponse(
-        roll_rad=np.hypot(b, d) / size,
-        roll_phase_rad=_difference(np.arctan2(d, b), np.arctan2(d_imag, d_real)),
+        roll_rad=np.hypot(b, d) / magnitude,
+        roll_phase_rad=_phase_difference(np.arctan2(d, b), np.arctan2(d_imag, d_real)),
         tank_angle_rad=tank_angle,
         level_m=half * tank_angle,
-        tank_phase_rad=_difference(np.arctan2(c, a), np.arctan2(d_imag, d_real)),
+        tank_phase_rad=_phase_difference(np.arctan2(c, a), np.arctan2(d_imag, d_real)),
     )
 
 
-def _difference(phase: FloatArray, reference: FloatArray) -> FloatArray:
+def _phase_difference(phase: FloatArray, reference: FloatArray) -> FloatArray:
     """Phase difference in (-pi, pi]."""
     return np.asarray(np.pi - (np.pi - (phase - reference)) % (2 * np.pi), dtype=np.float64)

@@ -1,12 +1,12 @@
-"""Compiled fixed-step integration of the nonlinear coupled model. Imports numba: import it late.
+"""Compiled fixed-step integration of the nonlinear coupled model; imports numba, so import it late.
 
 Classical Runge-Kutta of order four. The wave moment is a sum of components ``amplitude
-cos(frequency t + phase)``, advanced by rotating one phasor per component and refreshed from the
-cosines every `REFRESH` steps: a step costs no trigonometry of the sea and rounding does not build
-up. Pump pressure and valve loss are held over whole steps.
+cos(frequency t + phase)``. It is advanced by rotating one phasor per component, without cosines,
+and recomputed from the cosines every `REFRESH` steps, so that rounding errors do not accumulate.
+Pump pressure and valve loss are held over whole steps.
 
-A step in which the level passes its limit is cut at the strike (the Illinois method finds its
-length), the impulse is applied, and the rest of the step follows.
+A step in which the level passes its limit ends at the impact, found by the Illinois method. The
+impulse is applied, and the rest of the step follows.
 """
 
 import math
@@ -19,10 +19,10 @@ from utank_hil.dynamics.nonlinear import RollCoefficients
 from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
 
 REFRESH = 256  # a power of two
-STRIKES_PER_STEP = 8  # with more than these in one step the water comes to rest at the stop
+STRIKES_PER_STEP = 8  # beyond these the water comes to rest at the stop
 CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE = range(5)  # entries of a ship's summary
 SUMMARY = 5
-# sums may be reordered and fused, for vector instructions; NaN and infinity keep their meaning
+# allows reordered and fused sums for vector instructions; NaN and infinity stay exact
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 State = tuple[float, float, float, float]
@@ -32,8 +32,7 @@ State = tuple[float, float, float, float]
 def sine_cosine(angle: float) -> tuple[float, float]:
     """Sine and cosine together, to 2e-16 for angles of a few turns.
 
-    The minimax polynomials of fdlibm on -pi/4 to pi/4; half the time of a step went into calls of
-    the library's two functions.
+    The minimax polynomials of fdlibm on -pi/4 to pi/4; they halve the time of a step.
     """
     quarter = math.floor(angle * (2 / math.pi) + 0.5)
     r = angle - quarter * (math.pi / 2)
@@ -112,7 +111,7 @@ def rk4(
     valve: float,
     dt: float,
 ) -> State:
-    """One step; `moments` are the wave's at its start, middle and end."""
+    """One Runge-Kutta step; `moments` are the wave moments at its start, middle and end."""
     x, v1, h, w1 = state
     start, middle, end = moments
     half = 0.5 * dt
@@ -136,22 +135,22 @@ def rk4(
 
 
 @njit(cache=True, error_model="numpy")
-def _part(
+def _moments_within(
     moments: tuple[float, float, float], begin: float, end: float
 ) -> tuple[float, float, float]:
-    """Moments at start, middle and end of a part of the step, by the parabola through three."""
+    """Wave moments at start, middle and end of a part of the step, by quadratic interpolation."""
     a, b, c = moments
-    slope, bend = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
+    slope, curvature = 4 * b - 3 * a - c, 2 * (a + c - 2 * b)
     mid = 0.5 * (begin + end)
     return (
-        a + begin * (slope + begin * bend),
-        a + mid * (slope + mid * bend),
-        a + end * (slope + end * bend),
+        a + begin * (slope + begin * curvature),
+        a + mid * (slope + mid * curvature),
+        a + end * (slope + end * curvature),
     )
 
 
 @njit(cache=True, error_model="numpy")
-def cut_step(
+def step_with_impacts(
     c: RollCoefficients,
     per_piece: float,
     restoring: FloatArray,
@@ -164,13 +163,13 @@ def cut_step(
     impacts: FloatArray,
     summary: FloatArray,
 ) -> State:
-    """One step with strikes at the limits of the level, each written to `impacts` and counted."""
+    """One step with impacts at the level limits, each counted and written to `impacts`."""
     done = 0.0
     limit = c.level_limit
     for strike in range(STRIKES_PER_STEP + 1):
         left = 1.0 - done
-        part = _part(moments, done, 1.0)
-        after = rk4(c, per_piece, restoring, state, part, pump, valve, left * dt)
+        moments_left = _moments_within(moments, done, 1.0)
+        after = rk4(c, per_piece, restoring, state, moments_left, pump, valve, left * dt)
         if abs(after[2]) <= limit:
             return after
         side = math.copysign(1.0, after[2])
@@ -180,11 +179,11 @@ def cut_step(
             if g_high < 1e-13 or high - low < 1e-15 or g_low >= 0:
                 break
             s = high - g_high * (high - low) / (g_high - g_low)
-            part = _part(moments, done, done + s)
-            trial = rk4(c, per_piece, restoring, state, part, pump, valve, s * dt)
-            g = side * trial[2] - limit
+            moments_left = _moments_within(moments, done, done + s)
+            candidate = rk4(c, per_piece, restoring, state, moments_left, pump, valve, s * dt)
+            g = side * candidate[2] - limit
             if g > 0:
-                high, g_high, after = s, g, trial
+                high, g_high, after = s, g, candidate
                 g_low *= 0.5
             else:
                 low, g_low = s, g
@@ -206,12 +205,12 @@ def cut_step(
             impacts[number, 4] = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
         summary[STRIKES] += 1
         summary[MAX_IMPULSE] = max(summary[MAX_IMPULSE], abs(c.ship_inertia * roll_jump))
-        # at rest exactly on the limit, where `accelerations` holds it; else a hair inside, so that
-        # the next strike is a change of sign
+        # at rest exactly on the limit, where `accelerations` holds it; else just inside, so that
+        # the next impact is a change of sign
         h = side * (limit if rebound == 0.0 else limit - INSIDE_M)
         state = (x, v + roll_jump, h, rebound)
-    part = _part(moments, done, 1.0)
-    x, v, h, w = rk4(c, per_piece, restoring, state, part, pump, valve, (1.0 - done) * dt)
+    moments_left = _moments_within(moments, done, 1.0)
+    x, v, h, w = rk4(c, per_piece, restoring, state, moments_left, pump, valve, (1.0 - done) * dt)
     return x, v, math.copysign(min(abs(h), limit), h), w
 
 
@@ -236,11 +235,11 @@ def advance(
     out: FloatArray,
     stride: int,
 ) -> None:
-    """Advance one ship from step `first` by `steps`; `state`, `summary`, `impacts`, `out` change.
+    """Advance one ship from step `first` by `steps`; updates `state`, `summary`, `impacts`, `out`.
 
-    `row` holds `RollCoefficients`. Samples of pressure and valve loss last `hold` steps each, the
-    last one for ever. `out` (k, 4) takes the state before every `stride`-th step. A capsized ship
-    stays as it was when it passed the angle `capsize`.
+    `row` holds `RollCoefficients`. Each sample of pressure and valve loss is held for `hold` steps,
+    the last one to the end. `out` (k, 4) receives the state before every `stride`-th step. A
+    capsized ship keeps the state in which it passed the angle `capsize`.
     """
     c = RollCoefficients(
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
@@ -257,19 +256,19 @@ def advance(
     alive = summary[CAPSIZED_S] == np.inf
     max_roll, max_level = summary[MAX_ROLL], summary[MAX_LEVEL]
     start = 0.0
-    # counters instead of remainders: integer division would cost as much as a sine
-    record, row_out = 0, 0
+    # counters, because integer division costs as much as a sine
+    until_output, row_out = 0, 0
     sample, held = first // hold, first % hold
     pump = c.area * pressure[min(sample, len(pressure) - 1)]
     valve = c.area * valve_loss[min(sample, len(valve_loss) - 1)]
     for i in range(steps):
-        if record == 0:
-            record = stride
+        if until_output == 0:
+            until_output = stride
             if row_out < out.shape[0]:
                 for k in range(4):
                     out[row_out, k] = now[k]
             row_out += 1
-        record -= 1
+        until_output -= 1
         if not alive:
             continue
         step = first + i
@@ -295,7 +294,7 @@ def advance(
         moments = (start, middle, end)
         after = rk4(c, per_piece, restoring, now, moments, pump, valve, dt)
         if abs(after[2]) > c.level_limit:
-            after = cut_step(
+            after = step_with_impacts(
                 c, per_piece, restoring, now, moments, pump, valve, dt, step * dt, impacts, summary
             )
         now, start = after, end
@@ -330,7 +329,7 @@ def advance_batch(
 ) -> None:
     """`advance` for every row of `state` (n, 4), on all cores.
 
-    Every other array has a leading axis of length n, or 1 if all ships share it.
+    Every other array has a leading axis of length n, or of length 1 for all ships.
     """
     for n in prange(state.shape[0]):
         advance(

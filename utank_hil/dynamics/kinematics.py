@@ -1,4 +1,4 @@
-"""Transformation between body and earth axes, thesis (2.5 ff.), put right.
+"""Transformation between body and earth axes, thesis (2.5 ff.), corrected.
 
 Euler angles (roll, pitch, yaw) in the order of Fossen: earth to body by yaw, then pitch, then roll.
 """

@@ -1,4 +1,4 @@
-"""The linear coupled model of roll and tank, thesis (2.19) with its signs put right.
+"""The linear coupled model of roll and tank, thesis (2.19) with corrected signs.
 
 With the level h instead of the tank angle, q = (phi, h), pump pressure P and wave moment K::
 
@@ -9,7 +9,7 @@ With the level h instead of the tank angle, q = (phi, h), pump pressure P and wa
     K = [ k_phi              -rho g At L               ]
         [ -rho g At L         2 rho g At               ]
 
-where m_phi and k_phi hold the ship and the water at rest in the tank.
+where m_phi and k_phi include the ship and the water at rest in the tank.
 """
 
 from typing import TYPE_CHECKING
@@ -58,14 +58,14 @@ def coupled_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray
 
 
 def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
-    """State and input matrix of `coupled_model`, for processes that do without python-control.
+    """State and input matrix of `coupled_model`, without python-control.
 
     Returns
     -------
     a : ndarray, shape (4, 4)
-        Between `STATES`.
+        State matrix for `STATES`.
     b : ndarray, shape (4, 2)
-        From `INPUTS`.
+        Input matrix for `INPUTS`.
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     inverse = np.linalg.inv(mass)

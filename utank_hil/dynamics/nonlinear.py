@@ -1,4 +1,4 @@
-"""Nonlinear coupled model of roll and tank at any angle, by Lagrange's equations.
+"""Nonlinear coupled model of roll and tank at any angle, from Lagrange's equations.
 
 With q = (phi, h), kinetic and potential energy::
 
@@ -15,7 +15,8 @@ the equations of motion are::
     m_c phi'' + m_h h'' = At P - At (c1 + c2 |h'|) h' + m2 h phi'^2
         + rho g At L sin phi - 2 rho g At h cos phi
 
-They replace (4.2)-(4.4), whose h phi'^2 and h h' phi' terms conserve no energy as printed.
+They replace thesis (4.2)-(4.4), whose printed h phi'^2 and h h' phi' terms violate conservation of
+energy.
 
 The level is stopped where one reservoir is full or the other one empty. The stop is an impulse J on
 the level alone: h' changes to -e h', and the roll rate jumps through the coupling,
@@ -36,7 +37,7 @@ from utank_hil.dynamics.water import water_moments
 
 
 class RollCoefficients(NamedTuple):
-    """Numbers in the equations of motion, in the order in which the kernels read them."""
+    """Coefficients of the equations of motion in SI units; the kernels rely on their order."""
 
     inertia: float  # m0
     inertia_h2: float  # m2
@@ -58,18 +59,17 @@ class RollCoefficients(NamedTuple):
 
 
 class Impact(NamedTuple):
-    """The water striking a limit of the level.
+    """An impact of the water at a limit of the level.
 
     Attributes
     ----------
     time_s : float
     level_m : float
-        Limit that was struck; positive if starboard is full.
+        The limit; positive if starboard is full.
     speed_m_s : float
-        dh/dt just before.
+        dh/dt just before the impact.
     roll_impulse_nms : float
-        Impulsive roll moment of tank and water on the ship: its inertia times the jump of its
-        roll rate.
+        Angular impulse of tank and water on the ship: its inertia times the jump of its roll rate.
     stop_impulse_ns : float
         Impulse of the stop on the water along h (pressure times reservoir area, over time).
     """
@@ -154,7 +154,7 @@ class RollModel:
         return np.stack(np.broadcast_arrays(phi_dot, phi_ddot, h_dot, h_ddot), axis=-1)
 
     def strike(self, time_s: float, state: FloatArray) -> tuple[FloatArray, Impact]:
-        """State after the water has struck the limit it stands at, and the impact.
+        """State after an impact at the present level, and the impact.
 
         Parameters
         ----------

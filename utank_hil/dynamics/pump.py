@@ -1,21 +1,21 @@
 """Axial propeller pump in the duct, its drive, and the pressure loop around it (thesis Fig. 2.2).
 
-Blades as a screw. At the effective radius r the blade moves at r n, the water at u = Q / A, so it
-is met at W = sqrt((r n)^2 + u^2) and slips by s = p n - u, p the pitch per radian::
+Blade model. At the effective radius r the blade moves at r n and the water at u = Q / A. The
+relative speed is W = sqrt((r n)^2 + u^2) and the slip s = p n - u, p the pitch per radian::
 
     pressure rise   dP = rho / 2 lift W s
     shaft torque    T  = p A dP + rho / 2 friction A r^2 n W
     shaft power   T n  = dP Q + rho / 2 A W (lift s^2 + friction (r n)^2)
 
-The torque is that of a blade force normal to the blade, plus skin friction. So what the shaft gives
-is what the water gets plus losses that are never negative, in all four quadrants of speed n and
-flow Q. dP rises with n and falls with Q everywhere as long as the blade angle at r lies between
-19.5 and 70.5 degrees (1/sqrt(8) < p/r < sqrt(8)). A positive dP raises the starboard level.
+The torque is that of a blade force normal to the blade, plus skin friction. So shaft power is
+hydraulic power plus losses that are never negative, in all four quadrants of speed n and flow Q.
+dP increases with n and decreases with Q as long as the blade angle at r lies between 19.5 and 70.5
+degrees (1/sqrt(8) < p/r < sqrt(8)). A positive dP raises the starboard level.
 
-Inner loop. The set-point is limited, lagged and limited in rate to a reference; a PI controller on
-the reference's error adds to the reference, the inverse of the head curve at the present flow turns
-the sum into a speed, and the drive's speed loop follows within the limits of torque and power.
-Inside the limits the pressure follows the set-point like a first-order lag of `lag_s`.
+Pressure loop. The set-point is saturated, low-pass filtered and rate-limited to a reference. A PI
+controller on the pressure error adds to the reference. The inverse head curve at the present flow
+turns the sum into a speed, which the drive's speed loop follows within its limits of torque and
+power. Inside the limits the pressure follows the set-point with a first-order lag of `lag_s`.
 
 The functions take and return plain numbers and named tuples of numbers, so that they can be
 compiled (`compile_pump`); this module does not import a compiler.
@@ -31,7 +31,7 @@ from utank_hil.parameters import Positive, Problem, range_problems, refuse
 
 
 class PumpCoefficients(NamedTuple):
-    """What the step functions need of a `Pump`, in SI units."""
+    """Parameters of a `Pump` for the step functions, in SI units."""
 
     area: float
     radius: float
@@ -78,13 +78,13 @@ class Pump:
     lift, friction : float
         Blade coefficients for rho / 2: solidity times lift slope, and skin friction.
     inertia_kg_m2 : float
-        Rotor, motor (referred to the propeller) and entrained water.
+        Moment of inertia of rotor, motor (referred to the propeller) and entrained water.
     max_speed_rad_s, max_torque_nm, max_power_w : float
-        Limits of motor and drive, in either direction; power is the shaft's.
+        Limits of motor and drive in either direction; the power is shaft power.
     max_pressure_pa, max_pressure_rate_pa_s : float
-        Limits of the reference.
+        Limits of the pressure reference.
     lag_s : float
-        Time constant of pressure behind set-point, inside the limits.
+        Time constant from set-point to pressure, inside the limits.
     speed_bandwidth_rad_s : float
         Bandwidth of the drive's speed loop.
     pressure_gain, integral_time_s : float
@@ -94,8 +94,8 @@ class Pump:
     Raises
     ------
     ValueError
-        If a value is not positive and finite, if the pitch makes the head curve ambiguous, or if
-        the loop is slower than the lag.
+        If a value is not positive and finite, the pitch makes the head curve ambiguous, or the loop
+        is slower than the lag.
     """
 
     duct_area_m2: Positive
@@ -117,7 +117,7 @@ class Pump:
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
-        if not problems:  # else these can't be computed
+        if not problems:  # the checks below divide by these values
             problems = [*self._blade_problems(), *self._lag_problems()]
         refuse("pump", problems)
 
@@ -145,12 +145,12 @@ class Pump:
 
     @classmethod
     def for_duct(cls, area_m2: float, max_pressure_pa: float = 50e3) -> "Pump":
-        """Pump for a duct, similar to the first ship's.
+        """Pump for a duct, scaled from the first ship's pump by similarity.
 
-        The first ship's (6.22 m^2, 50 kPa at up to 45 m^3/s, 2.25 MW to the water) is of the size
-        of a 3.5 MW tunnel thruster: 2.8 m, 25 rad/s, 67 % efficient there. Geometric similarity
-        with water speeds as the square root of pressure gives the others: shaft speed as
-        sqrt(P/A), torque P A^1.5, power P^1.5 A, inertia A^2.5.
+        That pump (6.22 m^2, 50 kPa at up to 45 m^3/s, 2.25 MW of hydraulic power) has the size of
+        a 3.5 MW tunnel thruster: 2.8 m, 25 rad/s, 67 % efficiency. With geometric similarity and
+        water speeds proportional to the square root of pressure, shaft speed scales as sqrt(P/A),
+        torque as P A^1.5, power as P^1.5 A and inertia as A^2.5.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class Pump:
 
     @property
     def reference_lag_s(self) -> float:
-        """Lag of the reference: what is left of `lag_s` after the loop's own."""
+        """Time constant of the reference filter: `lag_s` minus the lag of the pressure loop."""
         return self.lag_s - self._loop_lag_s
 
     @property
@@ -189,7 +189,7 @@ class Pump:
 
     @property
     def coefficients(self) -> PumpCoefficients:
-        """The argument of the step functions."""
+        """Parameters for the step functions."""
         return PumpCoefficients(
             area=self.duct_area_m2,
             radius=self.radius_m,
@@ -216,10 +216,10 @@ def pump_pressure(speed: float, flow: float, c: PumpCoefficients) -> float:
 
 
 def pump_load(speed: float, flow: float, c: PumpCoefficients) -> tuple[float, float]:
-    """Torque of the water on the shaft in N m and its slope with speed in N m s, not negative."""
+    """Load torque of the water in N m, and its derivative by speed in N m s, zero or more."""
     u = flow / c.area
     rn = c.radius * speed
-    w = math.hypot(rn, u) + 1e-9  # never divided by zero
+    w = math.hypot(rn, u) + 1e-9  # avoids division by zero
     slip = c.pitch * speed - u
     drag = c.pitch * c.half_rho_lift * slip + c.half_rho_friction * c.radius * rn
     drag_slope = c.half_rho_lift * c.pitch**2 + c.half_rho_friction * c.radius**2
@@ -261,17 +261,17 @@ def pump_speed(pressure: float, flow: float, c: PumpCoefficients) -> float:
 def pump_step(
     state: PumpState, setpoint: float, flow: float, step_s: float, c: PumpCoefficients
 ) -> PumpState:
-    """Advance drive and pump by a step under closed pressure loop.
+    """Advance drive and pump by one step with closed pressure loop.
 
     Parameters
     ----------
     state : PumpState
     setpoint : float
-        Pressure asked for, Pa; held over the step.
+        Pressure set-point in Pa, held over the step.
     flow : float
-        Flow to starboard Q = At dh/dt, m^3/s; held over the step.
+        Flow to starboard Q = At dh/dt in m^3/s, held over the step.
     step_s : float
-        Up to some 20 ms.
+        About 20 ms at most.
     c : PumpCoefficients
 
     Returns
@@ -284,24 +284,24 @@ def pump_step(
     reference = state.reference_pa + min(max(change, -bound), bound)
 
     error = reference - pump_pressure(state.speed_rad_s, flow, c)
-    free = pump_speed(reference + c.gain * error + state.integral_pa, flow, c)
-    command = min(max(free, -c.max_speed), c.max_speed)
+    demanded_speed = pump_speed(reference + c.gain * error + state.integral_pa, flow, c)
+    command = min(max(demanded_speed, -c.max_speed), c.max_speed)
 
-    # the load is taken at the end of the step (linearised), which is stable at any step
+    # implicit (linearised) load torque: stable for any step
     load, slope = pump_load(state.speed_rad_s, flow, c)
     stiffness = c.inertia / step_s + slope
-    rise = (command - state.speed_rad_s) * (1.0 - math.exp(-step_s * c.speed_bandwidth))
-    asked = load + stiffness * rise
+    speed_change = (command - state.speed_rad_s) * (1.0 - math.exp(-step_s * c.speed_bandwidth))
+    demanded = load + stiffness * speed_change
     torque, speed = 0.0, state.speed_rad_s
-    for _ in range(2):  # the power limit needs the speed at the end of the step
+    for _ in range(2):  # the power limit depends on the speed at the end of the step
         fastest = max(abs(state.speed_rad_s), abs(speed), 1e-9)
-        ceiling = min(c.max_torque, c.max_power / fastest)
-        torque = min(max(asked, -ceiling), ceiling)
+        torque_limit = min(c.max_torque, c.max_power / fastest)
+        torque = min(max(demanded, -torque_limit), torque_limit)
         speed = state.speed_rad_s + (torque - load) / stiffness
 
-    limited = command != free or torque != asked
+    limited = command != demanded_speed or torque != demanded
     integral = state.integral_pa
-    if not limited:  # anti-windup: an actuator at its limit teaches the integral nothing
+    if not limited:  # anti-windup by conditional integration
         integral += error * step_s / c.integral_time
     return PumpState(
         speed,
@@ -315,7 +315,7 @@ def pump_step(
 
 
 def pump_coast(state: PumpState, flow: float, step_s: float, c: PumpCoefficients) -> PumpState:
-    """Advance by a step with the motor off: the water turns the rotor. Arguments as `pump_step`."""
+    """Advance by one step with the motor off; the water turns the rotor. See `pump_step`."""
     load, slope = pump_load(state.speed_rad_s, flow, c)
     speed = state.speed_rad_s - load / (c.inertia / step_s + slope)
     return PumpState(speed, 0.0, 0.0, pump_pressure(speed, flow, c), 0.0, 0.0, False)
@@ -327,8 +327,8 @@ def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Ca
     Parameters
     ----------
     compiler : callable
-        For example ``numba.njit(cache=True)``. The functions are handed to it over a namespace of
-        their own, in which the ones they call are compiled already.
+        For example ``numba.njit(cache=True)``. The functions are compiled in a namespace of their
+        own, callees first.
     """
     scope = dict(globals())
     for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):

@@ -1,7 +1,8 @@
 """Adaptive high-order integration of the nonlinear coupled model, for verification.
 
-Dormand-Prince 8(5,3) between events: every strike of the water at a limit of the level is located
-to rounding, the impulse is applied, and a stop is left when the water is pulled away from it.
+Dormand-Prince 8(5,3) between events. Every impact at a limit of the level is located to rounding
+error and its impulse is applied. Water at rest on a limit leaves it when its acceleration turns
+inward.
 """
 
 from collections.abc import Callable
@@ -12,13 +13,13 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import Impact, RollModel
 
-REST_M_S = 1e-4  # a rebound slower than this ends at rest, so that bouncing comes to an end
-INSIDE_M = 1e-12  # where the level starts again, so that its next strike is a sign change
+REST_M_S = 1e-4  # a slower rebound ends at rest, which bounds the number of bounces
+INSIDE_M = 1e-12  # distance from the limit after an impact, so that the next is a sign change
 
 
 @dataclass(frozen=True, slots=True)
 class _Event:
-    """Terminal event in the form that scipy looks for."""
+    """Terminal event in scipy's form: a function with attributes."""
 
     value: Callable[[float, FloatArray], float]
     direction: int
@@ -38,10 +39,9 @@ class RollRun:
     state : ndarray, shape (n, 4)
         Roll, roll rate, level, level rate.
     impacts : tuple of Impact
-        The water striking the limits of the level.
+        Impacts at the limits of the level.
     capsized_s : float
-        Time at which the roll angle passed the capsize angle, infinite if it never did; the run
-        ends there.
+        Time at which the roll passed the capsize angle and the run ended; infinite if it did not.
     """
 
     time_s: FloatArray
@@ -61,7 +61,7 @@ def simulate_reference(
     tolerance: float = 1e-12,
     capsize_rad: float = np.pi,
 ) -> RollRun:
-    """Integrate to near rounding error, events located exactly.
+    """Integrate nearly to rounding error, with located events.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def simulate_reference(
     duration_s : float
     initial : array_like, shape (4,)
     pressure_pa, wave_moment_nm : callable
-        Smooth functions of the time in s.
+        Smooth functions of time in s.
     samples : int
         Number of equally spaced output times, both ends included.
     tolerance : float
         Relative; the absolute one is a hundredth of it in SI units.
     capsize_rad : float
-        The run ends when the roll angle's size passes it.
+        The run ends when the roll's magnitude passes this angle.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def simulate_reference(
     Raises
     ------
     RuntimeError
-        If the integrator gives up.
+        If the integrator fails.
     """
     from scipy.integrate import solve_ivp
 

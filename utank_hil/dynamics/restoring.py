@@ -1,9 +1,9 @@
 """Restoring moment of a ship as a piecewise polynomial in the heel angle.
 
-One form serves an odd polynomial (a single piece) and a table of righting levers (a quintic spline
-with slope k1 / displacement at zero heel), so that the compiled kernels need no branches. The
-moment is odd: the pieces describe positive heel. The spline has four continuous derivatives,
-because kinks in fewer of them would cost the integrators their order.
+An odd polynomial (a single piece) and a table of righting levers (a quintic spline with slope
+k1 / displacement at zero heel) have the same form, so that the compiled kernels need no branches.
+The moment is odd: the pieces describe positive heel. The spline has four continuous derivatives,
+which the integrators need for their order of accuracy.
 """
 
 import math
@@ -22,7 +22,7 @@ class Restoring(NamedTuple):
     Attributes
     ----------
     piece_rad : float
-        Width of a piece; infinite for a polynomial. The last piece goes on beyond its end.
+        Width of a piece; infinite for a polynomial. The last piece extends beyond its end.
     coefficients_nm : ndarray, shape (pieces, powers)
         Moment within a piece as a polynomial of the angle since the piece's start, lowest first.
     """
@@ -36,7 +36,7 @@ class Restoring(NamedTuple):
         return np.sign(roll_rad) * _horner(self.coefficients_nm[piece], since)
 
     def energy_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:
-        """Work of heeling from upright to the given roll angles."""
+        """Potential energy at the given roll angles, zero upright."""
         piece, since = self._locate(roll_rad)
         powers = self.coefficients_nm.shape[1]
         integrals = np.zeros((len(self.coefficients_nm), powers + 1))
@@ -46,7 +46,7 @@ class Restoring(NamedTuple):
         return _horner(integrals[piece], since)
 
     def vanishing_rad(self) -> float:
-        """Angle of vanishing stability: the least positive zero, infinite if there is none."""
+        """Angle of vanishing stability in rad: the first positive zero, infinite without one."""
         for i, row in enumerate(self.coefficients_nm):
             roots = np.roots(row[::-1])
             real = roots.real[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))]
@@ -58,7 +58,7 @@ class Restoring(NamedTuple):
         return math.inf
 
     def _locate(self, roll_rad: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
-        """Piece of each angle, and the angle since that piece's start."""
+        """Piece of each angle, and the angle from the start of that piece."""
         heel = np.abs(np.asarray(roll_rad, dtype=np.float64))
         if math.isinf(self.piece_rad):
             return np.zeros(heel.shape, dtype=np.intp), heel
@@ -87,8 +87,8 @@ def restoring(ship: RollShip) -> Restoring:
     levers = np.array(ship.gz_m)
     heel = ship.gz_step_rad * np.arange(len(levers))
     slope = ship.stiffness_nm_rad / ship.displacement_n
-    # even derivatives vanish at zero heel, so that the odd continuation is as smooth as the rest;
-    # at the far end one knot less makes up for the third condition
+    # even derivatives vanish at zero heel, so that the odd continuation is smooth there; one knot
+    # less at the far end makes up for the third condition
     knots = np.concatenate([np.zeros(6), heel[1:-2], np.full(6, heel[-1])])
     conditions = [(1, slope), (2, 0.0), (4, 0.0)]
     spline = make_interp_spline(heel, levers, k=5, t=knots, bc_type=(conditions, None))

@@ -1,13 +1,13 @@
-"""Exact sampling of a continuous model behind a first-order lag and a delay of any length.
+"""Exact discretization of a continuous model with a first-order input lag and any input delay.
 
-Timing of the loop. At t_k = k Ts the controller measures y(t_k) and at once computes a command. The
-command takes effect at t_k + d (sensor delay, bus, controller tick, drive), is held for Ts, and
-reaches the plant through the actuator's lag, T u_a' + u_a = command. The sampled model's input is
-counted one ahead::
+Timing of the loop. At t_k = k Ts the controller measures y(t_k) and computes a command. The command
+takes effect at t_k + d (sensor delay, bus, controller tick, drive), is held for Ts, and reaches the
+plant through the actuator's lag, T u_a' + u_a = command. The input of the sampled model has the
+index of the next sample::
 
     v(k + 1) = command computed at t_k, acts over [t_k + d, t_k + d + Ts)
 
-so y(k) depends on v(k) at once when d < Ts (D is not zero), and a law that makes v(k + 1) from
+So y(k) depends on v(k) directly when d < Ts (D is not zero), and a law that computes v(k + 1) from
 y(k), y(k - 1), ... uses the newest measurement.
 
 With d = (n + f) Ts, n whole and 0 <= f < 1, x the continuous state (lag included), Phi = exp(A Ts),
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 
 class LinearModel(NamedTuple):
-    """Matrices of a linear model, named as in control.StateSpace and taken wherever one is.
+    """Matrices of a linear model, a light substitute for control.StateSpace with the same names.
 
-    For code that must not import python-control, which brings plotting into the process.
+    For code that must not import python-control, which imports plotting.
 
     Attributes
     ----------
@@ -52,16 +52,16 @@ class LinearModel(NamedTuple):
 def sampled_model(
     system: "StateSpace", sample_time_s: float, delay_s: float = 0.0, lag_s: float = 0.0
 ) -> "StateSpace":
-    """Discrete model from command to sampled outputs; see the module's text for its timing.
+    """Discrete model from command to sampled outputs, with the timing of the module docstring.
 
     Parameters
     ----------
     system : control.StateSpace
-        Continuous, without feed-through; all its inputs come from the pump. Pick signals by name:
+        Continuous, without feedthrough; all inputs are pump inputs. Select signals by name:
         ``coupled_model(ship, tank)[["roll_rad"], ["pressure_pa"]]``.
     sample_time_s : float
     delay_s : float
-        From measurement to effect at the drive; may be a fraction of the sample time or exceed it.
+        From measurement to effect at the drive; any value, not only whole samples.
     lag_s : float
         Time constant of the drive's inner pressure loop.
 
@@ -73,7 +73,7 @@ def sampled_model(
     Raises
     ------
     ValueError
-        If a time is out of range, or the model is discrete or has a feed-through.
+        If a time is out of range, or the model is discrete or has feedthrough.
     """
     from control import ss  # here, because importing it brings plotting into the process
 
@@ -84,7 +84,7 @@ def sampled_model(
 def sample(
     system: "StateSpace | LinearModel", sample_time_s: float, delay_s: float, lag_s: float
 ) -> LinearModel:
-    """As `sampled_model`, without python-control."""
+    """Same as `sampled_model`, without python-control."""
     for name, time in (("delay_s", delay_s), ("lag_s", lag_s)):
         if not (math.isfinite(time) and time >= 0):
             raise ValueError(f"{name} must be zero or more and finite, got {time}")
@@ -107,7 +107,7 @@ def sample(
 def transition_and_step(
     a: FloatArray, b: FloatArray, time_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Free transition exp(A t), and the state after a unit step of each input lasting t."""
+    """Transition matrix exp(A t), and the step response of the state to each input at time t."""
     from scipy.linalg import expm
 
     states = a.shape[0]
@@ -137,7 +137,7 @@ def _shifted(
     a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, samples: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """The discrete model with its input delayed by whole samples."""
-    for _ in range(samples):  # the newest past command joins as a state and feeds what was direct
+    for _ in range(samples):  # the newest past command becomes a state
         states, inputs = b.shape
         a = np.block([[a, b], [np.zeros((inputs, states + inputs))]])
         c = np.hstack([c, d])
@@ -147,14 +147,14 @@ def _shifted(
 
 
 def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatArray:
-    """Covariance gathered over a time from continuous white noise of unit density.
+    """Covariance of the state after a time of continuous white noise of unit spectral density.
 
     Parameters
     ----------
     a : ndarray, shape (n, n)
         State matrix.
     noise : ndarray, shape (n, k)
-        How the k noises enter.
+        Input matrix of the k noises.
     time_s : float
 
     References

@@ -1,4 +1,4 @@
-"""The ship in roll: inertia, damping, restoring, and what heels it."""
+"""The ship in roll: inertia, damping, restoring moment and heeling moments."""
 
 import math
 from dataclasses import dataclass
@@ -7,19 +7,19 @@ from typing import Annotated
 from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
-"""Roll at which something is given up: 0.7 rad at most, 40 degrees, to which the IS Code 2008
-(part A, 2.2.1) counts a ship's righting levers."""
+"""Limit on roll in rad, at most 0.7 (40 degrees): up to there the IS Code 2008 (part A, 2.2.1)
+rates a ship's righting levers."""
 
-_MOST = 1e30  # far beyond any ship, and what designs compute from it stays finite
+_MOST = 1e30  # far beyond any ship; keeps the results of designs finite
 
 
 @dataclass(frozen=True, slots=True)
 class RollShip:
-    """A ship that only rolls, without its tank water.
+    """A ship in roll alone, without its tank water.
 
     The restoring moment is ``k1 phi + k3 phi^3 + k5 phi^5 + ...`` or, if `gz_m` is given, the
-    displacement times a spline through the righting levers. The linear models use inertia,
-    stiffness and linear damping alone.
+    displacement times a spline through the righting levers. The linear models use only inertia,
+    stiffness and linear damping.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ class RollShip:
     restoring_odd_nm : tuple of float
         Higher coefficients (k3, k5, ...) of the restoring polynomial, N m per rad^3, rad^5, ...
     displacement_n : float
-        Weight that the righting levers are multiplied with; needed with `gz_m` only.
+        Displacement as a weight; used with `gz_m` only.
     gz_step_rad : float
         Spacing of the heel angles of `gz_m`.
     gz_m : tuple of float
         Righting levers at heel 0, `gz_step_rad`, 2 `gz_step_rad`, ...; the first is 0.
     offset_moment_nm : float
-        Moment of off-centre weight in the upright ship; it heels with the cosine of the roll angle.
+        Moment of off-centre weight in the upright ship; varies with the cosine of the roll angle.
     wind_moment_nm : float
         Steady wind moment, the same at every angle.
 
@@ -48,7 +48,7 @@ class RollShip:
     ------
     ValueError
         If inertia or stiffness is not positive, a damping is negative, a number is not finite or
-        beyond any ship's, or the table of levers is incomplete or given beside a polynomial.
+        too large, or the table of levers is incomplete or given besides a polynomial.
     """
 
     inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)]
@@ -81,7 +81,7 @@ class RollShip:
 
     @property
     def heeling_moment_nm(self) -> float:
-        """Steady moment on the upright ship, which is what the linear models are for."""
+        """Steady moment on the upright ship in N m, for the linear models."""
         return self.offset_moment_nm + self.wind_moment_nm
 
     @property

@@ -1,6 +1,6 @@
-"""Fixed-step simulation of one ship or of many, on the compiled kernels.
+"""Fixed-step simulation of one ship or of a batch, on the compiled kernels.
 
-The kernels are imported at the first run, so that importing this module brings no compiler along.
+The kernels are imported at the first run, so that importing this module imports no compiler.
 """
 
 import math
@@ -18,7 +18,7 @@ IMPACTS_KEPT = 10_000
 
 
 class WaveComponents(Protocol):
-    """What a wave moment must offer; `utank_hil.sea.Harmonics` does for one ship."""
+    """Interface of a wave moment, such as `utank_hil.sea.Harmonics` for one ship."""
 
     @property
     def amplitude(self) -> npt.ArrayLike:
@@ -39,7 +39,7 @@ class WaveMoment(NamedTuple):
     Attributes
     ----------
     amplitude : array_like, shape (m,) or (n, m)
-        In N m; n different seas for the n ships of a batch, or one for all.
+        In N m; one sea per ship of a batch, or one for all.
     frequency_rad_s, phase_rad : array_like, shape (m,) or (n, m)
     """
 
@@ -52,19 +52,19 @@ CALM = WaveMoment(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 class BatchResult(NamedTuple):
-    """What became of each of n ships.
+    """Results for a batch of n ships.
 
     Attributes
     ----------
     state : ndarray, shape (n, 4)
-        At the end, or at capsizing.
+        Final state, or the state at capsizing.
     capsized_s : ndarray, shape (n,)
-        Time of capsizing, infinite for a ship that did not.
+        Time of capsizing, infinite for a ship that survived.
     max_roll_rad, max_level_m : ndarray, shape (n,)
     strikes : ndarray of int, shape (n,)
-        How often the water struck a limit of its level.
+        Number of impacts at the limits of the level.
     max_roll_impulse_nms : ndarray, shape (n,)
-        Greatest impulsive roll moment of these strikes.
+        Greatest angular impulse of these impacts.
     time_s : ndarray, shape (k,)
         Times of `history`.
     history : ndarray, shape (n, k, 4)
@@ -96,7 +96,7 @@ def simulate(
 ) -> RollRun:
     """Simulate one ship with classical Runge-Kutta steps.
 
-    The first 10,000 strikes at the level limits are reported one by one.
+    The result lists the first 10,000 impacts at the level limits.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def simulate(
         Roll, roll rate, level, level rate.
     wave : WaveMoment or utank_hil.sea.Harmonics
     pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape () or (k,)
-        Samples, each held for `hold_s`, the last one for ever.
+        Samples, each held for `hold_s`, the last one to the end.
     hold_s : float, optional
         A whole number of steps; one step if not given.
     step_s : float
@@ -123,7 +123,7 @@ def simulate(
     Raises
     ------
     ValueError
-        If durations are no whole numbers of steps, or shapes do not fit.
+        If a duration is not a whole number of steps, or shapes do not match.
     """
     from utank_hil.dynamics import kernels
 
@@ -188,7 +188,7 @@ def simulate_batch(
 ) -> BatchResult:
     """Simulate many ships on all cores; the result does not depend on the number of cores.
 
-    Models, initial states, seas and inputs may each be one for all or one per ship.
+    Models, initial states, seas and inputs are each given once for all ships, or once per ship.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def simulate_batch(
     wave : WaveMoment
         With arrays of shape (m,) or (n, m).
     pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape (), (k,) or (n, k)
-        Samples, each held for `hold_s`, the last one for ever.
+        Samples, each held for `hold_s`, the last one to the end.
     hold_s : float, optional
         A whole number of steps; one step if not given.
     step_s : float
@@ -207,7 +207,7 @@ def simulate_batch(
         Steps between recorded states; nothing is recorded if not given.
     capsize_rad : float
     progress : callable, optional
-        Told the finished fraction, about fifty times.
+        Called about fifty times with the completed fraction.
 
     Returns
     -------
@@ -216,7 +216,7 @@ def simulate_batch(
     Raises
     ------
     ValueError
-        If durations are no whole numbers of steps, or shapes do not fit.
+        If a duration is not a whole number of steps, or shapes do not match.
     """
     from utank_hil.dynamics import kernels
 
@@ -225,7 +225,7 @@ def simulate_batch(
     models = [models] if isinstance(models, RollModel) else list(models)
     rows = np.array([model.coefficients for model in models])
     per_piece = 1 / np.array([model.restoring.piece_rad for model in models])
-    tables = _stacked([model.restoring.coefficients_nm for model in models])
+    restoring = _stacked([model.restoring.coefficients_nm for model in models])
     if record_every is not None:
         _check_record_every(record_every)
     amplitude, frequency, phase = _sea(wave)
@@ -251,7 +251,7 @@ def simulate_batch(
         kernels.advance_batch(
             rows,
             per_piece,
-            tables,
+            restoring,
             amplitude,
             frequency,
             phase,
@@ -287,7 +287,7 @@ def whole_steps(name: str, duration_s: float, step_s: float) -> int:
     Raises
     ------
     ValueError
-        If the step is not positive or the duration is no whole number of steps above 0.
+        If the step is not positive, or the duration is not a whole number of steps, 1 or more.
     """
     if not (math.isfinite(step_s) and step_s > 0):
         raise ValueError(f"step_s must be positive and finite, got {step_s}")
@@ -306,7 +306,7 @@ def _blank_summary(ships: int) -> FloatArray:
 
 
 def _sea(wave: WaveComponents) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Amplitudes, frequencies and phases as rows, all with as many components."""
+    """Amplitudes, frequencies and phases as rows of equal length."""
     amplitude, frequency, phase = (
         _rows(x) for x in (wave.amplitude, wave.frequency_rad_s, wave.phase_rad)
     )
@@ -328,9 +328,9 @@ def _rows(values: npt.ArrayLike) -> FloatArray:
     return np.atleast_2d(np.ascontiguousarray(values, dtype=np.float64))
 
 
-def _stacked(tables: list[FloatArray]) -> FloatArray:
-    """Tables of restoring pieces as one array, padded with zeros to the highest power."""
-    if len({len(table) for table in tables}) > 1:
+def _stacked(restoring: list[FloatArray]) -> FloatArray:
+    """Restoring coefficients of all ships as one array, padded with zeros to the highest power."""
+    if len({len(table) for table in restoring}) > 1:
         raise ValueError("the ships of a batch must have righting levers of the same length")
-    powers = max(table.shape[1] for table in tables)
-    return np.stack([np.pad(table, ((0, 0), (0, powers - table.shape[1]))) for table in tables])
+    powers = max(table.shape[1] for table in restoring)
+    return np.stack([np.pad(table, ((0, 0), (0, powers - table.shape[1]))) for table in restoring])

@@ -1,4 +1,4 @@
-"""A ship in six degrees of freedom that carries the tank, in Fossen's vector form.
+"""A ship with tank in six degrees of freedom, in Fossen's vector form.
 
 With eta the earth position of the centre of gravity and the Euler angles, nu = (u, v, w, p, q, r)::
 
@@ -6,13 +6,13 @@ With eta the earth position of the centre of gravity and the Euler angles, nu = 
     M nu' + C(nu) nu + D nu + g(eta) = tau + tank(nu', h'')
     rho residual(nu', h'') = P - (c1 + c2 |h'|) h'
 
-M is the rigid ship and its added mass, C follows from M (nu' C nu = 0), g from a potential::
+M is the mass matrix with added mass, C follows from M (nu' C nu = 0), and g from a potential::
 
     V = 1/2 k_z z^2 + k_zt z theta + 1/2 k_t theta^2 + V_roll(phi)
 
-and from the buoyancy that carries the tank water, upward at the tank's station, so that upright and
-level is an equilibrium. Tank force, moment and residual are linear in (nu', h''): seven linear
-equations a step. Water level limits are those of the roll model and are not applied here.
+and from the buoyancy for the weight of the tank water, upward at the tank's station, so that the
+upright ship is in equilibrium. Tank force, moment and residual are linear in (nu', h''): a linear
+system of seven equations. The limits of the level are not modelled here.
 """
 
 from collections.abc import Callable
@@ -40,18 +40,18 @@ class SixDegreeShip:
     Parameters
     ----------
     roll : RollShip
-        Roll: its inertia is the dry one plus ``added_mass[3][3]``.
+        Roll; its inertia includes ``added_mass[3][3]``.
     mass_kg : float
     pitch_inertia_kg_m2, yaw_inertia_kg_m2 : float
-        Dry, about the centre of gravity.
+        Without added mass, about the centre of gravity.
     product_xz_kg_m2 : float
         Product of inertia, the integral of x z dm.
     added_mass : 6 x 6 nested tuple of float
         Symmetric, about the centre of gravity, SI units.
     damping : 6 x 6 nested tuple of float
-        Linear; ``[3][3]`` must be zero because roll damping belongs to `roll`.
+        Linear damping in SI units; ``[3][3]`` must be zero, because `roll` has the roll damping.
     heave_stiffness_n_m, heave_pitch_n, pitch_stiffness_nm_rad : float
-        Hydrostatics k_z, k_zt, k_t.
+        Hydrostatic stiffnesses k_z, k_zt, k_t.
 
     Raises
     ------
@@ -106,7 +106,7 @@ class SixDegreeModel:
     ship : SixDegreeShip
     tank : Tank
     free : tuple of str
-        Motions that are free, out of `MOTIONS`; the others are held, with whatever force it takes.
+        Free motions out of `MOTIONS`; the others are constrained to rest.
 
     Raises
     ------
@@ -183,14 +183,14 @@ class SixDegreeModel:
         return out
 
     def _hull_loads(self, state: FloatArray) -> FloatArray:
-        """Forces and moments on the hull in body axes, but those of inertia and of the tank."""
+        """Forces and moments on the hull in body axes, without inertia and tank, shape (6,)."""
         ship, roll = self.ship, self.ship.roll
         z, angles, nu = state[2], state[3:6], state[6:12]
-        turn = body_to_earth(*angles)
+        rotation = body_to_earth(*angles)
         momentum = self._mass @ nu
         damping = self._damping @ nu
         damping[3] += (roll.damping_nms_rad + roll.quadratic_damping_nms2_rad2 * abs(nu[3])) * nu[3]
-        # minus the gradient of the potential, as generalized forces on the Euler angles
+        # generalized forces on the Euler angles: minus the gradient of the potential
         heeling = roll.offset_moment_nm * np.cos(angles[0]) + roll.wind_moment_nm
         generalized = np.array(
             [
@@ -200,11 +200,11 @@ class SixDegreeModel:
             ]
         )
         heave = -ship.heave_stiffness_n_m * z - ship.heave_pitch_n * angles[1]
-        carrying = -water_moments(self.tank, 0.0).mass_kg * gravity_body(angles[0], angles[1])
+        buoyancy = -water_moments(self.tank, 0.0).mass_kg * gravity_body(angles[0], angles[1])
         loads = np.empty(6)
-        loads[:3] = turn.T @ np.array([0.0, 0.0, heave]) + carrying
+        loads[:3] = rotation.T @ np.array([0.0, 0.0, heave]) + buoyancy
         loads[3:] = euler_rates(angles[0], angles[1]).T @ generalized
-        loads[3:] += np.cross([self.tank.lx_m, 0.0, 0.0], carrying)
+        loads[3:] += np.cross([self.tank.lx_m, 0.0, 0.0], buoyancy)
         # Coriolis and centripetal forces, C(nu) nu
         loads[:3] -= np.cross(nu[3:], momentum[:3])
         loads[3:] -= np.cross(nu[:3], momentum[:3]) + np.cross(nu[3:], momentum[3:])
@@ -229,7 +229,7 @@ def simulate_six_degree(
     duration_s : float
     initial : ndarray, shape (14,)
     pressure_pa, force : callable
-        Functions of the time in s; `force` gives body axes, shape (6,).
+        Functions of time in s; `force` is in body axes, shape (6,).
     samples : int
         Number of equally spaced output times, both ends included.
     tolerance : float
@@ -243,7 +243,7 @@ def simulate_six_degree(
     Raises
     ------
     RuntimeError
-        If the integrator gives up.
+        If the integrator fails.
     """
     from scipy.integrate import solve_ivp
 
@@ -263,6 +263,6 @@ def simulate_six_degree(
 
 
 def _skew(vector: FloatArray) -> FloatArray:
-    """Matrix of the cross product from the left."""
+    """Cross-product matrix of a vector."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

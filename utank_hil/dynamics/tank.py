@@ -44,13 +44,13 @@ class Tank:
     density_kg_m3 : float
         Density of the tank water.
     damping_ratio : float
-        Linear loss as the damping ratio of the tank's free oscillation in a ship held still.
+        Linear loss, as the damping ratio of the water's free oscillation in a fixed ship.
     quadratic_loss : float
         Coefficient zeta of the pressure loss ``zeta rho / 2 |u| u``, u the speed in the duct.
     headroom_m : float
         Height of the reservoirs' roof above the still level.
     restitution : float
-        Ratio of the level's speeds after and before it strikes a limit: 0 plastic, 1 elastic.
+        Coefficient of restitution of the level at its limits: 0 plastic, 1 elastic.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Tank:
 
     @property
     def natural_frequency_rad_s(self) -> float:
-        """Natural frequency sqrt(2 g / (2H + L At/Ap)) of the water in a ship held still."""
+        """Natural frequency sqrt(2 g / (2H + L At/Ap)) of the water in a fixed ship."""
         return math.sqrt(2 * GRAVITY_M_S2 / self.effective_length_m)
 
     @property
@@ -98,5 +98,5 @@ class Tank:
 
     @property
     def level_limit_m(self) -> float:
-        """Level at which one reservoir is full or the other one empty, whichever comes first."""
+        """Level at which one reservoir is full or the other one is empty, whichever is less."""
         return min(self.headroom_m, self.height_m)

@@ -1,9 +1,8 @@
-"""Losses that a semi-active tank adds: a throttle in the duct or in the air pipe.
+"""Valve losses of a semi-active tank: a throttle in the duct or in the air pipe.
 
-Both oppose the flow with the square of its speed, so that one number, the pressure loss per
-``|dh/dt| dh/dt``, tells the models how far a valve is open. The air is taken as incompressible,
-which holds while the pressure across its valve stays well below the atmosphere's; a valve that is
-shut altogether (an air spring, or a locked tank) is not modelled.
+Both losses are quadratic in the flow speed, so the models take one number, the pressure loss per
+``|dh/dt| dh/dt``. The air is treated as incompressible, which holds while the pressure across its
+valve is well below atmospheric. A closed valve (an air spring, or a locked tank) is not modelled.
 """
 
 from utank_hil.dynamics.tank import Tank
@@ -12,7 +11,7 @@ AIR_DENSITY_KG_M3 = 1.225
 
 
 def duct_valve_loss(tank: Tank, opening: float) -> float:
-    """Loss of a gate in the duct, by the sudden-expansion (Borda-Carnot) law (1 / s - 1)^2.
+    """Loss coefficient of a gate in the duct, by the Borda-Carnot law (1 / s - 1)^2.
 
     Parameters
     ----------
@@ -23,7 +22,7 @@ def duct_valve_loss(tank: Tank, opening: float) -> float:
     Returns
     -------
     float
-        Pa per (m/s)^2 of dh/dt, to be added to the tank's own.
+        Pa per (m/s)^2 of dh/dt, in addition to the tank's quadratic loss.
 
     Raises
     ------
@@ -38,7 +37,7 @@ def duct_valve_loss(tank: Tank, opening: float) -> float:
 def air_valve_loss(
     tank: Tank, pipe_area_m2: float, opening: float, discharge_coefficient: float = 0.6
 ) -> float:
-    """Loss of an orifice in the air pipe that joins the two reservoirs.
+    """Loss coefficient of an orifice in the air pipe between the reservoirs.
 
     Parameters
     ----------
@@ -53,7 +52,7 @@ def air_valve_loss(
     Returns
     -------
     float
-        Pa per (m/s)^2 of dh/dt, to be added to the tank's own.
+        Pa per (m/s)^2 of dh/dt, in addition to the tank's quadratic loss.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Mass, centre and inertia of the tank water, exact in the level.
+"""Mass, first moment and inertia of the tank water, exact in the level.
 
-The water fills a line of three straight pieces (port reservoir, duct, starboard reservoir); every
-integral over its mass is a polynomial in the level h.
+The water fills three straight tubes (port reservoir, duct, starboard reservoir), so every integral
+over its mass is a polynomial in the level h.
 """
 
 from typing import NamedTuple

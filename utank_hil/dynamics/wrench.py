@@ -1,16 +1,16 @@
 """Force and moment of the tank water on a ship in arbitrary motion, thesis (2.11), (2.14), (2.16).
 
-The printed expressions contain many slips (docs/errata.md), so these follow from the water's linear
-and angular momentum. With m, S, J the mass, first moment and inertia tensor of the water about the
-centre of gravity, and s the angular momentum of the flow relative to the ship per dh/dt::
+The printed expressions contain errors (docs/errata.md), so these are derived from the water's
+linear and angular momentum. With m, S, J the mass, first moment and inertia tensor of the water
+about the centre of gravity, and s the angular momentum of the flow relative to the ship per dh/dt::
 
     P = m v + W x S + S' h'                       momentum
     H = S x v + J W + s h'                        angular momentum about the CG
     F = m g - dP/dt,    M = S x g - dH/dt - v x P
 
 (dash: d/dh for S, J, s and d/dt for h). Differentiating S' h' brings -2 rho At h'^2 in heave, the
-momentum flux of the water turning at the two corners; an integral of the particles' accelerations
-alone misses it.
+momentum flux of the water at the two corners, which an integral of the particles' accelerations
+does not contain.
 """
 
 import numpy as np
@@ -47,7 +47,7 @@ def tank_wrench(
     rate : array_like, shape (..., 3)
         (p, q, r) in rad/s.
     acceleration : array_like, shape (..., 3)
-        (u_dot, v_dot, w_dot) in m/s^2, the derivatives of the body components as in (2.6): without
+        (u_dot, v_dot, w_dot) in m/s^2: derivatives of the body components as in (2.6), without
         rate x velocity.
     rate_dot : array_like, shape (..., 3)
         (p_dot, q_dot, r_dot) in rad/s^2.
@@ -85,14 +85,16 @@ def tank_wrench(
     water = water_moments(tank, level)
     mass, first = water.mass_kg, water.first_kgm
 
-    felt = v0_dot + np.cross(omega, v0) - gravity_body(roll, pitch)
-    flow = water.first_slope_kg * speed_
-    flow_dot = water.first_slope_kg * level_acceleration_ + water.first_curvature_kg_m * speed_**2
+    specific_force = v0_dot + np.cross(omega, v0) - gravity_body(roll, pitch)
+    flow_momentum = water.first_slope_kg * speed_
+    flow_momentum_dot = (
+        water.first_slope_kg * level_acceleration_ + water.first_curvature_kg_m * speed_**2
+    )
     force = -(
-        mass * felt
+        mass * specific_force
         + np.cross(omega_dot, first)
-        + np.cross(omega, np.cross(omega, first) + 2 * flow)
-        + flow_dot
+        + np.cross(omega, np.cross(omega, first) + 2 * flow_momentum)
+        + flow_momentum_dot
     )
     relative = np.einsum("...ij,...j->...i", water.inertia_kgm2, omega) + water.swirl_kgm * speed_
     relative_dot = (
@@ -101,17 +103,17 @@ def tank_wrench(
         + water.swirl_kgm * level_acceleration_
         + water.swirl_slope_kg * speed_**2
     )
-    moment = -(np.cross(first, felt) + relative_dot + np.cross(omega, relative))
+    moment = -(np.cross(first, specific_force) + relative_dot + np.cross(omega, relative))
 
     # along the streamline the Coriolis acceleration does no work, and the centrifugal one is the
-    # gradient of -|rate x r|^2 / 2, so that only the two surfaces count
+    # gradient of -|rate x r|^2 / 2, so that only its values at the two surfaces remain
     flow_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
     zero = np.zeros_like(level)
     across = np.stack([zero, zero + tank.width_m, -2 * level], axis=-1)  # port to starboard surface
     middle = np.array([tank.lx_m, 0.0, tank.lz_m - tank.height_m])
     residual = (
         tank.effective_length_m * level_acceleration
-        + _dot(felt, across)
+        + _dot(specific_force, across)
         + _dot(omega_dot, water.swirl_kgm) / flow_kg_m
         - _dot(np.cross(omega, across), np.cross(omega, middle))
     )
