@@ -1,4 +1,4 @@
-"""Sea: model and measured spectra, irregular seas, wave moment on roll."""
+"""Waves: model and measured spectra, irregular seas, roll moment."""
 
 from utank_hil.sea.encounter import encounter_frequency, wave_frequencies
 from utank_hil.sea.harmonics import Harmonics

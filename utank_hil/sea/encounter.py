@@ -4,9 +4,9 @@ A wave of frequency omega has wave number k = omega^2 / g. A ship at speed U mee
 
     omega_e = omega - k U cos(heading)
 
-`heading` is the direction the wave travels relative to the ship's course: 0 following, pi head,
-+pi/2 from port to starboard. In a following sea omega_e falls to zero where the ship keeps up with
-the phase and turns negative where she overtakes the wave.
+`heading` is the direction of wave travel relative to the ship's course: 0 following, pi head,
++pi/2 from port to starboard. In a following sea omega_e is zero for a wave of the ship's speed, and
+negative for a wave that the ship overtakes.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 
 def wavenumber_rad_m(omega_rad_s: FloatArray) -> FloatArray:
-    """Deep-water wave number omega^2 / g."""
+    """Deep-water wave number omega^2 / g in rad/m."""
     wavenumber: FloatArray = np.asarray(omega_rad_s, dtype=float) ** 2 / GRAVITY_M_S2
     return wavenumber
 
@@ -26,8 +26,7 @@ def encounter_frequency(
 ) -> FloatArray:
     """Signed encounter frequency in rad/s.
 
-    Negative where the ship overtakes the wave: the wave then passes from bow to stern and its phase
-    runs backwards. Broadcasts.
+    Negative where the ship overtakes the wave, which then passes from bow to stern. Broadcasts.
     """
     omega = np.asarray(omega_rad_s, dtype=float)
     return omega - wavenumber_rad_m(omega) * speed_m_s * np.cos(heading_rad)
@@ -36,10 +35,10 @@ def encounter_frequency(
 def wave_frequencies(
     encounter_rad_s: float, heading_rad: float, speed_m_s: float
 ) -> tuple[float, ...]:
-    """Every wave frequency that a ship meets at a given encounter frequency.
+    """All wave frequencies with a given encounter frequency.
 
-    One in head and beam seas; in following seas up to three, which is why an encounter spectrum
-    cannot be turned back into a wave spectrum there.
+    One in head and beam seas, up to three in following seas, where an encounter spectrum therefore
+    cannot be converted back to a wave spectrum.
 
     Parameters
     ----------
@@ -62,7 +61,7 @@ def wave_frequencies(
         raise ValueError(f"encounter_rad_s must be positive, got {encounter_rad_s}")
     a = speed_m_s * np.cos(heading_rad) / GRAVITY_M_S2
     found = []
-    for sign in (1.0, -1.0):  # a omega^2 - omega + sign omega_e = 0, in the form safe for small a
+    for sign in (1.0, -1.0):  # a omega^2 - omega + sign omega_e = 0, stable for small a
         discriminant = 1 - 4 * a * sign * encounter_rad_s
         if discriminant < 0:
             continue

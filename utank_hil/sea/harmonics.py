@@ -1,4 +1,4 @@
-"""A sum of sinusoids: how elevation, slope and wave moment are handed to whoever integrates."""
+"""A sum of sinusoids, the form of wave elevation, slope and moment."""
 
 from dataclasses import dataclass
 
@@ -28,11 +28,11 @@ class Harmonics:
 
     @property
     def variance(self) -> float:
-        """Mean square over a long time, sum of amplitude^2 / 2."""
+        """Variance, sum of amplitude^2 / 2."""
         return float(self.amplitude @ self.amplitude / 2)
 
     def at(self, time_s: FloatArray | float) -> FloatArray:
-        """Evaluate at any times by the direct sum.
+        """Evaluate at arbitrary times by the direct sum.
 
         Parameters
         ----------
@@ -41,7 +41,7 @@ class Harmonics:
         Returns
         -------
         ndarray
-            Shaped as `time_s`.
+            Shape of `time_s`.
         """
         times = np.asarray(time_s, dtype=float)
         flat = times.ravel()
@@ -54,11 +54,11 @@ class Harmonics:
         return result.reshape(times.shape)
 
     def series(self, step_s: float, count: int, start_s: float = 0.0) -> FloatArray:
-        """Evaluate on the even grid ``start_s + step_s * arange(count)``.
+        """Evaluate on the uniform grid ``start_s + step_s * arange(count)``.
 
-        Time is split into a coarse and a fine part, t = T + s, and cos(w T + phase + w s) into its
-        two products: sqrt(count) cosines a component instead of `count`, and one matrix product.
-        Nothing is accumulated from step to step, so it equals `at` to rounding.
+        With t = T + s, T on a coarse and s on a fine grid, cos(w T + phase + w s) is expanded into
+        two products. This takes sqrt(count) cosines per component and one matrix product. No error
+        accumulates, so the result equals `at` to rounding error.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Spectra measured one after the other at one place."""
+"""A time series of wave spectra measured at one place."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class MeasuredSpectra:
     Parameters
     ----------
     source : str
-        Where they come from, for messages.
+        Origin, for error messages.
     time : ndarray of datetime64[s], shape (N,)
         UTC, increasing.
     frequency_hz : ndarray, shape (F,)
@@ -43,10 +43,10 @@ class MeasuredSpectra:
     def __getitem__(self, index: int) -> Spectrum:
         """Return the spectrum at a position.
 
-        Bands without data at either end of the grid count as calm; ValueError if one is missing
-        in between, because the energy there is then unknown.
+        Missing bands at either end of the grid count as zero. A missing band in between is a
+        ValueError, because its energy is unknown.
         """
-        density = self._calm_ends()[index]
+        density = self._zero_filled_ends()[index]
         if np.isnan(density).any():
             gap = self.frequency_hz[np.isnan(density)][0]
             raise ValueError(
@@ -64,12 +64,12 @@ class MeasuredSpectra:
         time : str or datetime64
             UTC, such as ``"2019-02-10T05:40"``.
         within_s : float
-            How far away the nearest measurement may be.
+            Largest distance in time to the nearest measurement.
 
         Raises
         ------
         ValueError
-            If there is none that near, or the time cannot be read.
+            If there is none within that time, or the time cannot be parsed.
         """
         wanted = np.datetime64(str(time), "s")
         index = int(np.argmin(np.abs(self.time - wanted)))
@@ -82,21 +82,21 @@ class MeasuredSpectra:
 
     @property
     def hs_m(self) -> FloatArray:
-        """Significant heights 4 sqrt(m0), shape (N,); nan where a band in between is missing."""
+        """Significant wave heights 4 sqrt(m0), shape (N,); nan if a band in between is missing."""
         widths = np.diff(band_edges(self.frequency_hz))[:, 0]
-        heights: FloatArray = 4 * np.sqrt(self._calm_ends() @ widths)
+        heights: FloatArray = 4 * np.sqrt(self._zero_filled_ends() @ widths)
         return heights
 
     @property
     def tp_s(self) -> FloatArray:
-        """Peak periods, shape (N,); nan for a flat calm and where a band in between is missing."""
-        density = self._calm_ends()
+        """Peak periods, shape (N,); nan without energy or if a band in between is missing."""
+        density = self._zero_filled_ends()
         period = 1 / self.frequency_hz[np.argmax(density, axis=1)]
         known = np.isfinite(density).all(axis=1) & (density > 0).any(axis=1)
         return np.where(known, period, np.nan)
 
-    def _calm_ends(self) -> FloatArray:
-        """Density with missing values at either end of a spectrum replaced by zero."""
+    def _zero_filled_ends(self) -> FloatArray:
+        """Density, with zeros for missing values at either end of a spectrum."""
         present = np.isfinite(self.density)
         begun = np.logical_or.accumulate(present, axis=1)
         ahead = np.logical_or.accumulate(present[:, ::-1], axis=1)[:, ::-1]

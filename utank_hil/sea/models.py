@@ -1,9 +1,9 @@
-"""Formula spectra: JONSWAP, Pierson-Moskowitz, ITTC.
+"""Model spectra: JONSWAP, Pierson-Moskowitz, ITTC.
 
-The `*_density` functions give S(omega) in m^2 s/rad over angular frequency. Each is normalised so
+The `*_density` functions return the spectral density S(omega) in m^2 s/rad. Each is normalised so
 that its integral over all frequencies is exactly Hs^2 / 16. The functions without the suffix sample
-one into a `Spectrum` up to ten peak frequencies; the tail beyond holds 1.3e-4 of the variance (6e-5
-of Hs) and is left out.
+a density into a `Spectrum` up to ten peak frequencies; the omitted tail has 1.3e-4 of the variance
+(6e-5 of Hs).
 
 All three share the form S = A omega^-5 exp(-5/4 (omega_p / omega)^4), so m0 = A / (5 omega_p^4).
 """
@@ -29,12 +29,12 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     omega_rad_s : ndarray
         Angular frequencies, zero or more.
     hs_m, tp_s : float
-        Significant height and peak period.
+        Significant wave height and peak period.
 
     Returns
     -------
     ndarray
-        S(omega) in m^2 s/rad, shaped as `omega_rad_s`.
+        S(omega) in m^2 s/rad, shape of `omega_rad_s`.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
     _require_positive(hs_m=hs_m, tp_s=tp_s)
     peak = 2 * math.pi / tp_s
     ratio = np.asarray(omega_rad_s, dtype=float) / peak
-    # below 0.2 the exponential is less than 1e-300: zero, without dividing by zero
+    # below 0.2 the exponential is less than 1e-300; this also avoids division by zero
     u = np.maximum(ratio, 0.2)
     shape = np.where(ratio > 0.2, u**-5 * np.exp(-1.25 * u**-4), 0.0)
     density: FloatArray = 5 / 16 * hs_m**2 / peak * shape
@@ -52,7 +52,7 @@ def ittc_density(omega_rad_s: FloatArray, hs_m: float, tp_s: float) -> FloatArra
 
 
 def pierson_moskowitz_density(omega_rad_s: FloatArray, hs_m: float) -> FloatArray:
-    """Pierson-Moskowitz spectrum of a fully developed sea: the height settles the period.
+    """Pierson-Moskowitz spectrum of a fully developed sea: the height determines the period.
 
     S = alpha g^2 omega^-5 exp(-beta omega^-4), alpha = 8.1e-3, beta = 4 alpha (g / Hs)^2.
     Parameters, result and errors as `ittc_density`.
@@ -66,9 +66,9 @@ def jonswap_density(
     """JONSWAP spectrum (Hasselmann et al. 1973), normalised to Hs exactly.
 
     S = C(gamma) S_ITTC gamma^r, r = exp(-(omega / omega_p - 1)^2 / (2 sigma^2)), sigma = 0.07 up to
-    the peak and 0.09 above. C is the exact quadrature; the common fit 1 - 0.287 ln(gamma) is up to
-    2 % off in energy. gamma = 1 is the ITTC spectrum. Other parameters, result and errors as
-    `ittc_density`; also ValueError if gamma is less than 1.
+    the peak and 0.09 above. C is integrated numerically; the common fit 1 - 0.287 ln(gamma) has
+    errors of up to 2 % in energy. gamma = 1 is the ITTC spectrum. Other parameters, result and
+    errors as `ittc_density`; also ValueError if gamma is less than 1.
     """
     if not (math.isfinite(gamma) and gamma >= 1):
         raise ValueError(f"JONSWAP peak enhancement gamma must be 1 or more, got {gamma}")
@@ -79,18 +79,18 @@ def jonswap_density(
 
 
 def ittc(hs_m: float, tp_s: float) -> Spectrum:
-    """ITTC two-parameter `Spectrum` of given significant height and peak period."""
+    """ITTC two-parameter `Spectrum` of given significant wave height and peak period."""
     return _sample(lambda omega: ittc_density(omega, hs_m, tp_s), tp_s)
 
 
 def pierson_moskowitz(hs_m: float) -> Spectrum:
-    """Pierson-Moskowitz `Spectrum` of given significant height."""
+    """Pierson-Moskowitz `Spectrum` of given significant wave height."""
     tp_s = developed_peak_period_s(hs_m)
     return _sample(lambda omega: pierson_moskowitz_density(omega, hs_m), tp_s)
 
 
 def jonswap(hs_m: float, tp_s: float, gamma: float = 3.3) -> Spectrum:
-    """JONSWAP `Spectrum` of given significant height, peak period and peak enhancement."""
+    """JONSWAP `Spectrum` of given significant wave height, peak period and peak enhancement."""
     return _sample(lambda omega: jonswap_density(omega, hs_m, tp_s, gamma), tp_s)
 
 
@@ -109,13 +109,13 @@ def _enhancement(ratio: FloatArray, gamma: float) -> FloatArray:
 
 @functools.lru_cache(maxsize=64)
 def _energy_ratio(gamma: float) -> float:
-    """Energy of the enhanced spectrum over that of the ITTC one, to 1e-12.
+    """Energy of the enhanced spectrum relative to the ITTC spectrum's, to 1e-12.
 
-    Gauss-Legendre over the bump, on each side of the peak, where sigma jumps.
+    Gauss-Legendre quadrature of the excess, separately on each side of the peak, where sigma jumps.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     excess = 0.0
-    for low, high in ((0.4, 1.0), (1.0, 1.9)):  # 8.6 and 10 sigma: the bump is below 1e-16
+    for low, high in ((0.4, 1.0), (1.0, 1.9)):  # 8.6 and 10 sigma: the excess is below 1e-16
         u = low + (high - low) * (nodes + 1) / 2
         bump = 5 * u**-5 * np.exp(-1.25 * u**-4) * (_enhancement(u, gamma) - 1)
         excess += float((high - low) / 2 * weights @ bump)

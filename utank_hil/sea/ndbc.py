@@ -1,18 +1,18 @@
 """Reader of wave spectra as the US National Data Buoy Center (NDBC) publishes them.
 
-Yearly archive (``41010w2019.txt``): the header holds the frequencies, a line one spectrum::
+Yearly archive (``41010w2019.txt``): the header has the frequencies, each line one spectrum::
 
     #YY  MM DD hh mm  .0200  .0325  .0375 ...
     2019 02 06 00 40   0.00   0.00   0.02 ...
 
-Older years lack the ``#``, the minutes, or two digits of the year. The last 45 days
-(``41010.data_spec``) hold pairs of density and frequency, newest first, after a separation
+Older years lack the ``#``, the minutes, or two digits of the year. Files of the last 45 days
+(``41010.data_spec``) have pairs of density and frequency, newest first, after a separation
 frequency that the directional files (``.swdir``) lack::
 
     #YY  MM DD hh mm Sep_Freq  < spec_1 (freq_1) spec_2 (freq_2) ... >
     2019 02 10 05 40 0.153 0.000 (0.033) 0.012 (0.038) ...
 
-A missing value is ``MM``, 99.00 (densities only), 999 or 9999, whatever its decimals.
+A missing value is ``MM``, 99.00 (densities only), 999 or 9999, with any number of decimals.
 """
 
 import re
@@ -34,7 +34,7 @@ DIRECTION_MISSING = (999.0, 9999.0)
 ROUNDED_HZ = {round(0.033 + 0.005 * i, 3): round(0.0325 + 0.005 * i, 4) for i in range(13)}
 
 
-class Row(NamedTuple):
+class DataLine(NamedTuple):
     """One line of data."""
 
     number: int
@@ -51,26 +51,25 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
     path : str or Path
         Spectral density file.
     direction_path : str or Path, optional
-        Mean direction (alpha1) file of the same station, in either layout. An hour it lacks
-        has no direction.
+        Mean direction (alpha1) file of the same station, in either layout. Spectra missing in it
+        have no direction.
 
     Returns
     -------
     MeasuredSpectra
-        Increasing in time. Spectra with no value at all are left out; single missing values are
-        nan.
+        In order of time. Spectra without any value are left out; single missing values are nan.
 
     Raises
     ------
     ValueError
-        Naming the file, the line and the reason, if the file cannot be understood.
+        If the file cannot be parsed; the message has file, line and reason.
     OSError
         If a file cannot be read.
     """
-    time, frequency, density = _table(Path(path), DENSITY_MISSING, "density", (0.0, np.inf))
+    time, frequency, density = _parse(Path(path), DENSITY_MISSING, "density", (0.0, np.inf))
     direction = None
     if direction_path is not None:
-        direction_time, direction_frequency, measured = _table(
+        direction_time, direction_frequency, measured = _parse(
             Path(direction_path), DIRECTION_MISSING, "direction", (0.0, 360.0)
         )
         if direction_frequency != frequency:
@@ -81,11 +80,11 @@ def load_ndbc(path: str | Path, direction_path: str | Path | None = None) -> Mea
     return MeasuredSpectra(str(path), time, np.array(frequency), density, direction)
 
 
-def _table(
+def _parse(
     path: Path, missing: tuple[float, ...], quantity: str, bounds: tuple[float, float]
 ) -> tuple[npt.NDArray[np.datetime64], tuple[float, ...], FloatArray]:
-    """Return times, frequencies and values (N, F) of one file, sorted by time."""
-    rows = _rows(path)
+    """Parse one file: times, frequencies and values (N, F), sorted by time."""
+    rows = _data_lines(path)
     seen: dict[np.datetime64, int] = {}
     for row in rows:
         if row.frequency_hz != rows[0].frequency_hz:
@@ -110,7 +109,7 @@ def _table(
     return time[order], rows[0].frequency_hz, values[order]
 
 
-def _rows(path: Path) -> list[Row]:
+def _data_lines(path: Path) -> list[DataLine]:
     rows = []
     header: tuple[int, tuple[float, ...]] | None = None  # time columns and frequencies
     for number, line in enumerate(
@@ -132,7 +131,7 @@ def _rows(path: Path) -> list[Row]:
 
 
 def _header(path: Path, number: int, line: str) -> tuple[int, tuple[float, ...]] | None:
-    """Count of time columns and frequencies; None for a header or comment without frequencies."""
+    """Number of time columns, and frequencies; None for a line without frequencies."""
     words = line.replace("#", " ").split()
     names = [word for word in words if not word[0].isdigit() and word[0] != "."]
     if len(names) == len(words) or "(" in line:
@@ -145,16 +144,16 @@ def _header(path: Path, number: int, line: str) -> tuple[int, tuple[float, ...]]
 
 def _columns(
     path: Path, number: int, words: list[str], time_columns: int, frequency: tuple[float, ...]
-) -> Row:
+) -> DataLine:
     if len(words) != time_columns + len(frequency):
         found = len(words) - time_columns
         raise _error(path, number, f"{found} values for {len(frequency)} frequencies in the header")
     values = tuple(_number(path, number, word) for word in words[time_columns:])
-    return Row(number, _time(path, number, words[:time_columns]), frequency, values)
+    return DataLine(number, _time(path, number, words[:time_columns]), frequency, values)
 
 
-def _pairs(path: Path, number: int, line: str) -> Row:
-    lead = PAIR.sub("", line).split()  # what is not a pair: the time, and the separation frequency
+def _pairs(path: Path, number: int, line: str) -> DataLine:
+    lead = PAIR.sub("", line).split()  # time, and separation frequency
     if len(lead) not in (5, 6):
         raise _error(
             path, number, "not of the form: year month day hour minute density (frequency)"
@@ -163,7 +162,7 @@ def _pairs(path: Path, number: int, line: str) -> Row:
     frequencies = (_number(path, number, frequency) for _, frequency in pairs)
     exact = tuple(ROUNDED_HZ.get(frequency, frequency) for frequency in frequencies)
     values = tuple(_number(path, number, value) for value, _ in pairs)
-    return Row(number, _time(path, number, lead[:5]), _checked(path, number, exact), values)
+    return DataLine(number, _time(path, number, lead[:5]), _checked(path, number, exact), values)
 
 
 def _checked(path: Path, number: int, frequencies: tuple[float, ...]) -> tuple[float, ...]:

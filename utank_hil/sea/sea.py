@@ -1,14 +1,13 @@
-"""A realised sea: long-crested or short-crested wave components met by a ship.
+"""Realization of a sea: long-crested or short-crested wave components at a ship.
 
 Ship-fixed horizontal axes, x forward and y to starboard, origin at the centre of gravity. A
 component travels in direction `heading_rad` from the x axis towards y and raises the surface by::
 
     zeta = a cos(omega_e t - k (x cos(heading) + y sin(heading)) + phase)
 
-The wave slope that rolls the ship is the angle of the surface across her, positive like roll,
-starboard down: -d zeta / dy = k a sin(heading) cos(omega_e t + phase + pi/2) at the centre of
-gravity. A small ship on a long wave rights herself towards it, so the wave moment is the restoring
-stiffness times an effective slope::
+The transverse wave slope is positive like roll, starboard down: -d zeta / dy =
+k a sin(heading) cos(omega_e t + phase + pi/2) at the centre of gravity. A small ship on a long wave
+aligns with the surface, so the wave moment is the restoring stiffness times an effective slope::
 
     K = k1 r(k, heading) k a sin(heading) cos(omega_e t + phase + pi/2)
 """
@@ -29,7 +28,7 @@ BEAM_RAD = math.pi / 2  # waves travelling from port to starboard
 
 @dataclass(frozen=True, slots=True)
 class EffectiveSlope:
-    """How much of the wave slope acts on the ship.
+    """Ratio r of effective to true wave slope.
 
     r = coefficient * exp(-k depth) * sinc(k |sin(heading)| beam / 2), sinc(x) = sin(x) / x.
 
@@ -38,9 +37,9 @@ class EffectiveSlope:
     coefficient : float
         Effective wave slope coefficient, the long-wave limit of r.
     depth_m : float
-        Smith effect: the slope is taken this far below the surface, usually half the draught.
+        Depth for the Smith effect, usually half the draught.
     beam_m : float
-        The slope is averaged over this beam; short waves that fit under the hull cancel.
+        Beam over which the slope is averaged; much shorter waves cancel.
 
     Raises
     ------
@@ -56,7 +55,7 @@ class EffectiveSlope:
         refuse("effective slope", range_problems(self))
 
     def factor(self, wavenumber_rad_m: FloatArray, heading_rad: FloatArray) -> FloatArray:
-        """Return the ratio r of effective to true slope, per component."""
+        """Return the ratio r per component."""
         across = wavenumber_rad_m * np.abs(np.sin(heading_rad)) * self.beam_m / 2
         smith = np.exp(-wavenumber_rad_m * self.depth_m)
         ratio: FloatArray = self.coefficient * smith * np.sinc(across / np.pi)
@@ -65,14 +64,14 @@ class EffectiveSlope:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sea:
-    """Wave components as a ship meets them; make one with `Sea.irregular` or `Sea.regular`.
+    """Wave components at a ship; created by `Sea.irregular` or `Sea.regular`.
 
     Parameters
     ----------
     amplitude_m, omega_rad_s, heading_rad, phase_rad : ndarray, shape (N,)
         Amplitude, earth-frame frequency, direction of travel relative to the ship, phase.
     speed_m_s : float
-        Ship's speed.
+        Speed of the ship.
     """
 
     amplitude_m: FloatArray
@@ -91,7 +90,7 @@ class Sea:
         speed_m_s: float = 0.0,
         phase_rad: float = 0.0,
     ) -> "Sea":
-        """One regular wave; a crest passes the ship at t = 0 unless a phase is given.
+        """One regular wave, by default with a crest at the ship at t = 0.
 
         Raises
         ------
@@ -124,34 +123,33 @@ class Sea:
     ) -> "Sea":
         """Draw a sea from a spectrum: the same seed gives the same sea.
 
-        The spectrum is cut into `components` intervals, narrow where the energy is (equal steps of
-        the integral of sqrt(S)). Each holds one component with the interval's exact energy, its
-        frequency drawn from the spectrum within the interval, its phase evenly. So every sea has
-        the variance m0 exactly, the mean over seeds has the spectrum exactly, and since no two
-        frequencies are commensurate nothing repeats.
+        The spectrum is divided into `components` intervals of equal integral of sqrt(S). Each has
+        one component with the energy of the interval, a frequency drawn from the spectrum within
+        it, and a uniform phase. So every sea has exactly the variance m0, the mean over seeds has
+        exactly the spectrum, and the sea does not repeat, since no frequencies are commensurate.
 
         Parameters
         ----------
         spectrum : Spectrum
         seed : int
-            Zero or more. Random numbers are the raw output of `numpy.random.PCG64`, whose stream
-            numpy guarantees, so a seed means the same sea in every numpy version.
+            Zero or more. The random numbers are the raw stream of `numpy.random.PCG64`, which is
+            the same in every numpy version.
         components : int
             Number of intervals.
         heading_rad : float or ndarray, shape (F,)
-            Mean direction of travel relative to the ship, for all or for each band
+            Mean direction of travel relative to the ship, for all bands or for each
             (`Spectrum.heading_rad`): 0 following, pi head, +pi/2 from port to starboard.
         spreading : float, optional
             Exponent s of the short-crested spreading cos^2s(theta / 2) about the mean direction
-            (Longuet-Higgins 1963; 10 to 15 for wind sea, 25 and more for swell). Long-crested
-            when left out. Each component has one direction, so the sea stays ergodic.
+            (Longuet-Higgins 1963; 10 to 15 for wind sea, 25 and more for swell). Long-crested by
+            default. Each component has one direction, so the sea is ergodic.
         speed_m_s : float
-            Ship's speed.
+            Speed of the ship.
 
         Raises
         ------
         ValueError
-            If the spectrum is a flat calm or an argument is out of range.
+            If the spectrum has no energy or an argument is out of range.
         """
         if components < 1:
             raise ValueError(f"a sea needs one component or more, got {components}")
@@ -163,18 +161,20 @@ class Sea:
         edges = spectrum.band_edges_hz.ravel()  # lower, upper, lower, upper ...
         width = np.diff(edges)[::2]
         energy = _cumulative(spectrum.density * width)
-        effort = _cumulative(np.sqrt(spectrum.density) * width)
-        cuts = np.interp(np.linspace(0, effort[-1], components + 1), effort, edges)
+        root_integral = _cumulative(np.sqrt(spectrum.density) * width)
+        cuts = np.interp(np.linspace(0, root_integral[-1], components + 1), root_integral, edges)
         energy_at_cuts = np.interp(cuts, edges, energy)
-        share = np.diff(energy_at_cuts)
-        frequency = np.interp(energy_at_cuts[:-1] + within * share, energy, edges)
+        energies = np.diff(energy_at_cuts)
+        frequency = np.interp(energy_at_cuts[:-1] + within * energies, energy, edges)
         mean = np.broadcast_to(np.asarray(heading_rad, dtype=float), spectrum.density.shape)
         band = np.clip(np.searchsorted(edges[1::2], frequency), 0, width.size - 1)
         heading = mean[band]
         if spreading is not None:
-            # one draw in each of N equal slices of the distribution, in random order
+            # stratified sampling: one draw per quantile interval, in random order
             heading = heading + _spread((np.argsort(order) + across) / components, spreading)
-        return cls(np.sqrt(2 * share), 2 * np.pi * frequency, heading, 2 * np.pi * phase, speed_m_s)
+        return cls(
+            np.sqrt(2 * energies), 2 * np.pi * frequency, heading, 2 * np.pi * phase, speed_m_s
+        )
 
     @property
     def encounter_rad_s(self) -> FloatArray:
@@ -202,7 +202,7 @@ class Sea:
         stiffness_nm_rad : float
             Restoring stiffness k1 of the ship (`RollShip.stiffness_nm_rad`).
         effective_slope : EffectiveSlope, optional
-            The full slope when left out.
+            By default the true slope.
         """
         ratio = (effective_slope or EffectiveSlope()).factor(
             wavenumber_rad_m(self.omega_rad_s), self.heading_rad
@@ -215,18 +215,18 @@ class Sea:
     def _harmonics(self, amplitude: FloatArray, lead_rad: float) -> Harmonics:
         encounter = self.encounter_rad_s
         phase = self.phase_rad + lead_rad
-        # cos is even: an overtaken wave is one of positive frequency with its phase reversed
+        # cos is even: a negative frequency is a positive one with reversed phase
         return Harmonics(amplitude, np.abs(encounter), np.where(encounter < 0, -phase, phase))
 
 
 def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:
-    """Uniform numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
+    """Uniform random numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
     raw = np.random.PCG64(seed).random_raw(shape)
     return (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
 def _cumulative(per_band: FloatArray) -> FloatArray:
-    """Integrate up to every lower and upper band edge; flat between bands."""
+    """Cumulative integral at every lower and upper band edge; constant between bands."""
     total = np.concatenate([[0.0], np.cumsum(per_band)])
     return np.column_stack([total[:-1], total[1:]]).ravel()
 

@@ -1,8 +1,8 @@
 """A one-dimensional wave spectrum: energy in frequency bands.
 
-The spectral density S(f) in m^2/Hz is one-sided and constant within a band, which is what a buoy
-reports and what a fine grid of a formula comes to. All moments are sums over the bands, so the
-significant height 4 sqrt(m0) is the one that the measuring centre publishes.
+The spectral density S(f) in m^2/Hz is one-sided and constant within a band, as a buoy reports it.
+All moments are sums over the bands, so the significant wave height 4 sqrt(m0) equals the published
+one.
 """
 
 import math
@@ -14,13 +14,12 @@ from utank_hil.arrays import FloatArray
 
 
 def band_edges(frequency_hz: FloatArray) -> FloatArray:
-    """Edges of the frequency bands that belong to given centre frequencies.
+    """Edges of the frequency bands with given centre frequencies.
 
-    Halfway between neighbours where the spacing is even. Where it changes, between two evenly
-    spaced stretches, the gap is shared in proportion to the spacing on either side. For NDBC's
+    Midpoints where the spacing is uniform. Where it changes, between two uniformly spaced parts,
+    the gap is divided in proportion to the spacing on either side. For NDBC's
     grids (0.0325, 0.0375, ... 0.0925, 0.1000, 0.1100, ...) this gives the bandwidths in NDBC's
-    "Description of NDBC wave spectra"; plain midpoints make the band at 0.1 Hz an eighth too
-    narrow.
+    "Description of NDBC wave spectra"; with midpoints the band at 0.1 Hz is an eighth too narrow.
 
     Parameters
     ----------
@@ -33,15 +32,15 @@ def band_edges(frequency_hz: FloatArray) -> FloatArray:
         Lower and upper edge of each band in Hz; bands never overlap.
     """
     gap = np.diff(frequency_hz)
-    # beyond the grid the spacing is taken to go on changing as it did last
+    # beyond the grid the spacing is extrapolated linearly
     before = max(2 * gap[0] - gap[min(1, gap.size - 1)], gap[0])
     after = max(2 * gap[-1] - gap[max(-2, -gap.size)], gap[-1])
     left = np.concatenate([[before], gap[:-1]])
     right = np.concatenate([gap[1:], [after]])
-    margin = 1.02  # rounding in print must not look like a change of spacing
+    margin = 1.02  # tolerance for frequencies rounded in the file
     changes = (gap > margin * np.minimum(left, right)) & (margin * gap < np.maximum(left, right))
     between = frequency_hz[:-1] + gap * np.where(changes, left / (left + right), 0.5)
-    # the outermost bands: symmetric, at most twice as wide as their neighbours
+    # outermost bands: symmetric, at most twice as wide as their neighbours
     widths = np.diff(between) if between.size > 1 else gap
     first_half = min(between[0] - frequency_hz[0], widths[0])
     last_half = min(frequency_hz[-1] - between[-1], widths[-1])
@@ -54,7 +53,7 @@ def band_edges(frequency_hz: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Wave energy over frequency, at a fixed point (earth frame).
+    """Wave spectrum at a fixed point (earth frame).
 
     Parameters
     ----------
@@ -110,13 +109,13 @@ class Spectrum:
 
     @property
     def tp_s(self) -> float:
-        """Peak period, of the band with the greatest density; not a number for a flat calm."""
+        """Peak period, of the band with the greatest density; nan without energy."""
         peak = int(np.argmax(self.density))
         return float(1 / self.frequency_hz[peak]) if self.density[peak] > 0 else math.nan
 
     @property
     def tz_s(self) -> float:
-        """Mean zero-up-crossing period sqrt(m0 / m2); not a number for a flat calm."""
+        """Mean zero-up-crossing period sqrt(m0 / m2); nan without energy."""
         second = self.moment(2)
         return math.sqrt(self.moment(0) / second) if second > 0 else math.nan
 
@@ -126,7 +125,7 @@ class Spectrum:
         Parameters
         ----------
         course_deg : float
-            Ship's course, degrees clockwise from true north.
+            Course of the ship, degrees clockwise from true north.
 
         Returns
         -------
