@@ -1,6 +1,6 @@
-"""Everything about the CAN bus: the catalogue of messages, their protection, and the ports.
+"""CAN bus: the catalogue of messages, their end-to-end protection, and the ports.
 
-Light to import: cantools is loaded with the catalogue, python-can with `SocketCanPort`.
+cantools is imported with the catalogue, python-can with `SocketCanPort`.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The catalogue of messages: reads the DBC, checks it against the message types, compiles it."""
+"""The catalogue of messages: the DBC, checked against the message types and compiled."""
 
 import hashlib
 from collections.abc import Mapping
@@ -20,21 +20,21 @@ T = TypeVar("T", bound=tuple[Any, ...])
 
 DBC_PATH: Final = Path(__file__).with_name("utank.dbc")
 
-#: Hashes of the catalogue travel in 12 bits, of which all ones is "not available".
+#: Number of catalogue hashes: 12 bits without all ones, which means "not available".
 _VERSIONS: Final = (1 << 12) - 1
 
 _PROTECTION: Final = {"crc": (0, 8), "counter": (8, 4)}
 
 
 class Catalogue:
-    """The compiled messages of one DBC; makes the two ends of each.
+    """The compiled messages of one DBC; creates transmitters and receivers.
 
     Attributes
     ----------
     version : int
         Hash of the DBC, 0 to 4094, as HEARTBEAT and CTRL_STATUS carry it.
     can_ids : frozenset of int
-        Every identifier of the catalogue.
+        All identifiers of the catalogue.
     """
 
     def __init__(self, codecs: Mapping[tuple[type, Address], Codec[Any]], version: int) -> None:
@@ -43,19 +43,19 @@ class Catalogue:
         self._codecs = dict(codecs)
 
     def codec(self, message_type: type[T], source: Address | None = None) -> Codec[T]:
-        """Return how a message travels.
+        """Return the codec of a message.
 
         Parameters
         ----------
         message_type : type
             One of the types of `utank_hil.canbus.messages`.
         source : Address, optional
-            Who sends it; needed for the messages that every node sends.
+            Sender; needed for the messages that every node sends.
 
         Raises
         ------
         ValueError
-            If no such node sends the message, or several do and none is named.
+            If no such node sends the message, or several do and `source` is None.
         """
         found = {
             address: codec
@@ -79,22 +79,22 @@ class Catalogue:
         )
 
     def transmitter(self, message_type: type[T], source: Address | None = None) -> Transmitter[T]:
-        """Return a new sending end, its counter at the start; see `codec`."""
+        """Return a new transmitter; see `codec`."""
         return Transmitter(self.codec(message_type, source))
 
     def receiver(self, message_type: type[T], source: Address | None = None) -> Receiver[T]:
-        """Return a new receiving end that has heard nothing yet; see `codec`."""
+        """Return a new receiver; see `codec`."""
         return Receiver(self.codec(message_type, source))
 
 
 @cache
 def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
-    """Read and compile a DBC; the same catalogue again for the same path.
+    """Read and compile a DBC; cached by path.
 
     Raises
     ------
     ValueError
-        If the DBC doesn't fit the message types, with everything that doesn't.
+        If the DBC doesn't match the message types; the message lists every difference.
     OSError
         If it can't be read.
     """
@@ -140,7 +140,7 @@ def read_data_ids(message: "DbcMessage") -> bytes | None:
     Raises
     ------
     ValueError
-        If they are not written in hexadecimal.
+        If they are not hexadecimal.
     """
     attribute = message.dbc.attributes.get("DataIDs") if message.dbc else None
     return None if attribute is None else bytes.fromhex(str(attribute.value))
@@ -174,7 +174,7 @@ def _signal(signal: "DbcSignal", hint: Any) -> Signal:
 
 
 def _problems(message: "DbcMessage", kind: type, address: Address) -> list[str]:
-    """Return what keeps a message from being compiled into its type."""
+    """Return the reasons why a message does not match its type."""
     problems = []
     if message.length != FRAME_BYTES or not message.is_extended_frame:
         problems.append("must have 8 bytes and an extended identifier")

@@ -1,9 +1,8 @@
-"""Bytes of a frame to and from a message, by functions generated from the DBC.
+"""Encodes and decodes frames with functions generated from the DBC.
 
-cantools knows every DBC and pays for it; a control loop and a lockstep run need a tenth of its
-time. So the catalogue's messages are compiled at start: one Python function to encode and one to
-decode, over the frame's CRC byte, counter byte and three 16-bit words. Tests hold both equal to
-cantools on random frames.
+The messages of the catalogue are compiled at start: one Python function to encode and one to
+decode, over the frame's CRC byte, counter byte and three 16-bit words. They take a tenth of
+cantools' time, which control loop and lockstep runs need. Tests compare both with cantools.
 """
 
 import math
@@ -20,7 +19,7 @@ T = TypeVar("T", bound=tuple[Any, ...])
 
 FRAME_BYTES: Final = 8
 
-#: Parts a frame is packed from: name, first bit, bits.
+#: Parts of a frame: name, first bit, number of bits.
 _PARTS: Final = (("crc", 0, 8), ("b1", 8, 8), ("w1", 16, 16), ("w2", 32, 16), ("w3", 48, 16))
 _STRUCT: Final = struct.Struct("<BBHHH")
 
@@ -38,9 +37,9 @@ class Signal:
     start, length : int
         First bit and number of bits.
     scale, offset : float
-        Not used unless `kind` is float.
+        Used only if `kind` is float.
     minimum, maximum : float
-        Range of the physical value; exact integers unless `kind` is float.
+        Range of the physical value; integers unless `kind` is float.
     """
 
     name: str
@@ -68,16 +67,16 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class Codec(Generic[T]):
-    """How one message of the catalogue travels.
+    """Encoding of one message of the catalogue.
 
     Attributes
     ----------
     name : str
-        In the DBC.
+        Name in the DBC.
     can_id : int
         29-bit identifier.
     cycle_ns : int
-        Time between two frames; 0 for a message without a cycle.
+        Cycle time; 0 for a message without one.
     protected : bool
         Whether byte 0 is a CRC and the low nibble of byte 1 a counter.
     encode : Callable
@@ -108,7 +107,7 @@ def compile_codec(
     Parameters
     ----------
     message_type : type
-        The NamedTuple; its fields are the signals' names.
+        NamedTuple with the signals' names as fields.
     signals : iterable of Signal
         All signals but CRC and counter, in the order of the fields.
     name, can_id, cycle_ns
@@ -140,12 +139,12 @@ def compile_codec(
 
 
 def field_kind(annotation: Any) -> type:
-    """Return the kind of a field: `E | None` and `int | None` are E and int.
+    """Return the kind of a field from its annotation: E for `E | None`, int for `int | None`.
 
     Raises
     ------
     ValueError
-        If the annotation is none of those `utank_hil.canbus.messages` allows.
+        If the annotation is not one of those in `utank_hil.canbus.messages`.
     """
     if annotation in (float, bool):
         return annotation  # type: ignore[no-any-return]  # narrowed by the line above
@@ -163,7 +162,7 @@ def _members(kind: type[IntEnum], length: int) -> tuple[IntEnum | None, ...]:
 
 
 def _clamp(value: float, signal: tuple[float, int, int, int]) -> int:
-    """Raw value of a physical one that is not within the range (out of it, or NaN)."""
+    """Raw value of a physical value that is out of range or NaN."""
     minimum, raw_minimum, raw_maximum, not_available = signal
     if value != value:
         return not_available
@@ -171,7 +170,7 @@ def _clamp(value: float, signal: tuple[float, int, int, int]) -> int:
 
 
 def _overlaps(signal: Signal) -> list[tuple[str, int, int]]:
-    """Return the parts a signal lies in: name, shift of the signal within it, its bits."""
+    """Return the parts that contain a signal: name, shift of the signal, number of bits."""
     return [
         (part, signal.start - start, bits)
         for part, start, bits in _PARTS

@@ -1,20 +1,19 @@
 """End-to-end protection in the style of AUTOSAR E2E Profile 2.
 
 Byte 0 of a frame is a CRC-8 (polynomial 0x2F, start value and final exclusive-or 0xFF) over bytes
-1 to 7 followed by one more byte that is never sent: the data ID, taken from the message's own list
-of sixteen by the counter in the low nibble of byte 1. A frame of another message thus fails the
-check even if its length and counter fit (masquerade). Source: AUTOSAR, Specification of SW-C
-End-to-End Communication Protection Library (polynomial, start value and Profile 2).
+1 to 7 and one more byte that is not sent: the data ID, selected from the message's list of sixteen
+by the counter in the low nibble of byte 1. So a frame of another message fails the check even with
+the right length and counter (masquerade). Source: AUTOSAR, Specification of SW-C End-to-End
+Communication Protection Library (polynomial, start value and Profile 2).
 
 The lists of the catalogue (attribute `DataIDs` of the DBC) are those of `data_ids`. Two messages
-then differ at every counter, and differ even with any one bit flipped; and the four constants are
-such that any one, two or three flipped bits of a frame are found. That is not so with any list:
-where the data ID changes with the counter, a flipped counter bit changes the ID as well, and
-careless lists let two flipped bits through. Tests hold all of this.
+then differ at every counter value, even after one bit error. Any one, two or three bit errors of a
+frame are detected. Other lists may miss some: a bit error in the counter changes the data ID as
+well, and two bit errors may cancel. Tests check all of this.
 
-The CRC is linear over GF(2): the CRC of a frame is the exclusive-or of what each byte contributes
-at its place. So eight bytes cost four look-ups: byte 1 with the data ID and all constants in a
-table of the message, bytes 2 to 7 in pairs in the tables `WORD_TABLES`.
+The CRC is linear over GF(2): the CRC of a frame is the exclusive-or of one contribution per byte.
+So eight bytes take four table look-ups: byte 1 with the data ID and all constants in a table of the
+message, bytes 2 to 7 in pairs in the tables `WORD_TABLES`.
 """
 
 from functools import reduce
@@ -33,7 +32,7 @@ def _shifted(crc: int) -> int:
     return crc
 
 
-#: What one byte contributes to the CRC register when nothing follows it.
+#: Contribution of the last byte to the CRC register.
 _BYTE_TABLE: Final = bytes(_shifted(crc) for crc in range(256))
 
 
@@ -46,7 +45,7 @@ def crc8(data: bytes) -> int:
 
 
 def _place_table(following_bytes: int) -> bytes:
-    """What a byte contributes to the CRC with so many bytes behind it."""
+    """Contribution of a byte to the CRC, with this number of bytes after it."""
     table = _BYTE_TABLE
     for _ in range(following_bytes):
         table = table.translate(_BYTE_TABLE)
@@ -54,7 +53,7 @@ def _place_table(following_bytes: int) -> bytes:
 
 
 def _word_table(place: int) -> bytes:
-    """What the 16-bit little-endian word at byte `place` contributes; the data ID comes last."""
+    """Contribution of the 16-bit little-endian word at byte `place`; the data ID comes last."""
     low, high = _place_table(8 - place), _place_table(7 - place)
     rows = int.from_bytes(low, "little")
     return b"".join(
@@ -83,7 +82,7 @@ def data_ids(number: int) -> bytes:
 
 
 def first_byte_table(data_ids: bytes) -> bytes:
-    """Contribution of byte 1, of the data ID that its counter chooses and of the constants.
+    """Contribution of byte 1, of the data ID for its counter, and of the constants.
 
     The CRC of a frame with bytes b is ``table[b[1]] ^ A[b[2:4]] ^ B[b[4:6]] ^ C[b[6:8]]`` where
     A, B, C are `WORD_TABLES`.

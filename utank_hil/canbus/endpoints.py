@@ -1,4 +1,4 @@
-"""The two ends of one message: the counter on the way out, the verdict on the way in."""
+"""Transmitter and receiver of one message: sequence counter and acceptance of frames."""
 
 from enum import Enum
 from typing import Any, Final, Generic, TypeVar
@@ -8,10 +8,10 @@ from utank_hil.canbus.frame import Frame
 
 T = TypeVar("T", bound=tuple[Any, ...])
 
-#: Frames that may be missing between two accepted ones; more, and the stream must prove itself.
+#: Frames that may be missing between two accepted ones; after more, `RESYNC_FRAMES` applies.
 MAX_LOST: Final = 3
 
-#: Frames in a row that must follow one another before a new counter is trusted.
+#: Consecutive frames after which a new counter value is accepted.
 RESYNC_FRAMES: Final = 3
 
 #: Level of the leaky bucket at which a stream becomes invalid.
@@ -34,15 +34,15 @@ class Rejection(Enum):
 
 
 class Transmitter(Generic[T]):
-    """Turns messages of one type into protected frames; one for each sender.
+    """Encodes messages of one type and sender into protected frames.
 
     Attributes
     ----------
     can_id : int
     cycle_ns : int
-        Time between two frames that the catalogue promises; 0 for none.
+        Cycle time by the catalogue; 0 for none.
     counter : int
-        Counter of the last frame.
+        Sequence counter of the last frame.
     """
 
     __slots__ = ("_encode", "can_id", "counter", "cycle_ns")
@@ -54,33 +54,33 @@ class Transmitter(Generic[T]):
         self._encode = codec.encode
 
     def frame(self, message: T) -> Frame:
-        """Return the next frame; values out of range saturate, NaN and None are not available."""
+        """Return the next frame; values out of range saturate, NaN and None mean not available."""
         self.counter = counter = (self.counter + 1) & _COUNTER_MASK
         return _new(Frame, (self.can_id, self._encode(message, counter)))
 
 
 class Receiver(Generic[T]):
-    """Accepts or rejects the frames of one message; a rejected frame changes no trusted state.
+    """Accepts or rejects the frames of one message; a rejected frame does not change the counter.
 
-    The first good frame is accepted. After that a counter may skip up to `MAX_LOST` frames, counted
-    in `lost`. Any other step is rejected, until `RESYNC_FRAMES` frames in a row follow one another
-    without an accepted one between them: then the sender has restarted or the gap was long, and the
-    last of them is accepted. A single repeated, delayed or inserted frame thus never moves the
-    trusted counter, as long as it is less than ``16 - MAX_LOST - 1`` frames old: older, four bits
-    can't tell it from the next one. Age is not judged here: that needs the caller's clock.
+    The first valid frame is accepted. After that the counter may skip up to `MAX_LOST` frames,
+    counted in `lost`. Any other step is rejected. After `RESYNC_FRAMES` consecutive frames without
+    an accepted one between them, the last is accepted: the sender has restarted or the gap was
+    long. So a single repeated, delayed or inserted frame never changes the expected counter if it
+    is less than ``16 - MAX_LOST - 1`` frames old; with four bits, an older one looks like the next
+    one. The age of frames is judged elsewhere, since there is no clock here.
 
     Attributes
     ----------
     can_id : int
     cycle_ns : int
-        Time between two frames that the catalogue promises; 0 for none.
+        Cycle time by the catalogue; 0 for none.
     valid : bool
-        Verdict on the stream by a leaky bucket, a rejected frame +1, an accepted one -1: False
-        before the first accepted frame and from `BUCKET_LIMIT` until the bucket is empty again.
+        State of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame. False
+        before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
     lost : int
-        Frames found missing by the counter's step.
+        Frames missing by the counter.
     rejected : dict
-        Count of rejected frames by `Rejection`.
+        Number of rejected frames by `Rejection`.
     """
 
     __slots__ = (
@@ -145,7 +145,7 @@ class Receiver(Generic[T]):
         return message
 
     def _drain(self) -> None:
-        """One step down with the bucket, after an accepted frame."""
+        """Decrement the bucket after an accepted frame."""
         self._run = 0
         self._bucket = max(self._bucket - 1, 0)
         if not self._bucket:

@@ -1,6 +1,6 @@
-"""The value tables of the catalogue. A value the table does not list decodes to None.
+"""Value tables of the catalogue. A value that is not in the table decodes to None.
 
-Raw all-ones means "not available" and is no member: a field typed `Mode | None` carries it as None.
+The raw value of all ones means "not available". It is not a member: a field `Mode | None` has None.
 """
 
 from enum import IntEnum
@@ -51,7 +51,7 @@ class Fault(IntEnum):
 
 
 class RetuningState(IntEnum):
-    """Where the controller is in identifying the ship and retuning itself."""
+    """State of the controller's retuning."""
 
     IDLE = 0
     IDENTIFY = 1
@@ -105,7 +105,7 @@ class DriveFault(IntEnum):
 
 
 class Quality(IntEnum):
-    """A sensor's own verdict on what it sends."""
+    """Quality of a measurement, as the sensor rates it."""
 
     GOOD = 0
     DEGRADED = 1

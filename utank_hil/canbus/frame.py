@@ -1,4 +1,4 @@
-"""The CAN frame as every node and port sees it."""
+"""The CAN frame of nodes and ports."""
 
 from typing import NamedTuple
 

@@ -1,13 +1,13 @@
 """The messages of the catalogue: one typed tuple each, declared here and in the DBC only.
 
 Field names are the DBC's signal names. `utank_hil.canbus` exports every message of this file.
-What a field's type says:
+Types of fields:
 
-* `float`: scaled to the unit in the name; NaN is "not available" on the bus, and what a value out
-  of range decodes to; encoding saturates at the range.
-* `E | None` (E an IntEnum) and `int | None`: None is "not available" and what a value outside the
-  table or range decodes to; encoding an integer saturates.
-* `bool`: one bit, for which there is no "not available".
+* `float`: a value in the unit of the name. NaN is "not available"; a raw value out of range decodes
+  to NaN; encoding saturates at the range.
+* `E | None` (E an IntEnum) and `int | None`: None is "not available"; a raw value outside the table
+  or range decodes to None; encoding an integer saturates.
+* `bool`: one bit, without "not available".
 """
 
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class PumpCommand(NamedTuple):
     control_word
         CiA 402 command. None must not enable anything.
     timeout_s
-        The drive goes to zero pressure on its own when no valid command came for so long.
+        The drive goes to zero pressure by itself after this time without a valid command.
     """
 
     pressure_pa: float
@@ -70,13 +70,13 @@ class DriveStatus1(NamedTuple):
     pressure_pa
         Differential pressure as the drive measures it, signed as the command.
     speed_rad_s
-        Speed of the pump, positive for positive pressure.
+        Shaft speed of the pump, positive for positive pressure.
     state
         CiA 402 state.
     command_echo
         Counter of the last PUMP_CMD accepted; None before the first.
     pressure_limited, speed_limited, rate_limited, power_limited
-        The limit holds back the pressure at present.
+        The limit is active.
     """
 
     pressure_pa: float
@@ -104,7 +104,7 @@ class DriveStatus2(NamedTuple):
     temperature_warning, voltage_warning
         Near the limit that would trip the drive.
     command_warning
-        Commands were rejected or lost lately.
+        Commands were rejected or lost recently.
     sensor_warning
         The drive's pressure feedback is implausible.
     """
@@ -136,11 +136,11 @@ class SensorTank(NamedTuple):
     Attributes
     ----------
     port_level_m, starboard_level_m
-        Level above the still-water level, each on its own; negative below.
+        Level above the still-water level, measured independently; negative below.
     port_high, starboard_high
         Independent high-level switches.
     quality
-        Of both levels.
+        Quality of both levels.
     """
 
     port_level_m: float
@@ -161,7 +161,7 @@ class SensorPump(NamedTuple):
     flow_m3_s
         Flow through the duct, positive to starboard; NaN where no flow meter is fitted.
     quality
-        Of the pressure.
+        Quality of the pressure.
     """
 
     pressure_pa: float
@@ -194,7 +194,7 @@ class ControllerStatus(NamedTuple):
     catalogue_version, configuration_version
         Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
     retuning
-        Where it is in retuning itself; None if it can't.
+        State of its retuning; None if it has none.
     """
 
     mode: Mode | None
@@ -217,7 +217,7 @@ class OperatorCommand(NamedTuple):
     Attributes
     ----------
     mode_request
-        Mode wished for; None wishes nothing.
+        Requested mode; None for no request.
     arm
         Permission to use the pump; a rising edge arms, False disarms.
     stop
@@ -231,7 +231,7 @@ class OperatorCommand(NamedTuple):
     undo
         Rising edge: back to the law before the last retuning.
     forbid_retuning
-        No retuning, by order or by itself; one under way is given up.
+        No retuning, requested or automatic; one under way is cancelled.
     """
 
     mode_request: Mode | None
@@ -253,9 +253,9 @@ class Heartbeat(NamedTuple):
     state
         State of the node.
     reset_cause
-        Why it last started.
+        Cause of its last start.
     uptime_s
-        Time since then, in steps of 10 s; a fall is a restart.
+        Time since then, in steps of 10 s; a decrease means a restart.
     catalogue_version, configuration_version
         Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
     transmit_error_count, receive_error_count
@@ -275,7 +275,7 @@ class Heartbeat(NamedTuple):
 class AddressClaim(NamedTuple):
     """ADDRESS_CLAIM_<NODE>, every node at boot, unprotected: all 64 bits are SAE J1939-81's NAME.
 
-    A second holder of one's own address means: never arm.
+    A node that receives a claim of its own address from another node must not arm.
     """
 
     name: int | None

@@ -1,4 +1,4 @@
-"""The way from a runner to a bus."""
+"""Interface from a runner to a bus."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -11,7 +11,7 @@ class PortError(OSError):
 
 
 class Port(Protocol):
-    """A bus as a runner sees it; never blocks."""
+    """A bus as seen by a runner; never blocks."""
 
     def send(self, frame: Frame) -> None:
         """Queue one frame for transmission.
@@ -19,11 +19,11 @@ class Port(Protocol):
         Raises
         ------
         PortError
-            If the frame was not taken.
+            If the frame was not accepted.
         """
 
     def receive(self) -> Sequence[Frame]:
-        """Return what has arrived since the last call, oldest first.
+        """Return the frames received since the last call, oldest first.
 
         Raises
         ------

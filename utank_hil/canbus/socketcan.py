@@ -1,7 +1,7 @@
 """SocketCAN through python-can, as a `Port`.
 
-No notifier thread and no periodic sending by the kernel: the loop drains the socket at the start of
-its tick and sends at the end, so a hanging loop is a silent one.
+No notifier thread and no periodic transmission by the kernel: the loop reads the socket at the
+start of its tick and sends at the end, so a loop that hangs is silent on the bus.
 """
 
 import errno
@@ -15,12 +15,12 @@ from can.interfaces.socketcan import SocketcanBus
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.port import PortError
 
-#: The kernel keeps about 280 frames for a socket; a babbling bus must not hold the loop longer.
+#: More than the kernel's receive buffer (about 280 frames); bounds the time on a babbling bus.
 MAX_FRAMES_PER_CALL: Final = 320
 
 _EXTENDED_MASK: Final = 0x1FFFFFFF
 
-#: A deleted interface: its sockets never recover, not even when one of the same name comes back.
+#: A deleted interface: its sockets never recover, even if the interface is created again.
 _GONE: Final = (errno.ENODEV, errno.ENXIO)
 
 _REMEDIES: Final = {
@@ -31,7 +31,7 @@ _REMEDIES: Final = {
     errno.EAFNOSUPPORT: "the kernel has no CAN: modprobe can_raw",
 }
 
-#: Error classes of <linux/can/error.h> after which nothing of ours gets through.
+#: Error classes of <linux/can/error.h> after which no frame is transmitted.
 _ERROR_CLASSES: Final = {
     0x001: "transmit timeout",
     0x020: "no node acknowledges",
@@ -43,26 +43,26 @@ _CHECK_BUS: Final = "check wiring, termination and bit rate"
 class SocketCanPort:
     """A SocketCAN interface; see `Port` for `send`, `receive` and `close`.
 
-    An interface that was down is used again when it is up; one that was deleted is reopened by the
-    next call after it has come back. Every call until then raises PortError.
+    An interface that was down is used again when it is up. One that was deleted is reopened by the
+    first call after it exists again. Every call until then raises PortError.
 
     Parameters
     ----------
     channel : str
         Name of the interface, such as ``can0``.
     can_ids : iterable of int, optional
-        Extended identifiers the kernel lets through; all by default, which is what a node needs
-        that watches for strangers.
+        Acceptance filter in the kernel, extended identifiers; none by default, for nodes that
+        detect unknown identifiers.
 
     Attributes
     ----------
     error_frames, standard_frames, remote_frames : int
-        Frames received that are no `Frame`: error reports, 11-bit identifiers, remote requests.
+        Received frames that are not a `Frame`: error frames, 11-bit identifiers, remote frames.
 
     Raises
     ------
     PortError
-        If there is no such interface, or no CAN in the kernel.
+        If there is no such interface, or no CAN support in the kernel.
     """
 
     def __init__(self, channel: str, can_ids: Iterable[int] | None = None) -> None:
@@ -87,15 +87,15 @@ class SocketCanPort:
         self._down = False
 
     def receive(self) -> Sequence[Frame]:
-        """Return what has arrived, at most `MAX_FRAMES_PER_CALL` frames; see `Port.receive`.
+        """Return received frames, at most `MAX_FRAMES_PER_CALL`; see `Port.receive`.
 
-        What came just before a failure is lost with it.
+        Frames read just before an error are lost.
         """
         bus = self._open_bus()
         frames: list[Frame] = []
         for _ in range(MAX_FRAMES_PER_CALL):
             try:
-                # not recv(0): that measures on the wall clock, and blocks when it is set back
+                # not recv(0), which uses the wall clock and blocks when that is set back
                 message, _filtered = bus._recv_internal(0)
             except (can.CanError, OSError) as error:
                 raise self._failure(error) from error
@@ -112,7 +112,7 @@ class SocketCanPort:
         if frames:
             self._down = False
         elif self._down:
-            # the kernel reports it once and then is silent, as if the bus were merely quiet
+            # the kernel reports it only once, and later reads look like a quiet bus
             raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
         return frames
 
@@ -137,7 +137,7 @@ class SocketCanPort:
                     for can_id in self._can_ids
                 ]
             try:
-                # python-can leaks its socket if it can't bind it: ask for the interface first
+                # python-can leaks its socket if it can't bind it: check the interface first
                 socket.if_nametoindex(self.channel)
             except OSError as error:
                 number = errno.ENODEV
@@ -157,7 +157,7 @@ class SocketCanPort:
                 raise self._port_error(meaning, _CHECK_BUS)
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
-        """Note what an error says about the interface, and put it into words."""
+        """Record what an error says about the interface, and convert it with its remedy."""
         number = error.error_code if isinstance(error, can.CanError) else error.errno
         if number in _GONE:
             self._close_bus()
