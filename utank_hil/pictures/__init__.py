@@ -1,4 +1,4 @@
-"""Every picture the package draws, in one style; nothing below imports this room."""
+"""Figures in one style; no other package except the commands imports this one."""
 
 from utank_hil.pictures.bench_curves import BenchCurve, draw_bench
 from utank_hil.pictures.capsize_maps import draw_capsize_maps

@@ -1,4 +1,4 @@
-"""The picture of a bench: what the tank did to the ship, passive beside active."""
+"""Figure of a bench: roll, level and pressure over time, with passive and active tank."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,24 +23,24 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.REFUSED: ("refused", 0.1),
     RetuningState.UNDONE: ("undone", 0.1),
 }
-"""Name and strength of colour of what a run does to retune itself."""
+"""Label and opacity of each retuning state."""
 _NAMED_SHARE: Final = 0.07
-"""A lane's stretch that is a smaller part of the axis has no room for its name."""
+"""Shortest labelled section of a lane, relative to the axis."""
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 
 @dataclass(frozen=True, slots=True)
 class BenchCurve:
-    """One run of a bench, as it is drawn.
+    """Signals of one run of a bench.
 
     Attributes
     ----------
     label : str
-        What the legend says of it, figures included: they come from who judges the run.
+        Text in the legend, results included.
     time_s, roll_rad, level_m, pressure_pa : array (n,)
-        Level is the starboard surface above its still level.
+        The level is the starboard level above still water.
     retuning : array (n,), optional
-        `RetuningState` of a run that retuned itself: what it did is drawn as a lane of its own.
+        `RetuningState` of a retuning run, drawn as a lane.
     """
 
     label: str
@@ -52,21 +52,20 @@ class BenchCurve:
 
 
 def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
-    """Draw roll, level and pressure of all runs: the whole time, and three minutes of it.
+    """Draw roll, level and pressure of all runs: the whole time, and three minutes enlarged.
 
-    Those are the ones around the largest roll. Where runs retuned themselves, they are the ones
-    around the first trial of a new law instead, and lanes below show when each run identified,
-    tried and kept one.
+    The enlarged part is around the largest roll, or around the first trial of a new law if a run
+    retuned. Lanes below show the retuning states of each run.
 
     Parameters
     ----------
     curves : sequence of BenchCurve
-        The first is the reference, the passive tank: the largest roll is its own, and it is drawn
-        in grey behind the others.
+        The first is the reference, the passive tank: drawn in grey, and searched for the largest
+        roll.
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
 
     Returns
     -------
@@ -76,7 +75,7 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
     Raises
     ------
     ValueError
-        If there are no curves, or more than the colours that can be told apart.
+        If there are no curves, or more than there are colours.
     """
     if not 1 <= len(curves) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} runs in one picture, got {len(curves)}")
@@ -121,7 +120,7 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
 
 
 def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
-    """Return the time that is shown closely, and what to call it."""
+    """Return the centre of the enlarged part in s, and its title."""
     trials = [
         float(curve.time_s[curve.retuning == RetuningState.TRIAL][0])
         for curve in curves
@@ -135,7 +134,7 @@ def _centre(curves: Sequence[BenchCurve]) -> tuple[float, str]:
 
 
 def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
-    """Return `ZOOM_S` around a time, or all of a run that is not much longer."""
+    """Return a span of `ZOOM_S` around a time, or the whole of a short run."""
     if whole[1] - whole[0] < 2 * ZOOM_S:
         return whole
     start_s = min(max(centre_s - ZOOM_S / 2, whole[0]), whole[1] - ZOOM_S)
@@ -143,7 +142,7 @@ def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
 
 
 def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
-    """Return the length in seconds, and the name, of the unit a time axis is labelled in."""
+    """Return the unit of a time axis: its length in s, and its name."""
     return (60.0, "min") if span_s[1] - span_s[0] > 600.0 else (1.0, "s")
 
 
@@ -166,7 +165,7 @@ def _draw_column(
 
 
 def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float, float]) -> None:
-    """Draw what each run that retuned itself did when: the stronger, the more in service."""
+    """Draw the retuning states of each retuning run over time."""
     unit_s, _ = _time_unit(span_s)
     lanes = [
         (curve, c) for curve, c in zip(curves, COLORS, strict=False) if curve.retuning is not None

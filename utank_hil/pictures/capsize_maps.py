@@ -1,4 +1,4 @@
-"""The picture of capsizing: phase planes with their safe basins, and how waves erode these."""
+"""Figure of capsizing: phase planes with safe basins, and the erosion of the basins by waves."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,11 +24,11 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
     Parameters
     ----------
     maps : sequence of CapsizeMap
-        Such as one ship without and with her tank; all in the same wave.
+        Such as one ship without and with its tank; all in the same wave.
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
     Raises
     ------
     ValueError
-        If there is no map, or there are more than colours that can be told apart.
+        If there are no maps, or more than there are colours.
     """
     if not 1 <= len(maps) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} maps in one picture, got {len(maps)}")
@@ -47,7 +47,7 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
         for axes, each in zip(planes, maps, strict=True):
             _draw_plane(axes, each)
         planes[0].set_ylabel("Roll rate (°/s)")
-        figure.legend(handles=_explained(), loc="outside lower left", ncols=5, frameon=False)
+        figure.legend(handles=_legend_handles(), loc="outside lower left", ncols=5, frameon=False)
         for color, each in zip(COLORS, maps, strict=False):
             curves.plot(
                 each.amplitude_nm / 1e3,
@@ -97,8 +97,8 @@ def _mark(*, stable: bool) -> dict[str, Any]:
     }
 
 
-def _explained() -> "list[Artist]":
-    """What the legend of the phase planes shows."""
+def _legend_handles() -> "list[Artist]":
+    """Handles of the legend of the phase planes."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -1,4 +1,4 @@
-"""The picture of an identification: does the model hold on data it has not seen."""
+"""Figure of an identification: validation of the model on data that it was not fitted to."""
 
 import math
 from pathlib import Path
@@ -32,7 +32,7 @@ def draw_identification(
     ----------
     record : ndarray, shape (N, 1 + m)
     found : Identification
-        Of that record.
+        Result for that record.
     task : RetuningTask
     path : Path
         The `.png` file; written anew.

@@ -1,4 +1,4 @@
-"""Bode and Nyquist pictures of a set of laws on a ship, by one call each."""
+"""Bode and Nyquist plots of a set of laws on a ship."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,20 +27,20 @@ def draw_bode(
     path: Path,
     title: str,
 ) -> Path:
-    """Draw magnitude and phase of the roll per effective wave slope, without and with the tank.
+    """Bode plot of the roll per effective wave slope, without and with the tank.
 
-    The effective wave slope is the wave moment over the ship's roll stiffness. The laws are sampled
-    on the continuous plant.
+    The effective wave slope is the wave moment over the ship's roll stiffness. The responses are
+    those of the sampled laws on the continuous plant.
 
     Parameters
     ----------
     loops : sequence of Loop
-        At most four; the passive tank is always drawn.
+        One to seven laws; the passive tank is always drawn.
     plant : DesignPlant
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def draw_bode(
     Raises
     ------
     ValueError
-        If there are more laws than colours that can be told apart.
+        If there are no laws, or more than there are colours.
     """
     from matplotlib.ticker import LogLocator, MultipleLocator
 
@@ -89,15 +89,16 @@ def draw_nyquist(
     path: Path,
     title: str,
 ) -> Path:
-    """Draw the sampled loops, broken at the pump, with the circle that none may enter.
+    """Nyquist plot of the open-loop transfer functions, opened at the pump.
 
-    Drawn for negative feedback: -L, critical point -1. Inside the circle of radius 1/2 about it the
-    sensitivity is above 2, which is not armed. Arguments as for `draw_bode`.
+    Drawn as -L with the critical point -1, as for negative feedback. Inside the circle around it
+    the sensitivity is above `PEAK_SENSITIVITY`; a law that enters it is refused. Arguments as for
+    `draw_bode`.
 
     Raises
     ------
     ValueError
-        If there are more laws than colours that can be told apart.
+        If there are no laws, or more than there are colours.
     """
     _check_number(loops)
     angle = np.linspace(0, 2 * np.pi, 361)
@@ -120,11 +121,11 @@ def draw_nyquist(
         )
         shown = [forbidden, circle]
         for loop, color in zip(loops, COLORS[1:], strict=False):
-            ahead = -_loop(loop, plant)
-            axes.plot(ahead.real, ahead.imag, color=color, linewidth=1.6, label=loop.name)
-            axes.plot(ahead.real, -ahead.imag, color=color, linewidth=0.8, linestyle="--")
-            shown.append(ahead)
-        _frame(axes, np.concatenate(shown))
+            curve = -_loop(loop, plant)
+            axes.plot(curve.real, curve.imag, color=color, linewidth=1.6, label=loop.name)
+            axes.plot(curve.real, -curve.imag, color=color, linewidth=0.8, linestyle="--")
+            shown.append(curve)
+        _fit_axes(axes, np.concatenate(shown))
         axes.set_xlabel("Real part of −L")
         axes.set_ylabel("Imaginary part of −L")
         figure.legend(loc="outside lower left", ncols=len(loops), frameon=False)
@@ -157,7 +158,7 @@ def _add_bode(
 
 
 def _loop(loop: Loop, plant: DesignPlant) -> ComplexArray:
-    """L from well below the ship's roll up to half the sampling frequency, dense in between."""
+    """L up to the Nyquist frequency, dense around the ship's natural frequency."""
     sampled = plant.sampled(loop.measured, loop.law.sample_time_s)
     roll = plant.ship.natural_frequency_rad_s
     w = np.unique(
@@ -171,8 +172,8 @@ def _loop(loop: Loop, plant: DesignPlant) -> ComplexArray:
     return loop_response(loop.law, sampled, w[w <= np.pi / loop.law.sample_time_s])
 
 
-def _frame(axes: "Axes", points: ComplexArray) -> None:
-    """Show all of the curves, both halves, in a square with equal scales."""
+def _fit_axes(axes: "Axes", points: ComplexArray) -> None:
+    """Fit axes with equal scales to the curves and their mirror images."""
     low, high = points.real.min(), points.real.max()
     half = 1.05 * max((high - low) / 2, np.abs(points.imag).max())
     axes.set_xlim((low + high) / 2 - half, (low + high) / 2 + half)

@@ -1,4 +1,4 @@
-"""Pictures of records: over time, and in the phase plane."""
+"""Figures of records: over time, and in a phase plane."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,18 +13,18 @@ def draw_time(
     path: Path,
     title: str,
 ) -> Path:
-    """Draw records over a common time, one panel below the other.
+    """Draw records over a common time axis, in panels one below the other.
 
     Parameters
     ----------
     time_s : ndarray, shape (n,)
     panels : mapping of str to mapping of str to ndarray, shape (n,)
-        From each panel's label, unit included, to the records in it by name, already in that unit.
-        A name has one colour in all panels, the first one grey.
+        Records by name, of each panel by its label; records are in the unit of the label. A name
+        has the same colour in all panels, the first one grey.
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def draw_time(
     Raises
     ------
     ValueError
-        If there is no record, or there are more names than colours that can be told apart.
+        If there are no records, or more names than there are colours.
     """
     names = list(dict.fromkeys(name for records in panels.values() for name in records))
     color = _colors(names)
@@ -71,11 +71,11 @@ def draw_phase(
     trajectories : mapping of str to tuple of ndarray, shape (n,)
         Abscissa and ordinate by name, in the units of the labels.
     labels : tuple of str
-        Of the two axes, units included.
+        Labels of the two axes, units included.
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def draw_phase(
     Raises
     ------
     ValueError
-        If there is no trajectory, or there are more than colours that can be told apart.
+        If there are no trajectories, or more than there are colours.
     """
     color = _colors(list(trajectories))
     with picture(path, title, (7.5, 6.5)) as figure:

@@ -1,4 +1,4 @@
-"""How pictures look: one style and one set of colours for all of them."""
+"""Common style and colours of the figures."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.typing import RcKeyType
 
-# Dark grey for the reference, then Okabe and Ito's colours, told apart by colour-blind eyes
+# dark grey for the reference, then Okabe and Ito's colour-blind safe palette
 COLORS: Final = (
     "#555555",
     "#0072B2",
@@ -37,21 +37,21 @@ STYLE: "Final[dict[RcKeyType, Any]]" = {
 
 @contextmanager
 def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[Figure]":
-    """Give an empty figure to draw in; its title is set and it is written when the block ends.
+    """Yield an empty figure; at the end of the block its title is set and it is written.
 
     Parameters
     ----------
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
     size_in : tuple of float
         Width and height in inches.
 
     Yields
     ------
     matplotlib.figure.Figure
-        Laid out by constraints.
+        With constrained layout.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -1,4 +1,4 @@
-"""The picture of a trade: how much less roll a law may buy with its margins and its pressure."""
+"""Figure of a trade-off: roll reduction against margins, pressure and level."""
 
 import math
 from pathlib import Path
@@ -20,10 +20,10 @@ _ARMED, _REFUSED = COLORS[1], COLORS[2]
 def draw_trade(
     trade: Trade, path: Path, title: str, pressure_limit_pa: float, level_limit_m: float
 ) -> Path:
-    """Draw roll reduction against peak sensitivity, and what each law costs.
+    """Draw roll reduction over peak sensitivity, and the cost of each law.
 
-    Filled dots may be armed, open ones miss a required margin, the star is the design as it
-    stands. Laws that are unstable on their own ship are left out.
+    Filled dots meet every required margin, open ones miss one, and the star is the design itself.
+    Laws that are unstable on their own ship are left out.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ def draw_trade(
     path : Path
         The `.png` file; written anew.
     title : str
-        Stands above the picture.
+        Title of the figure.
     pressure_limit_pa, level_limit_m : float
-        Drawn beside the root mean squares, which are those of linear theory without limits.
+        Drawn as lines. The RMS values are those of linear theory, without limits.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def draw_trade(
     Raises
     ------
     ValueError
-        If no law of the trade is stable.
+        If no law is stable.
     """
     points = [point for point in trade.points if point.motion is not None]
     if not points:
@@ -64,7 +64,7 @@ def draw_trade(
 
 def _draw_trade(axes: "Axes", points: list[TradePoint], trade: Trade) -> None:
     sensitivity = [point.robustness.nominal.peak_sensitivity for point in points]
-    reduction = [100 * _less(point) for point in points]
+    reduction = [100 * _roll_reduction(point) for point in points]
     axes.plot(sensitivity, reduction, color="#BBBBBB", linewidth=1.4, zorder=1)
     edge = max(*sensitivity, 1.1 * PEAK_SENSITIVITY)
     axes.set_xlim(0.97, edge + 0.1 * (edge - 1))
@@ -123,7 +123,7 @@ def _draw_costs(column: "list[Axes]", points: list[TradePoint]) -> None:
 
 
 def _mark(axes: "Axes", x: float, y: float, point: TradePoint) -> "Line2D":
-    """One law: a star for the design itself, open if it is refused."""
+    """Draw one law: a star for the design itself, an open dot if it is refused."""
     color = _REFUSED if point.refused else _ARMED
     star = point.factor == 1
     (mark,) = axes.plot(
@@ -152,7 +152,7 @@ def _limit(axes: "Axes", value: float, text: str) -> None:
     )
 
 
-def _less(point: TradePoint) -> float:
+def _roll_reduction(point: TradePoint) -> float:
     return np.nan if point.roll_below_passive is None else point.roll_below_passive
 
 

@@ -1,1 +1,1 @@
-"""Capsizing: thresholds, probability, maps, and what a law changes."""
+"""Capsizing: thresholds, probability, phase-plane maps, and the effect of a law."""

@@ -1,8 +1,8 @@
-"""The contest of thesis section 4.5: Patti-B without a tank, passive, and under each nonlinear law.
+"""Comparison of thesis section 4.5: Patti-B without tank, passive, and with each nonlinear law.
 
-The source gives neither Lz nor the tank's friction nor any limit of the pump or the law's numbers;
-those here are ours. The strong fuzzy numbers need a pump without limits: a pressure cut short turns
-these laws unstable (docs/controllers.md), so a limited pump gets the cautious ones.
+The source gives neither Lz nor the tank's friction, the pump's limits or the laws' parameters; the
+values here are our own. The high-gain fuzzy parameters need a pump without limits, because
+saturation makes these laws unstable (docs/controllers.md). A limited pump gets lower gains.
 """
 
 import math
@@ -45,14 +45,14 @@ LAWS = (
 
 
 class Contest(NamedTuple):
-    """How one law did with one pump.
+    """Result of one law with one pump.
 
     Attributes
     ----------
     runs : tuple of Survival
-        At each amplitude of `PRINTED_NM`.
+        Runs at the amplitudes `PRINTED_NM`.
     survivable_nm : float
-        Largest wave moment survived.
+        Largest survived wave moment.
     """
 
     runs: tuple[Survival, ...]
@@ -60,16 +60,16 @@ class Contest(NamedTuple):
 
 
 def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> Contest:
-    """Let one law meet the printed waves, and find the largest that it survives.
+    """Run one law in the printed waves, and find the largest wave that it survives.
 
     Parameters
     ----------
     law : str
         One of `LAWS`.
     pump_pa : float
-        Greatest pressure; its rate is ten times that per second, and the level barrier of
-        `CommandLimiter` keeps the water within `LEVEL_M`, also under the passive law. Infinite for
-        a pump without any limit, and a passive tank without a pump.
+        Largest pressure. The rate limit is ten times that per second, and the level barrier of
+        `CommandLimiter` keeps the water within `LEVEL_M`, also with the passive law. Infinite: a
+        pump without limits, and a passive tank without a pump.
     duration_s : float
 
     Raises
@@ -94,7 +94,7 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
 
 
 def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
-    """What makes a new controller of the law, at rest."""
+    """Factory of new controllers of a law, at rest."""
     c = PATTI_B.coefficients
     gain = -c.coupling * c.area / (c.inertia * c.level_inertia - c.coupling**2)
     brake, stiffness = level_brake(PATTI_B, 0.5), PATTI_B.ship.stiffness_nm_rad
@@ -102,7 +102,7 @@ def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
     slow, fast = ErrorDynamics(0.59, 0.5, 2.5), ErrorDynamics(1.5, 0.7, 2.5)
     if law in ("no tank", "passive"):
         return lambda: PassiveController(sample_time_s=SAMPLE_S)
-    if law == "feedback linearization (4.11)":  # nothing beside it, as printed
+    if law == "feedback linearization (4.11)":  # without level brake, as printed
         return FeedbackLinearization(
             ship=PATTI_B.ship,
             tank=PATTI_B.tank,
@@ -157,7 +157,7 @@ def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
             adaptation_f=0.02,
             adaptation_g=0.02,
             leakage=0.02,
-            # all that is told: the ship's own stiffness and the weight of the water
+            # prior knowledge: the ship's stiffness and the weight of the water
             prior=(0.0, -stiffness / c.inertia, 0.0, c.weight_h / c.inertia, 0.0),
             brake_pa_s_m=brake,
             sample_time_s=SAMPLE_S,

@@ -1,4 +1,4 @@
-"""Where a ship survives: her phase plane in calm water, her safe basin and how waves erode it."""
+"""Phase plane of a ship in calm water, its safe basin, and the basin's erosion by waves."""
 
 import math
 from collections.abc import Callable
@@ -11,28 +11,28 @@ from utank_hil.analysis.capsize.threshold import Equilibrium, equilibria, erosio
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate
 
-NEAR = 0.02  # trajectories start this share of the saddle's heel to either side of it
-CYCLES = 5  # and last that many roll periods
-COARSE = 4  # erosion is found on every so many points of the basin's grid
+NEAR = 0.02  # distance of a trajectory's start from the saddle, relative to its heel
+CYCLES = 5  # length of a trajectory in roll periods
+COARSE = 4  # stride on the basin's grid for the erosion
 
 
 class CapsizeMap(NamedTuple):
-    """A ship's phase plane; starts in it have the water flat and at rest relative to her.
+    """Phase plane of a ship; all starts have the water flat and at rest relative to the ship.
 
     Attributes
     ----------
     name : str
-        What the ship is called in a picture.
+        Name of the ship in a figure.
     equilibria : tuple of Equilibrium
     trajectories : tuple of ndarray, shape (k, 2)
-        Roll and roll rate in calm water, from either side of each saddle.
+        Roll and roll rate in calm water, starting on either side of each saddle.
     roll_rad : ndarray, shape (a,)
     roll_rate_rad_s : ndarray, shape (b,)
         Grid of starts.
     calm, in_waves : ndarray of bool, shape (b, a)
-        Which of them survive.
+        Whether a start survives.
     wave_nm : float
-        Wave moment of `in_waves`.
+        Wave moment amplitude of `in_waves`.
     amplitude_nm, area : ndarray, shape (n,)
         Area of the safe basin over the amplitude of the wave moment, relative to calm water.
     """
@@ -50,13 +50,13 @@ class CapsizeMap(NamedTuple):
 
 
 def phase_grid(model: RollModel, points: int) -> tuple[FloatArray, FloatArray]:
-    """Rolls and roll rates that hold a ship's safe basin in calm water.
+    """Grid of rolls and roll rates that contains the safe basin in calm water.
 
     Parameters
     ----------
     model : RollModel
     points : int
-        In either direction.
+        Number in either direction.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def phase_grid(model: RollModel, points: int) -> tuple[FloatArray, FloatArray]:
     if saddle == 0:
         raise ValueError(
             "the ship has no angle of vanishing stability below 89 degrees, so that nothing bounds "
-            "her safe basin: give her righting levers that end (restoring_odd_nm or a GZ table)"
+            "its safe basin: give righting levers that end (restoring_odd_nm or a GZ table)"
         )
     roll, rate = 1.4 * saddle, model.ship.natural_frequency_rad_s * saddle
     return np.linspace(-roll, roll, points), np.linspace(-rate, rate, points)
@@ -96,17 +96,17 @@ def capsize_map(
     name : str
     model : RollModel
     frequency_rad_s : float
-        Of the wave moment, a cosine from the start on.
+        Frequency of the wave moment, a cosine from the start on.
     wave_nm : float
-        Amplitude for which the whole basin is kept.
+        Wave moment amplitude for the basin.
     amplitude_nm : ndarray, shape (n,)
-        Those for which its area is.
+        Wave moment amplitudes for the erosion.
     roll_rad, roll_rate_rad_s : ndarray, shape (a,), (b,)
-        Grid of starts; for the areas every fourth of them counts.
+        Grid of starts; the erosion uses every fourth value.
     duration_s : float
-        How long a ship must survive.
+        Time that a ship must survive.
     progress : callable, optional
-        Told the finished fraction of the erosion, which takes most of the time.
+        Called with the completed fraction of the erosion, which takes most of the time.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def capsize_map(
 
 
 def _trajectory(model: RollModel, saddle: Equilibrium, side: float) -> FloatArray:
-    """Roll and roll rate in calm water, from beside a saddle until she capsizes or settles."""
+    """Roll and roll rate in calm water from near a saddle, until capsizing or for `CYCLES`."""
     limit = model.coefficients.level_limit
     roll = side * saddle.roll_rad
     level = float(np.clip(math.tan(roll) * model.tank.width_m / 2, -limit, limit))

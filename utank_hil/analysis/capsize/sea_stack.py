@@ -1,4 +1,4 @@
-"""Many seas as one array each of amplitudes, frequencies and phases, one row a ship."""
+"""Arrays of amplitudes, frequencies and phases of many seas, one row per ship."""
 
 from collections.abc import Iterable
 
@@ -9,13 +9,13 @@ from utank_hil.dynamics.simulate import WaveComponents, WaveMoment
 
 
 def stacked_seas(seas: Iterable[WaveComponents]) -> WaveMoment:
-    """Stack the wave moments of single seas for the ships of a batch.
+    """Stack wave moments for the ships of a batch.
 
     Parameters
     ----------
     seas : iterable of utank_hil.sea.Harmonics or WaveMoment
-        Of shape (m,) each, such as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for a
-        number of seeds.
+        Shape (m,) each, such as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for some
+        seeds.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def stacked_seas(seas: Iterable[WaveComponents]) -> WaveMoment:
         If there is no sea, one of them is not of shape (m,), or they differ in their number of
         components.
     TypeError
-        If what is given is no collection of seas.
+        If `seas` is not a collection of seas.
     """
     if hasattr(seas, "amplitude"):
         raise TypeError(

@@ -1,9 +1,9 @@
-"""Who capsizes, when, and in what wave: sampled controllers on the nonlinear model, thesis 4.5.
+"""Capsizing with sampled controllers on the nonlinear model, thesis 4.5.
 
-The ship starts at rest and upright, the wave moment is M cos(w t) from the first instant on. The
-controller is stepped with the true roll, roll rate, level and level rate; its pressure, brought
-within the pump's limits, or the loss of its valve, acts at once and is held. For the ship with a
-passive tank or none `utank_hil.analysis.capsize.threshold` does the same, many ships at a time.
+The ship starts at rest and upright; the wave moment is M cos(w t) from t = 0 on. The controller
+gets the true roll, roll rate, level and level rate. Its pressure, limited, or its valve loss acts
+without delay and is held. `utank_hil.analysis.capsize.threshold` does the same for batches of ships
+with a passive tank or none.
 """
 
 import math
@@ -20,18 +20,18 @@ from utank_hil.dynamics.simulate import WaveMoment, whole_steps
 
 
 class Survival(NamedTuple):
-    """What became of a ship.
+    """Result of a run.
 
     Attributes
     ----------
     capsized_s : float
-        Infinite if she did not.
+        Time of capsizing, infinite if the ship survives.
     max_roll_rad, max_level_m : float
-        Greatest at the controller's samples.
+        Maxima at the controller's samples.
     max_command : float
-        Greatest pressure in Pa, or greatest valve loss.
+        Largest pressure in Pa, or largest valve loss in Pa / (m/s)^2.
     strikes : int
-        How often the water struck a limit of its level.
+        Number of impacts at the limits of the level.
     """
 
     capsized_s: float
@@ -60,24 +60,24 @@ def controlled_run(
     ----------
     model : RollModel
     controller : Controller
-        Measured: roll, roll rate, level, level rate; one command.
+        Its outputs are roll, roll rate, level and level rate; one command.
     wave : WaveMoment
         One sea, arrays of shape (m,).
     duration_s : float
-        A whole number of the controller's samples.
+        A whole number of sample times.
     limiter : CommandLimiter, optional
-        Between controller and pump, its period the controller's sample time; none for a pump
-        without limits, or a valve.
+        Limiter between controller and pump, with the controller's sample time as its period. None
+        for a pump without limits, or a valve.
     initial : ndarray, shape (4,), optional
-        Upright and at rest if not given.
+        By default upright and at rest.
     valve : bool
-        The command is a valve's loss (`semi_active`), not a pump's pressure.
+        Whether the command is a valve loss (`semi_active`), not a pressure.
     step_s : float
-        Of the integration; the sample time is a whole number of these.
+        Integration step; the sample time is a whole number of steps.
     capsize_rad : float
         Roll angle at which the run ends.
     each_step : callable, optional
-        Told time, state and command at every sample.
+        Called with time, state and command at every sample.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def controlled_run(
     Raises
     ------
     ValueError
-        If times are no whole numbers of each other.
+        If the duration is not a whole number of samples, or the sample time of steps.
     """
     from utank_hil.dynamics import kernels
 
@@ -144,23 +144,23 @@ def controlled_run(
 def largest_survivable_wave(
     survives: Callable[[float], bool], highest_nm: float, tolerance: float = 0.01
 ) -> float:
-    """Greatest wave moment amplitude survived, by bisection.
+    """Largest survived amplitude of the wave moment, by bisection.
 
-    The survivable amplitudes need not form one interval; bisection finds one of their borders.
+    The survived amplitudes need not form one interval; bisection finds one of its ends.
 
     Parameters
     ----------
     survives : callable
-        Whether the ship survives an amplitude.
+        Function that returns whether the ship survives an amplitude in N m.
     highest_nm : float
-        Where the search starts.
+        Upper end of the search.
     tolerance : float
-        Width of the last bracket over the amplitude.
+        Relative width of the final bracket.
 
     Returns
     -------
     float
-        Survived; infinite if `highest_nm` is.
+        In N m; infinite if `highest_nm` is survived.
     """
     if survives(highest_nm):
         return math.inf

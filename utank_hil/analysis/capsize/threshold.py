@@ -1,7 +1,7 @@
 """Capsizing of the nonlinear coupled model: equilibria, threshold, safe basin, probability.
 
-All of it runs on `simulate_batch`, which uses every core. A ship counts as capsized when its roll
-angle passes a given angle beyond the saddle.
+All functions use `simulate_batch`, which runs on all cores. A ship counts as capsized when its roll
+passes a given angle beyond the saddle.
 """
 
 import math
@@ -21,13 +21,13 @@ SCAN = 64  # amplitudes tried at once in the search for a threshold
 
 
 class Equilibrium(NamedTuple):
-    """Ship and water at rest.
+    """An equilibrium of ship and water.
 
     Attributes
     ----------
     roll_rad, level_m : float
     stable : bool
-        A minimum of the potential energy; otherwise a saddle.
+        True for a minimum of the potential energy; otherwise a saddle.
     """
 
     roll_rad: float
@@ -36,12 +36,12 @@ class Equilibrium(NamedTuple):
 
 
 class Threshold(NamedTuple):
-    """Least amplitude of a regular wave moment that capsizes a ship.
+    """Bracket of the smallest amplitude of a regular wave moment that capsizes a ship.
 
     Attributes
     ----------
     safe_nm, capsizing_nm : float
-        The amplitude lies between; infinite if no amplitude tried capsized her.
+        Ends of the bracket; the upper one is infinite if no amplitude capsizes the ship.
     """
 
     safe_nm: float
@@ -65,7 +65,7 @@ class Probability(NamedTuple):
 
 
 def without_tank(model: RollModel) -> RollModel:
-    """The same ship with a billionth of the water, held back by friction.
+    """The same ship with a negligible tank: 1e-9 of the water, strongly damped.
 
     Parameters
     ----------
@@ -88,18 +88,18 @@ def without_tank(model: RollModel) -> RollModel:
 
 
 def equilibria(model: RollModel, limit_rad: float = math.radians(89)) -> tuple[Equilibrium, ...]:
-    """Where ship and water can stand still, unpumped and without waves.
+    """Equilibria of ship and water without pressure and waves.
 
     Parameters
     ----------
     model : RollModel
     limit_rad : float
-        Heel up to which to look, on either side; below 90 degrees.
+        Largest heel of the search, to either side; below 90 degrees.
 
     Returns
     -------
     tuple of Equilibrium
-        From port to starboard. A level at its limit is pressed against it.
+        From port to starboard. The level may be at its limit.
     """
     from scipy.optimize import brentq
 
@@ -135,22 +135,22 @@ def capsize_threshold(
     tolerance: float = 1e-3,
     capsize_rad: float = math.pi / 2,
 ) -> Threshold:
-    """Least amplitude of a regular wave moment, started on the ship at rest, that capsizes her.
+    """Smallest amplitude of a regular wave moment that capsizes a ship initially at rest.
 
-    The safe amplitudes need not form one interval (their border is fractal beyond a certain
-    forcing), so an even scan finds the first capsize, and each finer scan looks below it.
+    The safe amplitudes need not form one interval (their boundary is fractal beyond a certain
+    forcing). So a uniform scan finds the first capsize, and finer scans refine below it.
 
     Parameters
     ----------
     model : RollModel
     frequency_rad_s : float
     highest_nm : float
-        Greatest amplitude to try.
+        Largest amplitude of the scan.
     duration_s : float
     phase_rad : float
-        Of ``amplitude cos(frequency t + phase)`` at the start.
+        Phase in ``amplitude cos(frequency t + phase)``.
     tolerance : float
-        Width of the bracket over the amplitude.
+        Relative width of the bracket.
     capsize_rad : float
 
     Returns
@@ -181,7 +181,7 @@ def safe_basin(
     wave: WaveComponents | None = None,
     capsize_rad: float = math.pi / 2,
 ) -> npt.NDArray[np.bool_]:
-    """Which starts survive; the water starts flat and at rest relative to the ship.
+    """Safe basin: the starts that survive, with the water flat and at rest relative to the ship.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def safe_basin(
     roll_rate_rad_s : ndarray, shape (b,)
     duration_s : float
     wave : WaveMoment, optional
-        One sea for all; calm if not given.
+        One sea for all starts; by default calm water.
     capsize_rad : float
 
     Returns
@@ -222,7 +222,7 @@ def erosion(
     capsize_rad: float = math.pi / 2,
     progress: Callable[[float], None] | None = None,
 ) -> FloatArray:
-    """Area of the safe basin under a regular wave moment, relative to that in calm water.
+    """Area of the safe basin in regular waves, relative to that in calm water.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def erosion(
     duration_s : float
     capsize_rad : float
     progress : callable, optional
-        Told the finished fraction.
+        Called with the completed fraction.
 
     Returns
     -------
@@ -275,13 +275,13 @@ def capsize_probability(
     model : RollModel
     seas : WaveMoment or iterable of utank_hil.sea.Harmonics
         Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
-        as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for a number of seeds.
+        as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for some seeds.
     duration_s : float
     confidence : float
-        Of the interval, between 0 and 1.
+        Confidence level of the interval, between 0 and 1.
     capsize_rad : float
     progress : callable, optional
-        Told the finished fraction.
+        Called with the completed fraction.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""A record of motion: statistics, decay, exceedance, and what people on board have of it."""
+"""Analysis of motion records: statistics, decay, exceedance, comfort and motion sickness."""

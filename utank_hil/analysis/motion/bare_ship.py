@@ -1,4 +1,4 @@
-"""Roll of the ship without its tank, in closed form: what every tank is measured against."""
+"""Closed-form roll of the ship without its tank, the reference for every tank."""
 
 import math
 
@@ -20,22 +20,22 @@ def roll_without_tank(
 ) -> FloatArray:
     """Linear roll from rest at time 0 under a sum of harmonics, on a uniform grid.
 
-    Each component's steady answer and the steady heel, plus the free decay that makes angle and
-    rate what they are at the start: exact, whatever the step.
+    The sum of the steady response to each component, the steady heel, and the free decay that
+    matches the initial angle and rate. Exact for any step.
 
     Parameters
     ----------
     ship : RollShip
-        Inertia, linear damping, stiffness and what heels her steadily count; lightly damped
-        (damping ratio below one).
+        Inertia, linear damping, stiffness and steady heeling moments are used; damping ratio below
+        one.
     wave_moment : Harmonics
-        In N m.
+        Wave moment in N m.
     step_s : float
     count : int
     later_ship : RollShip, optional
-        What she becomes when she is loaded differently; angle and rate go on from where they are.
+        The ship after a change of loading; angle and rate are continuous.
     later_from_s : float
-        When that is; zero or more.
+        Time of the change, zero or more.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def roll_without_tank(
     Raises
     ------
     ValueError
-        If the roll is not lightly damped.
+        If the damping ratio is one or more.
     """
     motion = _Motion(ship, wave_moment, 0.0, 0.0, 0.0)
     if later_ship is None:
@@ -58,7 +58,7 @@ def roll_without_tank(
 
 
 class _Motion:
-    """Roll of one ship from an angle and a rate at `start_s` on."""
+    """Roll of one ship from a given angle and rate at `start_s`."""
 
     def __init__(
         self, ship: RollShip, moment: Harmonics, start_s: float, angle: float, rate: float
@@ -69,15 +69,17 @@ class _Motion:
             - ship.inertia_kg_m2 * omega**2
             + 1j * ship.damping_nms_rad * omega
         )
-        answer = moment.amplitude * np.exp(1j * moment.phase_rad) * compliance
+        response = moment.amplitude * np.exp(1j * moment.phase_rad) * compliance
         self._decay = ship.damping_nms_rad / (2.0 * ship.inertia_kg_m2)
         if self._decay >= ship.natural_frequency_rad_s:
             raise ValueError(
                 "the ship's roll is overdamped; this closed form needs damping below one"
             )
         self._damped = math.sqrt(ship.natural_frequency_rad_s**2 - self._decay**2)
-        self._steady = Harmonics(np.abs(answer), omega, np.angle(answer))
-        self._steady_rate = Harmonics(np.abs(answer) * omega, omega, np.angle(answer) + math.pi / 2)
+        self._steady = Harmonics(np.abs(response), omega, np.angle(response))
+        self._steady_rate = Harmonics(
+            np.abs(response) * omega, omega, np.angle(response) + math.pi / 2
+        )
         self._start_s = start_s
         self._heel = ship.heeling_moment_nm / ship.stiffness_nm_rad
         self._angle = angle - self._heel - float(self._steady.at(start_s))
@@ -98,10 +100,10 @@ class _Motion:
         )
 
     def _free(self, since_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Angle and rate of the free decay, so long after the start."""
+        """Angle and rate of the free decay at times since the start."""
         decay, damped, angle = self._decay, self._damped, self._angle
         sine_part = (self._rate + decay * angle) / damped
-        shrunk = np.exp(-decay * since_s)
+        envelope = np.exp(-decay * since_s)
         sine, cosine = np.sin(damped * since_s), np.cos(damped * since_s)
-        free = shrunk * (angle * cosine + sine_part * sine)
-        return free, shrunk * damped * (sine_part * cosine - angle * sine) - decay * free
+        free = envelope * (angle * cosine + sine_part * sine)
+        return free, envelope * damped * (sine_part * cosine - angle * sine) - decay * free

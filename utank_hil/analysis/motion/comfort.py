@@ -1,13 +1,13 @@
-"""What roll means for people on board: apparent gravity, stumbling, work limits, sickness.
+"""Effects of roll on people: apparent gravity, interruptions, work limits, motion sickness.
 
-A place on board at a height Z above and a distance y to starboard of the centre of gravity, the
-ship rolling about the latter with nothing else moving, feels in body axes::
+For pure roll about the centre of gravity, the apparent gravity at a height Z above and a distance y
+to starboard of it is, in body axes::
 
     lateral  = g sin(phi) - Z phi'' + y phi'^2       to starboard
     vertical = g cos(phi) - y phi'' - Z phi'^2       towards the deck
 
-The lateral one is the lateral force estimator of Baitis, Woolaver and Beck (1983) for roll alone.
-Sway, heave, yaw and pitch add to both on a real ship and are not in it.
+The lateral part is the lateral force estimator of Baitis, Woolaver and Beck (1983) for pure roll.
+Sway, heave, yaw and pitch of a real ship add to both parts and are not included.
 """
 
 import math
@@ -24,13 +24,13 @@ from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 STANDING: Final = 0.25
-"""Tipping coefficient of a person who stands facing forward or aft, Graham (1990)."""
+"""Tipping coefficient of a person standing and facing forward or aft, Graham (1990)."""
 EXPOSURE_S: Final = 7200.0
-"""Two hours, as in the experiments behind the motion sickness incidence."""
+"""Two hours, as in the experiments for the motion sickness incidence."""
 
 
 class WorkLimit(NamedTuple):
-    """Root mean squares up to which people can do something on board.
+    """Largest RMS values for a kind of work on board.
 
     Attributes
     ----------
@@ -64,24 +64,24 @@ roll."""
 
 @dataclass(frozen=True, slots=True)
 class Comfort:
-    """What a roll record means at a place on board.
+    """Comfort at a place on board, for a roll record.
 
     Attributes
     ----------
     lateral_rms_m_s2 : float
-        Lateral force estimator; it contains gravity.
+        RMS of the lateral force estimator, which contains gravity.
     vertical_rms_m_s2 : float
-        Vertical acceleration, without gravity's mean.
+        RMS of the vertical acceleration without its mean.
     gravity_angle_rms_rad : float
-        Effective gravity angle: between apparent gravity and the normal of the deck.
+        RMS of the effective gravity angle, between apparent gravity and the deck's normal.
     interruptions_per_min : float
         `motion_induced_interruptions` of a standing person.
     sickness_percent : float
-        `motion_sickness_incidence` over `EXPOSURE_S` of motion like this.
+        `motion_sickness_incidence` for an exposure of `EXPOSURE_S`.
     sickness_dose_m_s15 : float
-        `motion_sickness_dose` over the same time.
+        `motion_sickness_dose` for the same exposure.
     allowed_work : tuple of str
-        What NORDFORSK (1987) allows here.
+        Work within the limits of `NORDFORSK_1987`.
     """
 
     lateral_rms_m_s2: float
@@ -100,21 +100,21 @@ def comfort(
     height_m: float,
     starboard_m: float = 0.0,
 ) -> Comfort:
-    """Judge a roll record at a place on board.
+    """Comfort at a place on board, for a roll record.
 
     Parameters
     ----------
     roll_rad, roll_rate_rad_s : ndarray, shape (n,)
-        Evenly sampled, ten samples a second or more.
+        Uniformly sampled at 10 Hz or more.
     step_s : float
     height_m, starboard_m : float
-        Of the place above, and to starboard of, the ship's centre of gravity.
+        Position above, and to starboard of, the ship's centre of gravity.
     """
     lateral, vertical = apparent_gravity(roll_rad, roll_rate_rad_s, step_s, height_m, starboard_m)
-    heave = vertical - vertical.mean()
-    roll_rms, lateral_rms, vertical_rms = _rms(roll_rad), _rms(lateral), _rms(heave)
-    ups = _up_crossings(heave)
-    duration_s = step_s * len(heave)
+    vertical_motion = vertical - vertical.mean()
+    roll_rms, lateral_rms, vertical_rms = _rms(roll_rad), _rms(lateral), _rms(vertical_motion)
+    ups = _up_crossings(vertical_motion)
+    duration_s = step_s * len(vertical_motion)
     sickness = motion_sickness_incidence(vertical_rms, ups / duration_s, EXPOSURE_S) if ups else 0.0
     return Comfort(
         lateral_rms_m_s2=lateral_rms,
@@ -122,7 +122,7 @@ def comfort(
         gravity_angle_rms_rad=_rms(np.arctan2(lateral, vertical)),
         interruptions_per_min=motion_induced_interruptions(lateral, vertical, step_s),
         sickness_percent=sickness,
-        sickness_dose_m_s15=motion_sickness_dose(heave, step_s)
+        sickness_dose_m_s15=motion_sickness_dose(vertical_motion, step_s)
         * math.sqrt(EXPOSURE_S / duration_s),
         allowed_work=allowed_work(roll_rms, lateral_rms, vertical_rms),
     )
@@ -135,7 +135,7 @@ def apparent_gravity(
     height_m: float,
     starboard_m: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Lateral and vertical part of gravity minus acceleration, the module's equation.
+    """Lateral and vertical apparent gravity, by the equation of the module docstring.
 
     Parameters
     ----------
@@ -161,9 +161,9 @@ def motion_induced_interruptions(
     step_s: float,
     tipping_coefficient: float = STANDING,
 ) -> float:
-    """How often a minute a standing person must stop working to keep balance.
+    """Motion-induced interruptions per minute of a standing person, to keep balance.
 
-    Counts the tips: lateral above `tipping_coefficient` times vertical apparent gravity, to either
+    Counts tips: lateral apparent gravity above `tipping_coefficient` times the vertical, to either
     side. Graham (1990), "Motion-induced interruptions as ship operability criteria", Naval
     Engineers Journal 102(2), calls 0.1 a minute possible, 0.5 probable, 1.5 serious, 3 severe and 5
     extreme.
@@ -174,7 +174,7 @@ def motion_induced_interruptions(
         From `apparent_gravity`.
     step_s : float
     tipping_coefficient : float
-        Half the stance over the height of the centre of gravity.
+        Half the stance width over the height of the person's centre of gravity.
     """
     limit = tipping_coefficient * vertical_m_s2
     tips = _up_crossings(lateral_m_s2 - limit) + _up_crossings(-lateral_m_s2 - limit)
@@ -184,7 +184,7 @@ def motion_induced_interruptions(
 def allowed_work(
     roll_rms_rad: float, lateral_rms_m_s2: float, vertical_rms_m_s2: float
 ) -> tuple[str, ...]:
-    """What people may do within all three limits of `NORDFORSK_1987`."""
+    """Kinds of work within all three limits of `NORDFORSK_1987`."""
     return tuple(
         limit.work
         for limit in NORDFORSK_1987

@@ -1,4 +1,4 @@
-"""Mean of a few independent values, and how well they tell it."""
+"""Mean of a few independent values with its confidence interval."""
 
 import math
 from typing import NamedTuple
@@ -25,7 +25,7 @@ def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
     Parameters
     ----------
     values : array_like, shape (n,)
-        Two or more. For a comparison of two things under the same conditions, their differences.
+        Two or more values; for a paired comparison the differences.
     confidence : float
         Probability that the interval holds the true mean.
 

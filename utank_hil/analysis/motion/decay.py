@@ -1,11 +1,11 @@
-"""Roll decay: period and damping from the peaks of a dying oscillation.
+"""Roll decay test: period and damping from the peaks of a free decay.
 
 Froude's method. Over half a period with mean amplitude a the amplitude falls by::
 
     fall = pi zeta a + (4/3) (b2 / I) a^2
 
-zeta the linear damping ratio, b2 / I the quadratic damping per inertia; a straight line of fall / a
-against a gives both.
+with the linear damping ratio zeta and the quadratic damping per inertia b2 / I. A straight line
+fitted to fall / a over a gives both.
 """
 
 import math
@@ -22,13 +22,13 @@ class RollDecay(NamedTuple):
     Attributes
     ----------
     period_s : float
-        Mean over the peaks.
+        Mean period over the peaks.
     damping_ratio : float
-        Linear part.
+        Linear damping ratio.
     quadratic_per_rad : float
         Quadratic damping over inertia, b2 / I, in 1 / rad.
     peak_s, peak_rad : ndarray, shape (n,)
-        Times and sizes of the peaks, port and starboard, the half cycle between them.
+        Times and amplitudes of the peaks, alternately port and starboard.
     """
 
     period_s: float
@@ -44,9 +44,9 @@ def roll_decay(time_s: FloatArray, roll_rad: FloatArray, *, least_rad: float = 0
     Parameters
     ----------
     time_s, roll_rad : ndarray, shape (n,)
-        Evenly sampled, at least twenty samples a period.
+        Uniformly sampled, twenty samples per period or more.
     least_rad : float
-        Peaks below this size are left out.
+        Peaks of smaller amplitude are left out.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How often a motion passes a level: of a record, and as Rayleigh has it for a narrow band."""
+"""Exceedance of amplitudes: of a record, and by the Rayleigh distribution of a narrow band."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from utank_hil.arrays import FloatArray
 
 
 def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
-    """Share of the single amplitudes that are above each level.
+    """Share of single amplitudes above each level.
 
-    A single amplitude is the greatest deviation from the mean between two crossings of it, to
-    either side; what comes before the first crossing and after the last is left out.
+    A single amplitude is the largest deviation from the mean between two crossings of it, to either
+    side. The parts before the first crossing and after the last are left out.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
     Raises
     ------
     ValueError
-        If the record does not cross its mean twice.
+        If the record crosses its mean less than twice.
     """
     centred = signal - signal.mean()
     crossings = np.flatnonzero(np.diff(np.signbit(centred))) + 1
@@ -37,7 +37,7 @@ def exceedance(signal: FloatArray, levels: FloatArray) -> FloatArray:
 
 
 def rayleigh_exceedance(standard_deviation: float, levels: FloatArray) -> FloatArray:
-    """Share exp(-x^2 / 2 s^2) of the amplitudes of a narrow-banded Gaussian motion above x.
+    """Share exp(-x^2 / 2 s^2) of amplitudes above x, for a narrow-banded Gaussian motion.
 
     Longuet-Higgins (1952), "On the statistical distribution of the heights of sea waves".
 

@@ -1,7 +1,7 @@
 """Motion sickness from vertical acceleration: McCauley et al. (1976) and ISO 2631-1:1997.
 
-Both know vertical acceleration alone. Roll makes some, away from the centre line
-(`utank_hil.analysis.motion.comfort`); heave and pitch, which are not modelled here, usually make
+Both use vertical acceleration only. Roll causes some away from the centre line
+(`utank_hil.analysis.motion.comfort`); heave and pitch, which are not modelled here, usually cause
 more.
 """
 
@@ -20,7 +20,7 @@ MIXED_POPULATION: Final = 1 / 3  # % per m/s^1.5: unadapted men and women, ISO 2
 def motion_sickness_incidence(
     acceleration_rms_m_s2: float, frequency_hz: float, exposure_s: float
 ) -> float:
-    """Share of people, in percent, who vomit within an exposure to vertical oscillation.
+    """Motion sickness incidence: percentage of people who vomit within an exposure.
 
     ::
 
@@ -67,13 +67,13 @@ def motion_sickness_incidence(
 def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
     """Motion sickness dose value MSDV_z, ISO 2631-1:1997 D.1, in m/s^1.5.
 
-    The root of the time integral of the squared vertical acceleration after the weighting W_f. The
-    weighting is applied to the record's Fourier transform, as if the record went on periodically.
+    The square root of the time integral of the squared vertical acceleration with the frequency
+    weighting W_f, which is applied to the discrete Fourier transform of the record.
 
     Parameters
     ----------
     acceleration_m_s2 : ndarray, shape (n,)
-        Evenly sampled, several samples a second; its mean is taken out.
+        Uniformly sampled at several Hz; its mean is subtracted.
     step_s : float
 
     Returns
@@ -88,17 +88,17 @@ def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
 
 
 def vomiting_incidence(dose_m_s15: float) -> float:
-    """Percentage who may vomit after a dose, ISO 2631-1:1997 annex D: a third of the dose."""
+    """Percentage of people who may vomit, ISO 2631-1:1997 annex D: a third of the dose."""
     return MIXED_POPULATION * dose_m_s15
 
 
 def vertical_weighting(frequency_hz: FloatArray) -> ComplexArray:
-    """Frequency weighting W_f of ISO 2631-1:1997 annex A, shape of `frequency_hz`.
+    """Frequency weighting W_f of ISO 2631-1:1997 annex A, complex, shape of `frequency_hz`.
 
     Band limits 0.08 and 0.63 Hz (Butterworth), transition at 0.25 Hz (Q 0.86), upward step from
     0.0625 Hz (Q 0.80) to 0.1 Hz (Q 0.80).
     """
-    # in Hz throughout: only ratios count
+    # in Hz throughout, since only ratios matter
     s = np.asarray(1j * frequency_hz, dtype=np.complex128)
     high_pass = s**2 / _second_order(s, 0.08, math.sqrt(0.5)) / 0.08**2
     low_pass = 1 / _second_order(s, 0.63, math.sqrt(0.5))

@@ -15,7 +15,7 @@ class ResponseAmplitude(NamedTuple):
     Attributes
     ----------
     roll_rad_per_nm, level_m_per_nm : ndarray of complex, shape (n,)
-        Amplitude and phase against the wave moment; NaN where the ship capsized.
+        Complex amplitude relative to the wave moment; NaN where the ship capsized.
     """
 
     roll_rad_per_nm: ComplexArray
@@ -30,7 +30,7 @@ def simulated_response(
     settle_periods: int = 60,
     samples_per_period: int = 256,
 ) -> ResponseAmplitude:
-    """Simulate a regular wave moment per frequency until steady, and take the first harmonic.
+    """Simulate each frequency to the steady state, and take the first harmonic.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ def simulated_response(
     frequency_rad_s : ndarray, shape (n,)
     amplitude_nm : float
     settle_periods : int
-        Wave periods before the one that is analysed.
+        Wave periods before the analysed one.
     samples_per_period : int
-        Integration steps in a wave period.
+        Integration steps per wave period.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Figures that sum up a run: how much the ship rolled and what the pump did for it."""
+"""Statistics of a run: roll and pump."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from utank_hil.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class RollStatistics:
-    """Roll over a record.
+    """Statistics of a roll record.
 
     Attributes
     ----------
@@ -34,12 +34,12 @@ def significant_amplitude(signal: FloatArray) -> float | None:
     Parameters
     ----------
     signal : ndarray, shape (n,)
-        Evenly sampled; its mean is taken out first.
+        Uniformly sampled; its mean is subtracted.
 
     Returns
     -------
     float or None
-        In the signal's unit; None when the record holds no whole cycle to tell it from.
+        In the signal's unit; None if the record has no complete cycle.
     """
     centred = signal - signal.mean()
     starts = np.flatnonzero((centred[:-1] < 0) & (centred[1:] >= 0)) + 1
@@ -70,14 +70,14 @@ def roll_statistics(roll_rad: FloatArray) -> RollStatistics:
 
 @dataclass(frozen=True, slots=True)
 class PumpStatistics:
-    """What the pump did over a record.
+    """Statistics of the pump.
 
     Attributes
     ----------
     pressure_rms_pa, pressure_peak_pa : float
-        Of the differential pressure across the pump.
+        RMS and peak of the differential pressure across the pump.
     power_mean_w, power_peak_w : float
-        Shaft power taken from the ship; regenerated power does not count.
+        Mean and peak of the shaft power drawn; regenerated power counts as zero.
     level_peak_m : float
         Largest deviation of a reservoir's level from still water.
     """

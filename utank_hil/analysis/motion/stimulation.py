@@ -1,4 +1,4 @@
-"""Rolling a ship up on still water with the pump, then letting the tank quiet her, Fig. 2.8."""
+"""Forced roll in still water by the pump, then decay with the passive tank, thesis Fig. 2.8."""
 
 import math
 from dataclasses import replace
@@ -13,17 +13,17 @@ STEP_S = 0.02
 
 
 class StimulatedRoll(NamedTuple):
-    """What happened on still water.
+    """Result of a stimulation in still water.
 
     Attributes
     ----------
     run : RollRun
     stimulated_rad : float
-        Greatest roll in the last cycle before the pump stops.
+        Largest roll in the last cycle before the pump stops.
     level_lead_rad : float
-        Phase by which the level leads the roll in that cycle.
+        Phase lead of the level against the roll in that cycle.
     cycles_to_tenth : float
-        Cycles after the stop until the roll stays below a tenth of it.
+        Cycles after the stop until the roll stays below a tenth of `stimulated_rad`.
     """
 
     run: RollRun
@@ -47,7 +47,7 @@ def tuned_tank(ship: RollShip, tank: Tank) -> Tank:
     Raises
     ------
     ValueError
-        If the reservoirs alone are already slower than the ship.
+        If the reservoirs alone have a lower natural frequency than the ship.
     """
     duct_part_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2 - 2 * tank.height_m
     if duct_part_m <= 0:
@@ -66,7 +66,7 @@ def stimulate_on_still_water(
     off_s: float = 141.0,
     duration_s: float = 300.0,
 ) -> StimulatedRoll:
-    """Pump sinusoidally from rest, stop, and watch the roll fall.
+    """Drive the roll with a sinusoidal pressure from rest, stop the pump, and let the roll decay.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def stimulate_on_still_water(
     Raises
     ------
     ValueError
-        If the pump runs for less than a cycle, or to the end.
+        If the pump runs for less than one cycle, or to the end.
     """
     cycle_s = math.tau / frequency_rad_s
     if not cycle_s < off_s < duration_s:
@@ -96,9 +96,9 @@ def stimulate_on_still_water(
     size = np.abs(run.state[:, 0])
     last = (run.time_s > off_s - cycle_s) & (run.time_s <= off_s)
     stimulated = float(size[last].max())
-    turning = np.exp(-1j * frequency_rad_s * run.time_s[last])
-    roll, level = (np.sum(run.state[last, k] * turning) for k in (0, 2))
-    loud = run.time_s[size > stimulated / 10]
+    demodulation = np.exp(-1j * frequency_rad_s * run.time_s[last])
+    roll, level = (np.sum(run.state[last, k] * demodulation) for k in (0, 2))
+    above_tenth_s = run.time_s[size > stimulated / 10]
     return StimulatedRoll(
-        run, stimulated, float(np.angle(level / roll)), float((loud[-1] - off_s) / cycle_s)
+        run, stimulated, float(np.angle(level / roll)), float((above_tenth_s[-1] - off_s) / cycle_s)
     )
