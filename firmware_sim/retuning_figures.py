@@ -144,7 +144,7 @@ def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:
 
 
 def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """When each unbroken stretch of rows for which `here` is true begins and has ended."""
+    """When each segment_bounds stretch of rows for which `here` is true begins and has ended."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], here.astype(np.int8), [0]))))
     return [
         (float(time_s[start]), float(time_s[stop - 1]) + RECORD_S)

@@ -23,8 +23,8 @@ FIT = ShipFit(
     deviation=np.full(4, 0.02),
     period_deviation=0.01,
     dispersion=1.5,
-    later_s=np.zeros(2),
-    pressure=1.0,
+    extra_delay_s=np.zeros(2),
+    pressure_gain=1.0,
 )
 LIMITS = ModelLimits((8.0, 20.0))
 NAN = float("nan")

@@ -16,7 +16,7 @@ from utank_hil.identification import (
     era_dc,
     era_with_observer,
     find_disturbance_frequencies,
-    mode_confidence,
+    modal_confidence,
     okid,
     validate,
 )
@@ -132,7 +132,7 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
         return
     for matrix in (system.A, system.B, system.C, system.D, found.A, gain):
         assert np.isfinite(matrix).all()
-    known = mode_confidence(result, system.nstates)
+    known = modal_confidence(result, system.nstates)
     assert np.isfinite(known.modes.frequency_rad_s).all()
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.identification import IdentificationError
-from utank_hil.identification.lag_regression import LagRegression, unbroken
+from utank_hil.identification.lag_regression import LagRegression, segment_bounds
 
 
 def _case(seed: int) -> LagRegression:
@@ -59,7 +59,7 @@ def test_rows_of_the_matrix_are_the_arx_equation() -> None:
 def test_windows_never_span_a_gap() -> None:
     z = np.ones((10, 2))
     z[4] = np.nan
-    assert unbroken(z) == [(0, 4), (5, 10)]
+    assert segment_bounds(z) == [(0, 4), (5, 10)]
     assert LagRegression(z, 1, 3, np.empty((0, 10))).rows == 1 + 2
 
 

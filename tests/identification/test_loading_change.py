@@ -13,7 +13,7 @@ from roll_plant import (
 )
 
 from utank_hil.arrays import FloatArray
-from utank_hil.identification import find_disturbance_frequencies, mode_confidence, okid
+from utank_hil.identification import find_disturbance_frequencies, modal_confidence, okid
 
 
 def _sea(kind: str, samples: int) -> FloatArray:
@@ -38,7 +38,7 @@ def test_ship_is_found_again_after_loading(
     y = noisy(truth.respond(u, _sea(sea, len(u))), 0.01, 6)[:, :outputs]
     waves = find_disturbance_frequencies(u, y)
     assert waves == (pytest.approx((0.8,), abs=5e-4) if sea == "regular" else ())
-    found = mode_confidence(okid(u, y, order, disturbance_frequencies_rad_s=waves), 4)
+    found = modal_confidence(okid(u, y, order, disturbance_frequencies_rad_s=waves), 4)
     right = truth.poles_rad_s()
     assert found.modes.frequency_rad_s == pytest.approx(np.abs(right), rel=frequency_error)
     damping = -right.real / np.abs(right)

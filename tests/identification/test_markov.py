@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from utank_hil.control import ARX
 from utank_hil.identification import markov_parameters
-from utank_hil.identification.markov import gradient
+from utank_hil.identification.markov import markov_gradient
 
 
 def _arx(seed: int) -> ARX:
@@ -38,7 +38,7 @@ def test_gradient_is_the_finite_difference(seed: int) -> None:
     rng = np.random.default_rng(seed)
     markov, _ = markov_parameters(arx, 25)
     weights = rng.standard_normal(markov.shape) + 1j * rng.standard_normal(markov.shape)
-    slope = gradient(arx, markov, weights)
+    slope = markov_gradient(arx, markov, weights)
     d_alpha, d_beta = rng.standard_normal(arx.alpha.shape), rng.standard_normal(arx.beta.shape)
     step = 1e-6
     ahead, _ = markov_parameters(ARX(arx.alpha + step * d_alpha, arx.beta + step * d_beta, 0.2), 25)

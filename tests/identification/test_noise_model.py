@@ -8,7 +8,7 @@ from roll_plant import jonswap_moment
 
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import IdentificationError
-from utank_hil.identification.noise_model import NoiseModel, short_noise_model
+from utank_hil.identification.noise_model import NoiseModel, low_order_noise_model
 
 ALPHA = np.array([[[1.2, 0.1], [0.0, 0.5]], [[-0.6, 0.0], [0.2, -0.4]]])
 MIXING = np.array([[1.0, 0.0], [0.5, 0.3]])
@@ -40,7 +40,7 @@ def row_by_row(v: FloatArray, order: int, highest: int) -> tuple[FloatArray, Flo
 
 def test_white_noise_is_found_white() -> None:
     v = np.random.default_rng(1).standard_normal((1500, 2)) @ MIXING.T
-    found = short_noise_model(v, 30)
+    found = low_order_noise_model(v, 30)
     assert found is not None
     assert found.order == 0
     np.testing.assert_allclose(found.covariance, v[30:].T @ v[30:] / 1470, rtol=1e-9)
@@ -49,13 +49,13 @@ def test_white_noise_is_found_white() -> None:
 def test_white_noise_is_seldom_refused() -> None:
     """One in a hundred is; the ratio's correction keeps it so with few rows for each lag."""
     rng = np.random.default_rng(2)
-    found = [short_noise_model(rng.standard_normal((1000, 2)), 100) for _ in range(200)]
+    found = [low_order_noise_model(rng.standard_normal((1000, 2)), 100) for _ in range(200)]
     assert sum(one is None for one in found) <= 8  # of a mean of 2: once in 4000
     assert all(one.order == 0 for one in found if one is not None)
 
 
 def test_autoregression_is_recovered() -> None:
-    found = short_noise_model(coloured(20_000, 3), 20)
+    found = low_order_noise_model(coloured(20_000, 3), 20)
     assert found is not None
     assert found.order == 2
     np.testing.assert_allclose(found.alpha, ALPHA, atol=0.05)  # standard deviation 0.01 on average
@@ -66,7 +66,7 @@ def test_autoregression_is_recovered() -> None:
 def test_is_least_squares_over_the_rows_whose_past_has_no_gap(seed: int, gaps: set[int]) -> None:
     v = coloured(600, seed)
     v[sorted({300, *gaps})] = np.nan
-    found = short_noise_model(v, 6)
+    found = low_order_noise_model(v, 6)
     if found is None:  # one in a hundred
         return
     alpha, squares, rows = row_by_row(v, found.order, 6)
@@ -82,12 +82,12 @@ def test_is_least_squares_over_the_rows_whose_past_has_no_gap(seed: int, gaps: s
 def test_irregular_sea_has_no_short_model() -> None:
     sea = np.column_stack([jonswap_moment(2500, 1, 1.0), jonswap_moment(2500, 2, 1.0)])
     v = sea + 0.01 * np.random.default_rng(3).standard_normal(sea.shape)
-    assert short_noise_model(v, 120) is None
+    assert low_order_noise_model(v, 120) is None
 
 
 def test_order_that_is_not_below_the_highest_is_not_short() -> None:
-    assert short_noise_model(coloured(2000, 4), 2) is None
-    assert short_noise_model(coloured(2000, 4), 1) is None
+    assert low_order_noise_model(coloured(2000, 4), 2) is None
+    assert low_order_noise_model(coloured(2000, 4), 1) is None
 
 
 @given(seed=st.integers(0, 10_000), order=st.integers(0, 4))
@@ -107,7 +107,7 @@ def test_whitening_leaves_a_spectrum_of_one(seed: int, order: int) -> None:
 @pytest.mark.parametrize("scale", [0.0, 1e-160, 1e-17])
 def test_errors_that_are_rounding_or_twice_the_same_end_in_an_answer(scale: float) -> None:
     e = scale * np.random.default_rng(5).standard_normal(1000)
-    found = short_noise_model(np.column_stack([e, e]), 10)
+    found = low_order_noise_model(np.column_stack([e, e]), 10)
     assert found is None or np.isfinite(found.whitening()).all()
 
 
@@ -115,4 +115,4 @@ def test_stretches_no_longer_than_the_order_are_refused() -> None:
     v = coloured(100, 6)
     v[::20] = np.nan
     with pytest.raises(IdentificationError, match="no stretch"):
-        short_noise_model(v, 20)
+        low_order_noise_model(v, 20)

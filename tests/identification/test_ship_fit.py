@@ -111,7 +111,7 @@ def test_way_that_is_not_quite_as_configured_is_not_laid_to_the_ship(
             y[k, column] = (plant.C @ state + plant.D[:, 0] * value)[column]
             state = plant.A @ state + plant.B[:, 0] * value
     fit = fitted(u, noisy(y, 5e-3, 2), outputs, order)
-    np.testing.assert_allclose(fit.later_s, [-0.01, -0.025][:outputs], rtol=0, atol=6e-3)
+    np.testing.assert_allclose(fit.extra_delay_s, [-0.01, -0.025][:outputs], rtol=0, atol=6e-3)
     assert fit.dispersion < 1.5
     errors = [math.log(getattr(fit.ship, name) / getattr(ship, name)) for name in NUMBERS]
     assert (np.abs(errors) < 3 * fit.deviation[:3]).all()

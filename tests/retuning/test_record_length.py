@@ -8,7 +8,12 @@ from hypothesis import strategies as st
 
 from utank_hil.configuration import ConfigError, ControllerConfig, load_config
 from utank_hil.identification import okid, validate
-from utank_hil.retuning.record_length import LAGS, first_part, least_samples, record_problems
+from utank_hil.retuning.record_length import (
+    LAGS,
+    estimation_samples,
+    least_samples,
+    record_problems,
+)
 
 CONFIGS = Path("configs").resolve()
 
@@ -18,7 +23,7 @@ def test_least_record_leaves_enough_for_both_parts_and_one_sample_less_does_not(
     order: int, outputs: int
 ) -> None:
     def enough(samples: int) -> bool:
-        first = first_part(samples)
+        first = estimation_samples(samples)
         rows, columns = first - order, (order + 1) * (outputs + 1) - outputs + 3
         return rows > columns and samples - first - max(order, LAGS) >= 100
 
@@ -32,7 +37,7 @@ def test_least_record_is_identified_and_validated(order: int, outputs: int) -> N
     rng = np.random.default_rng(1)
     samples = least_samples(order, outputs)
     u, y = rng.standard_normal((samples, 1)), rng.standard_normal((samples, outputs))
-    first = first_part(samples)
+    first = estimation_samples(samples)
     found = okid(u[:first], y[:first], order, 0.2, (0.6,), 0)
     checked = validate(found.arx, u[first:], y[first:], (0.6,), LAGS, 0)
     assert checked.rows >= 100

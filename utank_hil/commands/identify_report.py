@@ -16,7 +16,7 @@ from utank_hil.commands.tables import print_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.identification import IdentificationError, ModeConfidence, mode_confidence
+from utank_hil.identification import IdentificationError, ModalConfidence, modal_confidence
 from utank_hil.retuning import Answer, Candidate
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
@@ -25,10 +25,10 @@ QUANTILE: Final = 1.96
 """Standard deviations to either side of a 95 % interval."""
 
 
-def realized_modes(found: Identification) -> ModeConfidence | None:
+def realized_modes(found: Identification) -> ModalConfidence | None:
     """Modes of the model without physics; None where it has none with deviations."""
     try:
-        return mode_confidence(found.okid, STATES)
+        return modal_confidence(found.okid, STATES)
     except (IdentificationError, ValueError):
         return None
 
@@ -48,8 +48,8 @@ def figures(found: Identification, answer: Answer, files: Mapping[str, Path]) ->
         "damping_nms_rad": fit.ship.damping_nms_rad,
         "tank_damping_ratio": fit.tank.damping_ratio,
         "deviations": fit.deviation.tolist(),
-        "later_s": fit.later_s.tolist(),
-        "pressure_over_command": fit.pressure,
+        "later_s": fit.extra_delay_s.tolist(),
+        "pressure_over_command": fit.pressure_gain,
         "dispersion": fit.dispersion,
         "held_out_fit": _finite(validation.one_step_fit),
         "simulation_fit": _finite(validation.simulation_fit),
@@ -63,7 +63,7 @@ def figures(found: Identification, answer: Answer, files: Mapping[str, Path]) ->
     }
 
 
-def _mode_figures(found: ModeConfidence) -> list[dict[str, float]]:
+def _mode_figures(found: ModalConfidence) -> list[dict[str, float]]:
     columns = {
         "frequency_rad_s": found.modes.frequency_rad_s,
         "frequency_std_rad_s": found.frequency_std_rad_s,
@@ -135,13 +135,14 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
             f"{identified / configured - 1:+.1%}" if configured else "",
             f"{QUANTILE * deviation:.2%}",
         )
+    measured = task.design.predictor.measured
     later = ", ".join(
         f"{name} {1e3 * late_s:+.0f} ms"
-        for name, late_s in zip(task.design.predictor.measured, fit.later_s.tolist(), strict=True)
+        for name, late_s in zip(measured, fit.extra_delay_s.tolist(), strict=True)
     )
     table.caption = (
-        f"later than configured: {later}; pressure {fit.pressure - 1:+.1%} of the command; misfit "
-        f"{fit.dispersion:.1f} times its uncertainty (limit {task.limits.dispersion:g})"
+        f"later than configured: {later}; pressure {fit.pressure_gain - 1:+.1%} of the command; "
+        f"misfit {fit.dispersion:.1f} times its uncertainty (limit {task.limits.dispersion:g})"
     )
     return table
 

@@ -1,6 +1,6 @@
 """Identification of ship and tank from recorded inputs and outputs.
 
-Knows nothing of CAN, clocks or files: arrays in, models out.
+No CAN, clocks or files: arrays in, models out.
 """
 
 from utank_hil.identification.disturbance import DisturbanceBasis
@@ -20,12 +20,12 @@ from utank_hil.identification.excitation import (
     response_scale,
 )
 from utank_hil.identification.markov import markov_parameters
-from utank_hil.identification.modes import (
-    ModeConfidence,
-    Modes,
+from utank_hil.identification.modal import (
+    ModalConfidence,
+    ModalParameters,
     modal_assurance,
-    mode_confidence,
-    modes,
+    modal_confidence,
+    modal_parameters,
 )
 from utank_hil.identification.okid import OkidResult, arx, okid
 from utank_hil.identification.persistence import excitation_order
@@ -39,8 +39,8 @@ from utank_hil.identification.wave_lines import find_disturbance_frequencies
 __all__ = [
     "DisturbanceBasis",
     "IdentificationError",
-    "ModeConfidence",
-    "Modes",
+    "ModalConfidence",
+    "ModalParameters",
     "OkidResult",
     "RecursiveArx",
     "Refinement",
@@ -58,8 +58,8 @@ __all__ = [
     "hankel_singular_values",
     "markov_parameters",
     "modal_assurance",
-    "mode_confidence",
-    "modes",
+    "modal_confidence",
+    "modal_parameters",
     "multisine",
     "okid",
     "order_from_singular_values",

@@ -1,7 +1,7 @@
-"""Whether an identified model may be believed: what speaks against it, in words.
+"""Acceptance test of an identified model; objections in words.
 
-The model is judged on data it was not made from, and against what is known of the ship. Whether the
-law made with it is good is judged elsewhere (`utank_hil.retuning.redesign`).
+The model is judged on validation data and against prior knowledge of the ship. The law designed
+with it is judged elsewhere (`utank_hil.retuning.redesign`).
 """
 
 import math
@@ -15,22 +15,22 @@ from utank_hil.identification.validation import Validation
 
 @dataclass(frozen=True, slots=True)
 class ModelLimits:
-    """What a model must keep within.
+    """Limits of the acceptance test.
 
     Attributes
     ----------
     roll_period_range_s : tuple of float
-        Of the ship's stability booklet.
+        Shortest and longest roll period of the ship's stability booklet.
     fit : float
-        Least one-step fit of each output on held-out data.
+        Smallest one-step fit of each output on validation data.
     correlation : float
-        Greatest autocorrelation of the held-out prediction errors at any lag. A probability of
-        whiteness is no measure here: with hundreds of coefficients a little colour is always
-        there, and with enough data always significant.
+        Largest autocorrelation of the prediction errors on validation data at any lag. A whiteness
+        test is no criterion here: with hundreds of coefficients the errors are always slightly
+        coloured, and with enough data significantly.
     period_deviation : float
-        Greatest standard deviation of the roll period, as a part of it.
+        Largest relative standard deviation of the roll period.
     dispersion : float
-        How much worse than its errors explain the ship may fit the identified model.
+        Largest misfit of the ship to the identified model, relative to its uncertainty.
     """
 
     roll_period_range_s: tuple[float, float]
@@ -41,14 +41,14 @@ class ModelLimits:
 
 
 def model_objections(validation: Validation, fit: ShipFit, limits: ModelLimits) -> tuple[str, ...]:
-    """What speaks against an identified model, in words; empty if nothing does.
+    """Objections to an identified model, in words; empty if it is acceptable.
 
     Parameters
     ----------
     validation : Validation
-        Of the identified ARX model on held-out data.
+        Validation of the identified ARX model.
     fit : ShipFit
-        Ship and tank behind it.
+        Ship and tank fitted to it.
     limits : ModelLimits
     """
     found = []

@@ -1,7 +1,7 @@
-"""Functions of time that a disturbance is made of, thesis (3.12), after Goodzeit and Phan (2000).
+"""Basis functions of a disturbance, thesis (3.12), after Goodzeit and Phan (2000).
 
-A known basis in the regression takes the wave out of the data: only its shape in time must be
-known, amplitude and phase are fitted with the model.
+Added to the regression they remove the wave from the data: only its shape in time must be known;
+amplitude and phase are fitted with the model.
 """
 
 import math
@@ -20,12 +20,12 @@ class DisturbanceBasis:
     Parameters
     ----------
     frequencies_rad_s : sequence of float
-        A sine and a cosine each.
+        Frequencies, with a sine and a cosine each.
     polynomial_degree : int or None
-        Legendre polynomials over the record up to this degree: 0 is an offset (a steady heel, a
-        sensor's bias), 1 a drift; None leaves the offset out.
+        Degree of Legendre polynomials over the record: 0 for an offset (a steady heel, the bias of
+        a sensor), 1 for a drift as well; None for no offset.
     decay_rates_1_s : sequence of float
-        exp(-rate t) each; a negative rate grows.
+        Rates of functions exp(-rate t); a negative rate grows.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class DisturbanceBasis:
         return 2 * len(self.frequencies_rad_s) + degree + 1 + len(self.decay_rates_1_s)
 
     def evaluate(self, samples: int, sample_time_s: float) -> FloatArray:
-        """The functions at t = 0, dt, ..., shape (d, samples); none exceeds 1 in magnitude."""
+        """Evaluate at t = 0, dt, ...; shape (d, samples), no value above 1 in magnitude."""
         time_s = np.arange(samples) * sample_time_s
         rows: list[FloatArray] = []
         for frequency in self.frequencies_rad_s:
@@ -72,6 +72,6 @@ class DisturbanceBasis:
             span = np.linspace(-1.0, 1.0, samples)
             rows += list(np.polynomial.legendre.legvander(span, self.polynomial_degree).T)
         for rate in self.decay_rates_1_s:
-            # from 1 down in the direction of decay, so that none overflows
+            # 1 at the end where the function is largest, so that none overflows
             rows.append(np.exp(-abs(rate) * (time_s if rate > 0 else time_s[::-1])))
         return np.array(rows).reshape(len(rows), samples)

@@ -6,9 +6,9 @@
     A = S^-1/2 U^T H1 V S^-1/2,   B = S^1/2 V^T E_r,   C = E_m^T U S^1/2,   D = Y_0
 
 Juang and Pappa (1985); with data correlations (ERA/DC) after Juang, Cooper and Wright (1988). The
-Hankel matrix takes half of the Markov parameters down and half across, and must span a roll period
-or more: 6 s of a 12.5 s roll is 10-50 % off. Channels are scaled to the same size, since pascals,
-radians and metres share the singular values.
+Hankel matrix has half of the Markov parameters down and half across. It must span a roll period or
+more: with 6 s for a period of 12.5 s the errors are 10-50 %. Channels are scaled to equal energy,
+because pascals, radians and metres share the singular values.
 """
 
 from dataclasses import dataclass
@@ -23,24 +23,24 @@ from utank_hil.identification.errors import IdentificationError
 if TYPE_CHECKING:
     from control import StateSpace
 
-_HIGHEST_ORDER = 20  # looked at when the singular values are to tell the order
-_CORRELATION_BLOCKS = 2  # of ERA/DC, beside the first, down and across
-_SMALLEST, _LARGEST = 1e-140, 1e140  # what is computed from such numbers stays finite
-_SIGNAL = 1e-3  # part of the largest singular value that can still be called signal
+_HIGHEST_ORDER = 20  # limit of an order chosen from the singular values
+_CORRELATION_BLOCKS = 2  # of ERA/DC, besides the first, down and across
+_SMALLEST, _LARGEST = 1e-140, 1e140  # range in which products stay finite
+_SIGNAL = 1e-3  # smallest singular value of a signal, relative to the largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Realization:
-    """A realized model in scaled channels, with the singular vectors it came from.
+    """A realized model with the singular vectors of the scaled Hankel matrix.
 
     Parameters
     ----------
     a, b, c : ndarray
-        State matrix (n, n), input matrix (n, r), output matrix (m, n), channels unscaled.
+        State matrix (n, n), input matrix (n, r), output matrix (m, n), for unscaled channels.
     left, right : ndarray, shape (a m, n) and (b r, n)
-        Singular vectors of H0 over the roots of its singular values.
+        Singular vectors of H0, divided by the square roots of its singular values.
     row_scale, column_scale : ndarray, shape (m,) and (r,)
-        Outputs and inputs were divided by these.
+        Scales by which outputs and inputs were divided.
     """
 
     a: FloatArray
@@ -60,7 +60,7 @@ def era(markov: FloatArray, order: int | None = None, sample_time_s: float = 0.2
     markov : array_like, shape (K, m, r)
         ``markov[0]`` is D.
     order : int or None
-        Number of states; None takes it from the singular values (`order_from_singular_values`).
+        Number of states; None: `order_from_singular_values`.
     sample_time_s : float
 
     Returns
@@ -72,7 +72,7 @@ def era(markov: FloatArray, order: int | None = None, sample_time_s: float = 0.2
     ValueError
         If the Markov parameters have the wrong shape or the order does not fit them.
     IdentificationError
-        If they are zero, or of an absurd size.
+        If the Markov parameters are zero, or too large or small for the computation.
     """
     markov = _checked(markov)
     found = realize(markov, order)
@@ -91,7 +91,7 @@ def era_with_observer(
     ----------
     markov : array_like, shape (K, m, r)
     observer_gain : array_like, shape (K - 1, m, m)
-        C A^(k-1) K, as `okid` returns them.
+        C A^(k-1) K, as `okid` returns it.
     order : int or None
     sample_time_s : float
 
@@ -135,7 +135,7 @@ def era_dc(
     Parameters
     ----------
     markov, order, sample_time_s
-        As in `era`.
+        See `era`.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def era_dc(
     markov = _checked(markov)
     scaled, row_scale, column_scale = _scaled(markov)
     count, m, r = markov.shape
-    # Markov parameters: half of them across, a sixth down, the rest for the correlation lags
+    # half of the Markov parameters across, a sixth down, the rest for the correlation lags
     lags = count - 1
     rows, columns = max(1, lags // 6), max(1, lags // 2)
     step = (lags - rows - columns) // (2 * _CORRELATION_BLOCKS)
@@ -187,12 +187,12 @@ def hankel_singular_values(markov: FloatArray) -> FloatArray:
 
 
 def order_from_singular_values(values: FloatArray) -> int:
-    """Order before the largest relative drop among the singular values that matter.
+    """Order before the largest relative drop of the singular values.
 
     Parameters
     ----------
     values : ndarray
-        Largest first; those below 1e-3 of the first, and beyond the 20th, are not looked at.
+        Largest first; values below 1e-3 of the first, or beyond the 20th, are ignored.
     """
     held = values[: _HIGHEST_ORDER + 1]
     signal = int(np.count_nonzero(held > _SIGNAL * held[0]))
@@ -202,7 +202,7 @@ def order_from_singular_values(values: FloatArray) -> int:
 
 
 def realize(markov: FloatArray, order: int | None) -> Realization:
-    """The work of `era`, with what the confidence of modes is computed from."""
+    """Realization of `era`, with what `modal_confidence` needs."""
     scaled, row_scale, column_scale = _scaled(markov)
     m, r = markov.shape[1:]
     half = len(markov) // 2
@@ -232,7 +232,7 @@ def _hankel(markov: FloatArray, first: int, rows: int, columns: int) -> FloatArr
 
 
 def _scaled(markov: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Markov parameters without D, outputs and inputs of equal energy; and the two scales."""
+    """Markov parameters with D = 0, scaled to channels of equal energy; and the two scales."""
     scaled = markov.copy()
     scaled[0] = 0.0
     rows = _energy(scaled, (0, 2))
@@ -242,8 +242,8 @@ def _scaled(markov: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _energy(markov: FloatArray, axes: tuple[int, int]) -> FloatArray:
-    """Root sum of squares over `axes`; 1 where a channel is dead."""
-    largest = np.abs(markov).max(axis=axes)  # first, so that no square underflows
+    """Root sum of squares over `axes`; 1 for a zero channel."""
+    largest = np.abs(markov).max(axis=axes)  # scaling before squaring, against underflow
     largest = np.where(largest > 0, largest, 1.0)
     relative = markov / np.expand_dims(largest, axes)
     energy: FloatArray = largest * np.sqrt(np.sum(relative**2, axis=axes))
@@ -270,7 +270,7 @@ def _checked(markov: FloatArray) -> FloatArray:
 
 
 def _checked_order(order: int | None, values: FloatArray) -> int:
-    if values[0] < _SMALLEST:  # channels are scaled: it is about one
+    if values[0] < _SMALLEST:  # of scaled channels: about 1 otherwise
         raise IdentificationError("the Markov parameters hold no response that can be realized")
     if order is None:
         return order_from_singular_values(values)

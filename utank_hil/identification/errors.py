@@ -1,4 +1,4 @@
-"""What identification raises when a record cannot be made into a model."""
+"""Exception of the identification."""
 
 
 class IdentificationError(ValueError):

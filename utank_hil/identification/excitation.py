@@ -1,8 +1,8 @@
-"""Pump pressures that make ship and tank show themselves, within the limits by construction.
+"""Excitation signals: pump pressures that stay within the pump's limits by construction.
 
 All start and end at zero and keep the pressure and its rate within the pump's limits at every
-sample; the same seed gives the same signal. `response_scale` turns one down until a model predicts
-that level and added roll stay within theirs too. Scaling down keeps every other promise.
+sample; the same seed gives the same signal. `response_scale` gives a factor, at most 1, for which a
+model predicts level and added roll within their limits.
 """
 
 import math
@@ -21,13 +21,13 @@ def random_pulses(
     hold_s: tuple[float, float] = (1.0, 5.0),
     sample_time_s: float = 0.2,
 ) -> FloatArray:
-    """Pulses of random amplitude and length, the thesis's excitation (3.7).
+    """Pulses of random amplitude and length, the excitation of thesis 3.7.
 
     Parameters
     ----------
     duration_s : float
     limits : PumpLimits
-        Of which pressure and rate count here.
+        Pressure and rate limits are used.
     seed : int
     hold_s : tuple of float
         Shortest and longest pulse.
@@ -41,7 +41,7 @@ def random_pulses(
     Raises
     ------
     ValueError
-        If a duration or hold time does not last a sample.
+        If a duration or hold time is shorter than a sample.
     """
     samples = _samples(duration_s, sample_time_s)
     shortest, longest = (_samples(hold, sample_time_s) for hold in hold_s)
@@ -50,7 +50,7 @@ def random_pulses(
     rng = np.random.default_rng(seed)
     lengths = rng.integers(shortest, longest + 1, samples // shortest + 1)
     amplitudes = rng.uniform(-limits.pressure_pa, limits.pressure_pa, len(lengths))
-    return _slewed(np.repeat(amplitudes, lengths)[:samples], limits, sample_time_s)
+    return _rate_limited(np.repeat(amplitudes, lengths)[:samples], limits, sample_time_s)
 
 
 def prbs(
@@ -60,15 +60,15 @@ def prbs(
     clock_s: float = 1.0,
     sample_time_s: float = 0.2,
 ) -> FloatArray:
-    """Pseudo-random binary signal: full pressure one way or the other, drawn anew every `clock_s`.
+    """Pseudo-random binary signal of full pressure, with a random sign every `clock_s`.
 
-    Parameters, returns and errors as `random_pulses`.
+    Parameters, result and errors as `random_pulses`.
     """
     samples = _samples(duration_s, sample_time_s)
     clock = _samples(clock_s, sample_time_s)
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], samples // clock + 1)
     target = limits.pressure_pa * np.repeat(signs, clock)[:samples]
-    return _slewed(target, limits, sample_time_s)
+    return _rate_limited(target, limits, sample_time_s)
 
 
 def multisine(
@@ -78,7 +78,7 @@ def multisine(
     band_rad_s: tuple[float, float] = (0.2, 1.2),
     sample_time_s: float = 0.2,
 ) -> FloatArray:
-    """Sines of equal amplitude and random phase at every harmonic of the duration in a band.
+    """Multisine: equal amplitudes and random phases at all harmonics of the duration in a band.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def multisine(
     Raises
     ------
     ValueError
-        If the band holds no harmonic or passes the Nyquist frequency.
+        If the band has no harmonic or extends beyond the Nyquist frequency.
     """
     samples = _samples(duration_s, sample_time_s)
     low, high = _band(band_rad_s, sample_time_s)
@@ -104,7 +104,9 @@ def multisine(
         raise ValueError(f"{duration_s} s hold no harmonic within {band_rad_s} rad/s; last longer")
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
     time_s = np.arange(samples) * sample_time_s
-    return _fitted(np.cos(np.outer(time_s, lines) + phases).sum(axis=1), limits, sample_time_s)
+    return _scaled_to_limits(
+        np.cos(np.outer(time_s, lines) + phases).sum(axis=1), limits, sample_time_s
+    )
 
 
 def chirp(
@@ -113,14 +115,14 @@ def chirp(
     band_rad_s: tuple[float, float] = (0.2, 1.2),
     sample_time_s: float = 0.2,
 ) -> FloatArray:
-    """Sine whose frequency rises evenly from one end of a band to the other.
+    """Linear chirp: a sine with a frequency that rises from one end of a band to the other.
 
-    Parameters, returns and errors as `multisine`.
+    Parameters, result and errors as `multisine`.
     """
     time_s = np.arange(_samples(duration_s, sample_time_s)) * sample_time_s
     low, high = _band(band_rad_s, sample_time_s)
     phase = low * time_s + 0.5 * (high - low) / duration_s * time_s**2
-    return _fitted(np.sin(phase), limits, sample_time_s)
+    return _scaled_to_limits(np.sin(phase), limits, sample_time_s)
 
 
 def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatArray) -> float:
@@ -130,7 +132,7 @@ def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatAr
     ----------
     pressure_pa : ndarray, shape (N,)
     model : ARX
-        From pressure to outputs; the response is predicted from rest, without waves.
+        Model from pressure to outputs; the response is simulated from rest, without waves.
     response_limits : array_like, shape (m,)
         Largest magnitude of each output, such as added roll in rad and level in m.
 
@@ -141,7 +143,7 @@ def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatAr
     Raises
     ------
     ValueError
-        If the limits do not fit the model's outputs or are not positive, or the model has more
+        If the limits do not match the model's outputs or are not positive, or the model has more
         than one input.
     """
     limits = np.asarray(response_limits, dtype=np.float64)
@@ -172,28 +174,28 @@ def _band(band_rad_s: tuple[float, float], sample_time_s: float) -> tuple[float,
     return low, high
 
 
-def _slewed(target: FloatArray, limits: PumpLimits, sample_time_s: float) -> FloatArray:
-    """Follow a stepwise target as fast as the rate limit lets."""
+def _rate_limited(target: FloatArray, limits: PumpLimits, sample_time_s: float) -> FloatArray:
+    """Rate-limit a piecewise constant target."""
     step = limits.rate_pa_s * sample_time_s
     pressure = np.empty_like(target)
     now = 0.0
     for k, wanted in enumerate(target):
         now += min(max(wanted - now, -step), step)
         pressure[k] = now
-    return _ended(pressure, step)
+    return _with_zero_ends(pressure, step)
 
 
-def _fitted(shape: FloatArray, limits: PumpLimits, sample_time_s: float) -> FloatArray:
-    """Scale a smooth signal so that the tighter of the two limits is reached."""
+def _scaled_to_limits(shape: FloatArray, limits: PumpLimits, sample_time_s: float) -> FloatArray:
+    """Scale a smooth signal to the stricter of the limits on pressure and rate."""
     step = limits.rate_pa_s * sample_time_s
     peak = np.abs(shape).max()
     steepest = np.abs(np.diff(shape)).max(initial=0.0)
     scale = min(limits.pressure_pa / peak, step / max(steepest, 1e-300 * peak))
-    return _ended(shape * scale, step)
+    return _with_zero_ends(shape * scale, step)
 
 
-def _ended(pressure: FloatArray, step: float) -> FloatArray:
-    """Lead in from zero and out to zero, at the rate limit and no faster."""
+def _with_zero_ends(pressure: FloatArray, step: float) -> FloatArray:
+    """Clip to an envelope that starts and ends at zero with the limited rate."""
     left = np.arange(len(pressure))
     envelope = step * np.minimum(left, left[::-1])
     ended: FloatArray = np.clip(pressure, -envelope, envelope)

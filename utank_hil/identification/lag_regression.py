@@ -1,18 +1,18 @@
-"""The least-squares problem of an ARX model, held as its data and never as its matrix.
+"""The least-squares problem of an ARX model, without its regression matrix.
 
 ::
 
     y(k) = sum_{i=1..p} alpha_i y(k-i) + sum_{i=0..p} beta_i u(k-i) + c psi(k) + e(k)
 
-With z = (y, u) of q = m + r channels, the N - p rows of the regression are windows sliding over z,
-so its Gram matrix is block Toeplitz but for the windows' two ends (displacement structure, the
-covariance method of linear prediction)::
+With z = (y, u) of q = m + r channels, the N - p rows of the regression matrix are a sliding window
+over z. So its Gram matrix is block Toeplitz up to corrections from the windows' ends (displacement
+structure, the covariance method of linear prediction)::
 
     G[i+1, j+1] = G[i, j] + z(p-1-i) z(p-1-j)^T - z(N-1-i) z(N-1-j)^T
 
-One block row of correlations and this recursion give all of it in O(N p q^2 + p^2 q^2) operations,
-and products with the matrix are convolutions. Rows with a NaN split a record into segments; the
-sums run over the segments, so a window never spans a gap.
+One block row of correlations and this recursion give the Gram matrix in O(N p q^2 + p^2 q^2)
+operations, and products with the regression matrix are convolutions. Rows with a NaN divide a
+record into segments. The sums run over the segments, so a window never spans a gap.
 """
 
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ from utank_hil.identification.errors import IdentificationError
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """An unbroken stretch of the record.
+    """A part of the record without gaps.
 
     Parameters
     ----------
     channels : ndarray, shape (q, N)
         Outputs, then inputs; each channel contiguous.
     basis : ndarray, shape (d, N - p)
-        Known disturbance functions at the rows' times.
+        Disturbance basis at the rows of the regression.
     """
 
     channels: FloatArray
@@ -42,24 +42,24 @@ class Segment:
 class LagRegression:
     """Regression of the outputs on their past, the inputs and a disturbance basis.
 
-    Coefficients are arrays of shape (n, m), n = r + p q + d: the rows are beta_0 transposed, then
-    for each lag i = 1..p alpha_i and beta_i transposed, then those of the basis.
+    Coefficients have shape (n, m), n = r + p q + d: beta_0 transposed, then alpha_i and beta_i
+    transposed for each lag i = 1..p, then the rows of the basis.
 
     Parameters
     ----------
     z : ndarray, shape (N, q)
-        Outputs and inputs; rows that are not finite throughout are gaps.
+        Outputs and inputs; a row with a value that is not finite is a gap.
     outputs : int
         m, the number of leading channels that are outputs.
     order : int
         p.
     basis : ndarray, shape (d, N)
-        Disturbance functions at every sample.
+        Disturbance basis at every sample.
 
     Raises
     ------
     IdentificationError
-        If no unbroken stretch is longer than the order.
+        If no segment is longer than the order.
     """
 
     def __init__(self, z: FloatArray, outputs: int, order: int, basis: FloatArray) -> None:
@@ -68,7 +68,7 @@ class LagRegression:
         self.channels = z.shape[1]
         self.segments = [
             Segment(np.ascontiguousarray(z[start:stop].T), basis[:, start + order : stop])
-            for start, stop in unbroken(z)
+            for start, stop in segment_bounds(z)
             if stop - start > order
         ]
         if not self.segments:
@@ -82,7 +82,7 @@ class LagRegression:
 
     @property
     def input_rows(self) -> np.ndarray:
-        """Rows of the coefficients that belong to the inputs, beta_0 first."""
+        """Row indices of the input coefficients, beta_0 first."""
         q, m = self.channels, self.outputs
         index: np.ndarray = np.arange(self.order + 1)[:, None] * q + np.arange(q - m)
         return index.ravel()
@@ -101,7 +101,7 @@ class LagRegression:
         Returns
         -------
         gram : ndarray, shape (n, n)
-            Only its upper triangle is filled in.
+            Upper triangle only.
         right : ndarray, shape (n, m)
         """
         p, q, m = self.order, self.channels, self.outputs
@@ -123,7 +123,7 @@ class LagRegression:
         return gram[m:, m:], right
 
     def residuals(self, coefficients: FloatArray) -> list[FloatArray]:
-        """Errors y - prediction by segment, each of shape (m, N - p)."""
+        """One-step prediction errors by segment, each of shape (m, N - p)."""
         p, q, m = self.order, self.channels, self.outputs
         split = (p + 1) * q - m
         filters = np.zeros(((p + 1) * q, m))
@@ -147,7 +147,7 @@ class LagRegression:
         return product[self.outputs :]
 
     def matrix(self) -> tuple[FloatArray, FloatArray]:
-        """The regression matrix (rows, n) and targets (rows, m) written out, for small problems."""
+        """Explicit regression matrix (rows, n) and targets (rows, m), for small problems."""
         p, m = self.order, self.outputs
         blocks, targets = [], []
         for segment in self.segments:
@@ -167,8 +167,8 @@ class LagRegression:
         return out.reshape(-1, out.shape[2])
 
 
-def unbroken(z: FloatArray) -> list[tuple[int, int]]:
-    """Start and end of each run of rows that are finite throughout."""
+def segment_bounds(z: FloatArray) -> list[tuple[int, int]]:
+    """Start and stop index of each segment: consecutive rows of finite values."""
     good = np.isfinite(z).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.view(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,12 +1,14 @@
-"""Least squares of a `LagRegression` from its Gram matrix, as exact as from the matrix itself.
+"""Least squares of a `LagRegression` from its Gram matrix, as accurate as from the matrix itself.
 
-Normal equations alone square the condition number. Here the Cholesky factor of the Gram matrix only
-preconditions: the residual is computed from the data and the correction solved for, until it no
-longer matters (corrected seminormal equations; Bjoerck, Numerical Methods for Least Squares
-Problems, 6.6.5). Data that fit a model of lower order exactly leave coefficients open: a pivoted
-factor reveals the rank, and of all solutions the least in norm is taken, whose surplus poles lie
-inside the unit circle. Noisy data with an input that hardly excites some directions go to
-`shrinkage`, and what that cannot do to the singular value decomposition, as slow as it is.
+The normal equations square the condition number. Here the Cholesky factor of the Gram matrix is
+only a preconditioner: residuals are computed from the data, and corrections are solved for until
+they converge (corrected seminormal equations; Bjoerck, Numerical Methods for Least Squares
+Problems, 6.6.5).
+
+Data that fit a model of lower order exactly do not determine all coefficients. A pivoted factor
+reveals the rank, and the solution of minimum norm is taken, whose surplus poles lie inside the unit
+circle. Noisy data with weak excitation in some directions use `shrinkage`; where that fails, the
+slow singular value decomposition.
 """
 
 from dataclasses import dataclass
@@ -17,14 +19,14 @@ from scipy.linalg import lapack, solve_triangular
 from utank_hil.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
-from utank_hil.identification.persistence import lagged_inputs
-from utank_hil.identification.shrinkage import shrunk
+from utank_hil.identification.persistence import input_excitation
+from utank_hil.identification.shrinkage import shrinkage_estimate
 
-_RANK = 1e-12  # pivots of the Gram matrix below this part of the first are rounding
+_RANK = 1e-12  # smallest pivot of the Gram matrix, relative to the first
 _EXACT = 1e-10  # relative residual of data without noise
-_SETTLED = 1e-9  # the next correction is the square of this, far below rounding
+_CONVERGED = 1e-9  # the next correction is its square, far below rounding
 _CORRECTIONS = 6
-_INFLATION = 100.0  # above, noise in the weak directions of the input outweighs shrinkage's bias
+_INFLATION = 100.0  # above, noise in weak directions of the input exceeds shrinkage's bias
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,14 +37,14 @@ class Fit:
     ----------
     coefficients : ndarray, shape (n, m)
     residual_covariance : ndarray, shape (m, m)
-        Of the equation errors, with the rank taken off the degrees of freedom.
+        Covariance of the equation errors, with rows minus rank as degrees of freedom.
     gram : ndarray, shape (n, n)
-        Upper triangle of the normal equations' matrix.
+        Upper triangle of the Gram matrix.
     penalty : ndarray, shape (m,)
-        What shrinkage added to the diagonal of the inputs' part; zero without.
+        Term of the shrinkage on the diagonal of the inputs' part; zero without shrinkage.
     rank : int
     excitation_order : int
-        As `persistence.excitation_order`, of p + 1 lags.
+        See `persistence.excitation_order`, for p + 1 lags.
     """
 
     coefficients: FloatArray
@@ -54,12 +56,12 @@ class Fit:
 
 
 def fit(regression: LagRegression) -> Fit:
-    """Least-squares solution, of minimum norm where there are many.
+    """Least-squares solution, of minimum norm if it is not unique.
 
     Raises
     ------
     IdentificationError
-        If there are not more rows than columns.
+        If there are no more rows than columns.
     """
     if regression.rows <= regression.columns:
         raise IdentificationError(
@@ -67,19 +69,19 @@ def fit(regression: LagRegression) -> Fit:
             "an output; record longer or lower the order"
         )
     gram, right = regression.gram()
-    excitation_order, inflation = lagged_inputs(regression, gram)
+    excitation_order, inflation = input_excitation(regression, gram)
     penalty = np.zeros(regression.outputs)
     solver = _Cholesky(gram)
-    coefficients, squares, settled = _corrected(regression, solver, right)
+    coefficients, squares, converged = _corrected(regression, solver, right)
     rank = solver.rank
     exact = np.trace(squares) <= _EXACT**2 * regression.target_squares().sum()
-    if not (settled and exact) and (
-        inflation > _INFLATION or not settled or rank < regression.columns
+    if not (converged and exact) and (
+        inflation > _INFLATION or not converged or rank < regression.columns
     ):
         try:
-            coefficients, penalty = shrunk(regression, gram, right)
+            coefficients, penalty = shrinkage_estimate(regression, gram, right)
             rank = regression.columns
-        except np.linalg.LinAlgError:  # outputs that tell the same, or next to no noise
+        except np.linalg.LinAlgError:  # dependent outputs, or hardly any noise
             matrix, wanted = regression.matrix()
             solution = np.linalg.lstsq(matrix, wanted, rcond=None)
             coefficients = solution[0].astype(np.float64)
@@ -98,10 +100,10 @@ def _squares(errors: list[FloatArray]) -> FloatArray:
 def _corrected(
     regression: LagRegression, solver: "_Cholesky", right: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Solution after corrections, its residual squares (m, m), and whether it has settled."""
+    """Solution after corrections, its residual squares (m, m), and whether it has converged."""
     coefficients = solver.solve(right)
     previous = np.inf
-    settled = False
+    converged = False
     for _ in range(_CORRECTIONS):
         errors = regression.residuals(coefficients)
         gradient = regression.transposed(errors)
@@ -110,13 +112,13 @@ def _corrected(
         change = float(np.linalg.norm(correction)) / max(
             float(np.linalg.norm(coefficients)), 1e-300
         )
-        settled = change < _SETTLED
-        if settled or not change < 0.5 * previous:
+        converged = change < _CONVERGED
+        if converged or not change < 0.5 * previous:
             break
         previous = change
-    # the correction's effect on the squares is known without the residuals of the new solution
+    # the last correction changes the squares by a known amount
     squares = _squares(errors) - correction.T @ gradient
-    return coefficients, squares, settled
+    return coefficients, squares, converged
 
 
 class _Cholesky:

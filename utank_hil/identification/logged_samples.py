@@ -1,4 +1,4 @@
-"""The samples that a law took, found again in a recording."""
+"""A law's samples, reconstructed from a recording."""
 
 from collections.abc import Mapping
 
@@ -14,23 +14,23 @@ def logged_samples(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> FloatArray:
-    """Rows (mean command since the sample before, outputs...) as the retuner takes them.
+    """Rows (mean command since the last sample, outputs...), the retuner's record format.
 
     Parameters
     ----------
     columns : mapping of str to ndarray, shape (n,)
-        Of one run, as `utank_hil.telemetry.read_recording` returns them; rows may be missing.
+        Columns of one run from `utank_hil.telemetry.read_recording`; rows may be missing.
     measured : tuple of str
         Outputs, among roll_rad, roll_rate_rad_s and level_m.
     sample_time_s : float
-        Samples lie at its multiples on the recording's time.
+        Samples are at its multiples on the time axis of the recording.
     from_s, to_s : float, optional
-        Part of the recording.
+        Start and end of the part to use.
 
     Returns
     -------
     ndarray, shape (N, 1 + m)
-        NaN where nothing was recorded.
+        NaN for missing values.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def logged_samples(
         raise ValueError(f"the recording has nothing between {low:g} and {high:g} s")
     place = time_s / sample_time_s - first
     record = np.full((count, 1 + len(measured)), np.nan)
-    # a command holds from its row to the next: it belongs to the sample after it
+    # a command is held to the next row, so it belongs to the sample after it
     ahead = np.floor(place + 1e-6).astype(np.int64) + 1
     inside = (ahead >= 0) & (ahead < count)
     sums = np.bincount(ahead[inside], columns["pressure_command_pa"][inside], minlength=count)

@@ -1,4 +1,4 @@
-"""From an ARX model to the pulse responses of the system behind it.
+"""Markov parameters (pulse response) of an ARX model.
 
 ::
 
@@ -23,7 +23,7 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
     ----------
     arx : ARX
     count : int
-        K.
+        Number K of Markov parameters.
 
     Returns
     -------
@@ -33,7 +33,7 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
         ``observer_gain[k - 1]`` is C A^(k-1) K.
     """
     p, m, r = arx.order, arx.outputs, arx.inputs
-    # both recursions at once, newest first, so that the past p responses lie side by side
+    # both recursions at once, newest first, so that the last p responses are contiguous
     newest_first = np.zeros((count + p, m, r + m))
     known = min(count, p + 1)
     newest_first[count - known : count, :, :r] = arx.beta[:known][::-1]
@@ -47,10 +47,10 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
     return responses[:, :, :r].copy(), responses[1:, :, r:].copy()
 
 
-def gradient(arx: ARX, markov: FloatArray, weights: np.ndarray) -> np.ndarray:
+def markov_gradient(arx: ARX, markov: FloatArray, weights: np.ndarray) -> np.ndarray:
     """Gradient of sum_k <weights_k, Y_k> with respect to the ARX coefficients.
 
-    One backward pass through the recursion (its adjoint), whatever the number of coefficients.
+    One backward pass through the recursion (adjoint method).
 
     Parameters
     ----------

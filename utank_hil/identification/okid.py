@@ -2,9 +2,9 @@
 
 The observer Markov parameters of (3.12) are the coefficients of an ARX model: with
 A_o = A - K C they are alpha_i = C A_o^(i-1) K and beta_i = C A_o^(i-1) (B - K D). They are fitted
-by least squares, with a disturbance basis beside them (`arx`), and the system's own Markov
-parameters follow from them by recursion. The order p must cover the observer's memory: p = 120 at
-0.2 s is two roll periods.
+by least squares together with a disturbance basis (`arx`). The Markov parameters of the system
+follow by recursion. The order p must cover the observer's memory: p = 120 at 0.2 s is two roll
+periods.
 """
 
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ from utank_hil.identification.least_squares import Fit, fit
 from utank_hil.identification.markov import markov_parameters
 from utank_hil.identification.record import channel_scale, stacked_record
 
-_MARKOV_COUNT = 401  # at 0.2 s a Hankel matrix of 40 s: more than the longest roll period
-_LEAST_EXCITATION = 4  # what one oscillation takes (twice its order)
+_MARKOV_COUNT = 401  # at 0.2 s a Hankel matrix over 40 s, longer than any roll period
+_LEAST_EXCITATION = 4  # for one oscillation: twice its order
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OkidResult:
-    """What OKID found.
+    """Result of OKID.
 
     Parameters
     ----------
@@ -42,21 +42,21 @@ class OkidResult:
     disturbance : ndarray, shape (d, m)
         Coefficients of the disturbance basis in the ARX equation.
     residual_covariance : ndarray, shape (m, m)
-        Of the one-step prediction errors.
+        Covariance of the one-step prediction errors.
     gram : ndarray, shape (n, n)
-        Upper triangle of the regression's Gram matrix with each column over `column_scale`, in the
-        order of `LagRegression`.
+        Upper triangle of the regression's Gram matrix, with columns divided by `column_scale`, in
+        the order of `LagRegression`.
     column_scale : ndarray, shape (n,)
     penalty : ndarray, shape (m,)
-        What shrinkage added to the diagonal of the inputs' part of the Gram matrix; zero when the
-        input excites well and least squares stand as they are.
+        Term of the shrinkage on the inputs' diagonal of the Gram matrix; zero for plain least
+        squares, when the input excites well.
     rank : int
-        Of the regression; below n when the data fit exactly or the input does not excite.
+        Rank of the regression; below n if the data fit exactly or the input does not excite.
     excitation_order : int
-        Order to which the input is persistently exciting, at most p + 1. A system of order n takes
-        2 n or more.
+        Order of persistent excitation of the input, at most p + 1. A system of order n needs 2 n
+        or more.
     rows : int
-        Equations used, after gaps.
+        Number of equations, without gaps.
     """
 
     arx: ARX
@@ -82,15 +82,15 @@ def arx(
     disturbance_polynomial_degree: int | None = None,
     disturbance_decay_rates_1_s: Sequence[float] = (),
 ) -> ARX:
-    """Fit an ARX model by least squares: the first step of `okid`, for who needs no more.
+    """Fit an ARX model by least squares: the first step of `okid`.
 
-    Parameters, errors and what is refused are those of `okid`, but for models that are violently
-    unstable: they predict one step as well as others.
+    Parameters and errors are those of `okid`, except that strongly unstable models are not refused:
+    their one-step predictions are as good as others.
 
     Returns
     -------
     ARX
-        `OkidResult.arx` of the same record.
+        As `OkidResult.arx` for the same record.
     """
     return _fitted(
         u,
@@ -117,19 +117,19 @@ def okid(
     Parameters
     ----------
     u : array_like, shape (N, r) or (N,)
-        Inputs as they acted (after limits).
+        Applied inputs (after limits).
     y : array_like, shape (N, m) or (N,)
-        Outputs. Rows in which anything is not finite are gaps; a gap keeps its rows, so that time
-        goes on. Separate records are joined with such a row between them.
+        Outputs. A row with a value that is not finite is a gap; gaps must keep their rows, since
+        the row index is time. Join separate records with one such row between them.
     order : int
-        p.
+        Order p of the ARX model.
     sample_time_s : float
     disturbance_frequencies_rad_s : sequence of float
-        Of regular waves; see `find_disturbance_frequencies`.
+        Frequencies of regular waves; see `find_disturbance_frequencies`.
     disturbance_polynomial_degree : int or None
-        0 fits an offset, 1 a drift too.
+        0 fits an offset, 1 also a drift.
     disturbance_decay_rates_1_s : sequence of float
-        Of exponential disturbances.
+        Decay rates of exponential disturbances.
 
     Returns
     -------
@@ -140,8 +140,8 @@ def okid(
     ValueError
         If an argument has the wrong shape or value.
     IdentificationError
-        If the record does not determine a model: too short, too many gaps, an input that hardly
-        excites, an output that does not move or is clipped.
+        If the record does not determine a model: too short, too many gaps, too little excitation,
+        an output that does not move or is clipped.
     """
     fitted = _fitted(
         u,
@@ -179,7 +179,7 @@ def okid(
 
 
 class _Fitted(NamedTuple):
-    """A least-squares solution in the record's units."""
+    """Least-squares solution in the units of the record."""
 
     model: ARX
     basis: DisturbanceBasis
@@ -222,7 +222,7 @@ def _in_units(
     sample_time_s: float,
     basis: DisturbanceBasis,
 ) -> _Fitted:
-    """Undo the scaling and name the parts."""
+    """Convert a solution to the units of the record."""
     p, m = regression.order, regression.outputs
     y_scale = scale[:m]
     column_scale = np.concatenate([np.tile(scale, p + 1)[m:], np.ones(regression.basis_size)])
@@ -244,7 +244,7 @@ def _in_units(
 
 
 def checked_order(order: int) -> int:
-    """`order`, refused if it is not a positive integer."""
+    """`order` as int; ValueError if it is not a positive integer."""
     if int(order) != order or order < 1:
         raise ValueError(f"order must be a positive integer, got {order}")
     return int(order)

@@ -1,17 +1,17 @@
-"""A record as the methods here take it: channels side by side, gaps marked, usable or refused."""
+"""Checks and normal form of a record: channels side by side, gaps as NaN."""
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 
-_SMALLEST, _LARGEST = 1e-60, 1e60  # what is computed from such numbers, squared, stays finite
-_CLIPPED = 0.01  # share of the samples; at twice that the model of a clipped roll is 2 % off
-_FEWEST = 4  # samples that agree by chance
+_SMALLEST, _LARGEST = 1e-60, 1e60  # range in which products of squares stay finite
+_CLIPPED = 0.01  # largest share of samples; at twice that a model of roll has errors of 2 %
+_FEWEST = 4  # fewer equal samples are chance
 
 
 def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
-    """Outputs and inputs side by side, shape (N, m + r), and m; gaps marked by NaN throughout."""
+    """Outputs and inputs side by side, shape (N, m + r), and m; rows of gaps are all NaN."""
     columns = []
     for name, part in (("y", y), ("u", u)):
         array = np.asarray(part, dtype=np.float64)
@@ -27,13 +27,13 @@ def stacked_record(u: FloatArray, y: FloatArray) -> tuple[FloatArray, int]:
 
 
 def channel_scale(z: FloatArray, outputs: int) -> FloatArray:
-    """Root mean square of each channel, shape (q,), so that pascals and radians weigh the same.
+    """Root mean square of each channel, shape (q,), to scale pascals and radians alike.
 
     Raises
     ------
     IdentificationError
-        If the record holds no finite row, a channel is constant or in an absurd unit, or an output
-        is clipped.
+        If the record has no finite row, a channel is constant or far out of range, or an output is
+        clipped.
     """
     good = z[np.isfinite(z[:, 0])]
     if len(good) == 0:
@@ -58,16 +58,16 @@ def _name(channel: int, outputs: int) -> str:
 
 
 def _refuse_clipped(output: FloatArray, number: int) -> None:
-    """Refuse an output that stays at its largest or smallest value longer than a swing does.
+    """Refuse an output that stays at its largest or smallest value longer than an oscillation does.
 
-    A sine of amplitude a, read in steps of q, is in the last step before its peak for
-    sqrt(2 q / a) / pi of the time or less, and waves that differ from one another for less. The
-    step is seen in the values themselves.
+    A sine of amplitude a with quantization step q is within the last step before its peak for at
+    most sqrt(2 q / a) / pi of the time, and an irregular signal for less. The step is estimated
+    from the values.
     """
     values, counts = np.unique(output, return_counts=True)
-    # a low quantile: values that were seldom reached leave wider gaps, rounding narrower ones
+    # a low quantile: rare values leave wider gaps, rounding narrower ones
     step = float(np.quantile(np.diff(values), 0.1))
-    turning = 2 * np.sqrt(4 * step / (values[-1] - values[0])) / np.pi  # twice: peaks may be flat
+    turning = 2 * np.sqrt(4 * step / (values[-1] - values[0])) / np.pi  # twice, for flat peaks
     for index, word in ((-1, "largest"), (0, "smallest")):
         share = counts[index] / len(output)
         if counts[index] >= _FEWEST and share > max(_CLIPPED, turning):

@@ -1,13 +1,13 @@
-"""ARX model tracked sample by sample: recursive least squares with forgetting, in square-root form.
+"""Recursive least squares of an ARX model, with forgetting, in square-root form.
 
-The covariance P = S S^T is carried by its root (Potter 1963; Bierman 1977)::
+The covariance P = S S^T is updated by its root (Potter 1963; Bierman 1977)::
 
     f = S^T phi,  a = lambda + f^T f,  theta += S f e^T / a
     S = (S - S f f^T / (a + sqrt(a lambda))) / sqrt(lambda)
 
-so that it stays symmetric and positive however long it runs, and rounding errors are forgotten like
-the data. Forgetting is withheld while the covariance is as large as at the start: on still water,
-where nothing is learned, plain forgetting would let it grow without bound.
+So it stays symmetric and positive definite, and rounding errors are forgotten like the data.
+Forgetting stops while the covariance is as large as at the start. Otherwise it would grow without
+bound in still water (covariance wind-up).
 """
 
 import math
@@ -17,9 +17,9 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.control.arx import ARX
 
-_START = 1e3  # root of the first covariance, in scaled coefficients: knows nothing
-_LARGEST = 1e6  # times the usual magnitude: no measurement
-_RECOUNT = 1000  # updates after which the running trace of P is computed anew
+_START = 1e3  # root of the initial covariance, for scaled coefficients
+_LARGEST = 1e6  # relative to the usual magnitude; larger values are gaps
+_RECOUNT = 1000  # updates after which the trace of P is recomputed
 
 
 class RecursiveArx:
@@ -28,12 +28,12 @@ class RecursiveArx:
     Parameters
     ----------
     order : int
-        p.
+        Order p.
     output_scale, input_scale : array_like, shape (m,) and (r,)
-        Usual magnitudes of the outputs and inputs, such as 0.05 rad and 20 kPa.
+        Typical magnitudes of outputs and inputs, such as 0.05 rad and 20 kPa.
     sample_time_s : float
     forgetting : float
-        lambda, above 0 and at most 1; the memory is about 1 / (1 - lambda) samples.
+        Forgetting factor lambda, above 0 and at most 1, for a memory of 1 / (1 - lambda) samples.
 
     Raises
     ------
@@ -74,20 +74,19 @@ class RecursiveArx:
         self._filled = 0
 
     def update(self, u: FloatArray, y: FloatArray) -> FloatArray:
-        """Take in one sample.
+        """Update the estimate with one sample.
 
         Parameters
         ----------
         u : array_like, shape (r,)
         y : array_like, shape (m,)
-            A sample that is not finite, or a million times as large as usual, is a gap: nothing is
-            learned until `order` samples have come after it.
+            A sample that is not finite, or a million times its scale, is a gap: there is no update
+            until `order` samples after it.
 
         Returns
         -------
         ndarray, shape (m,)
-            Error of the prediction made before this sample was learned; NaN while the past is
-            incomplete.
+            Innovation (prior prediction error); NaN while the regressor is incomplete.
         """
         m = self._outputs
         measured = np.concatenate([np.atleast_1d(y), np.atleast_1d(u)])
@@ -103,18 +102,18 @@ class RecursiveArx:
             return np.full(m, np.nan)
         regressor = self._window.ravel()[m:]
         error: FloatArray = sample[:m] - regressor @ self._coefficients
-        self._learn(regressor, error)
+        self._update_estimate(regressor, error)
         return error * self._scale[:m]
 
     @property
     def arx(self) -> ARX:
-        """The model as it stands."""
+        """The present estimate."""
         m = self._outputs
         lagged = np.vstack([np.zeros((m, m)), self._coefficients]).reshape(self.order + 1, -1, m)
         lagged = lagged.transpose(0, 2, 1) * self._scale[:m, None] / self._scale
         return ARX(lagged[1:, :, :m], lagged[:, :, m:], self.sample_time_s)
 
-    def _learn(self, regressor: FloatArray, error: FloatArray) -> None:
+    def _update_estimate(self, regressor: FloatArray, error: FloatArray) -> None:
         forgetting = self.forgetting if self._trace < self._most else 1.0
         projected = regressor @ self._root
         gain = self._root @ projected

@@ -1,21 +1,21 @@
-"""Last step of an identification: the model of low order that is most likely, given the record.
+"""Last step of an identification: maximum-likelihood refinement of the model of low order.
 
-OKID finds what colours the prediction errors, a sea above all, as part of a model of high order,
-and ERA then reduces that model without regard to how well each part of it is known. Here the
-reduced model starts a search for the one whose whitened output error is least::
+OKID identifies a model of high order, which includes the spectrum of the prediction errors, mainly
+the sea's. ERA reduces that model without regard to the accuracy of its parts. Here the reduced
+model is the start of a search for the smallest whitened output error::
 
     e(k) = A(q) (y(k) - yhat(k)) - c psi(k),    A(q) = I - alpha_1 q^-1 - ... - alpha_p q^-p
 
 with A(q) and the errors' covariance from OKID: maximum likelihood for a noise model of high order
-(Box-Jenkins structure; Ljung, System Identification, 7.4). OKID had to estimate A(q) before the
-ship was known. So the errors of the model of least plain output error are asked whether a short
-A(q) explains them (`noise_model`); with sensors' noise alone, or beside regular waves, one does,
-and the search goes on with it.
+(Box-Jenkins structure; Ljung, System Identification, 7.4). OKID estimates A(q) before the ship is
+known. So the errors of the model of smallest unweighted output error are tested for a low-order
+A(q) (`noise_model`). Sensor noise has one, alone or with regular waves, and the search continues
+with it.
 
-The model is in modal form, yhat = D u + sum over poles of c_l b_l u / (q - lambda_l), so that
-slopes are exact; free oscillations at the start of each stretch and the disturbance basis enter
-linearly and are projected out (Golub and Pereyra 1973). Damped Gauss-Newton steps; a step that does
-not help is not taken.
+The model is in modal form, yhat = D u + sum over poles of c_l b_l u / (q - lambda_l), with exact
+derivatives. Free oscillations at the start of each segment and the disturbance basis enter linearly
+and are projected out (variable projection, Golub and Pereyra 1973). The search takes damped
+Gauss-Newton steps that reduce the error.
 """
 
 from dataclasses import dataclass
@@ -24,9 +24,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.identification.lag_regression import LagRegression, unbroken
-from utank_hil.identification.modes import ModeConfidence, Modes, frequency_and_damping_std
-from utank_hil.identification.noise_model import NoiseModel, short_noise_model
+from utank_hil.identification.lag_regression import LagRegression, segment_bounds
+from utank_hil.identification.modal import (
+    ModalConfidence,
+    ModalParameters,
+    frequency_and_damping_std,
+)
+from utank_hil.identification.noise_model import NoiseModel, low_order_noise_model
 from utank_hil.identification.okid import OkidResult
 from utank_hil.identification.record import channel_scale, stacked_record
 
@@ -34,30 +38,30 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 _STEPS = 15
-_DAMPINGS = (1e-8, 1e-6, 1e-4, 1e-2, 1.0)  # tried in turn until a step helps
-_SETTLED = 1e-7  # relative gain of a step that is not worth another
-_ROUNDING = 1e-15  # of an output's root mean square
-_DEPENDENT = 1e-10  # singular values of the linear part's unit columns, below: no direction
-_NULL = 1e-8  # singular values of the slopes below this part are free scaling of c_l against b_l
+_DAMPINGS = (1e-8, 1e-6, 1e-4, 1e-2, 1.0)  # tried in turn until a step reduces the error
+_CONVERGED = 1e-7  # relative reduction by the last step
+_ROUNDING = 1e-15  # relative to an output's root mean square
+_DEPENDENT = 1e-10  # smallest singular value of the linear part's normalized columns
+_NULL = 1e-8  # relative singular value of the Jacobian; c_l and b_l share a free scale factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
-    """A refined model and how well its modes are known.
+    """A refined model with the confidence of its modes.
 
     Parameters
     ----------
     system : control.StateSpace
-    confidence : ModeConfidence
+    confidence : ModalConfidence
     gain : float
-        Part by which the whitened squared error fell; 0 when the model was the best already.
+        Relative reduction of the whitened squared error; 0 if there is none.
     noise_order : int
-        Of the autoregression that whitens: 0 where the errors are white, OKID's order where no
-        short one explains them, as in an irregular sea.
+        Order of the noise model: 0 for white errors, OKID's order if no low order explains them,
+        as in an irregular sea.
     """
 
     system: "StateSpace"
-    confidence: ModeConfidence
+    confidence: ModalConfidence
     gain: float
     noise_order: int
 
@@ -68,7 +72,7 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
     Parameters
     ----------
     system : control.StateSpace
-        As `era` made it from ``result.markov``; its poles must be distinct.
+        Model of `era` from ``result.markov``; its poles must be distinct.
     result : OkidResult
         Noise model and disturbance basis.
     u : array_like, shape (N, r) or (N,)
@@ -83,7 +87,7 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
     ValueError
         If model, result and record do not belong together.
     IdentificationError
-        If the record has no stretch longer than the order.
+        If the record has no segment longer than the order.
     """
     z, m = stacked_record(u, y)
     if np.shape(system.D) != (m, z.shape[1] - m) or result.arx.outputs != m:
@@ -103,14 +107,14 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
     noise = _noise_of(result, y_scale)
     problem = whitened(noise)
     model = _fitted(problem, given, largest)
-    # the errors of the model of least output error, which has no bias whatever colours them; in
-    # OKID's filter free oscillations vanish, and would then be left in the errors
+    # the model of smallest output error has no bias, whatever the errors' spectrum; OKID's filter
+    # would suppress free oscillations and leave them in the errors
     plain = whitened(NoiseModel(np.zeros((0, m, m)), np.eye(m)))
     unbiased = _fitted(plain, model, largest)
-    short = short_noise_model(plain.errors(unbiased), result.arx.order)
+    short = low_order_noise_model(plain.errors(unbiased), result.arx.order)
     if short is not None:
         noise, problem = short, whitened(short)
-        # from the best of them, so that it ends no worse than any
+        # start from the best, so that the result is no worse than any of them
         best = min(given, model, unbiased, key=problem.squares)
         model = _fitted(problem, best, largest)
     before = problem.squares(given)
@@ -123,12 +127,12 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
 
 
 def _fitted(problem: "_Problem", model: "_Modal", largest: float) -> "_Modal":
-    """The model of least squared errors, no pole of it beyond the largest magnitude."""
+    """Minimize the squared errors, with poles up to the largest magnitude."""
     squares = problem.squares(model)
     for _ in range(_STEPS):
-        errors, slopes = problem.linearized(model)
-        size = np.linalg.norm(slopes, axis=0)
-        left, values, right = np.linalg.svd(slopes / size, full_matrices=False)
+        errors, derivatives = problem.linearized(model)
+        size = np.linalg.norm(derivatives, axis=0)
+        left, values, right = np.linalg.svd(derivatives / size, full_matrices=False)
         kept = values > _NULL * values[0]
         along = left[:, kept].T @ errors
         before = squares
@@ -140,15 +144,15 @@ def _fitted(problem: "_Problem", model: "_Modal", largest: float) -> "_Modal":
                 if reached < squares:
                     model, squares = trial, reached
                     break
-        if before - squares <= _SETTLED * before:
+        if before - squares <= _CONVERGED * before:
             break
     return model
 
 
 def _noise_of(result: OkidResult, y_scale: FloatArray) -> NoiseModel:
-    """OKID's noise model, for outputs of unit size."""
+    """OKID's noise model, for outputs scaled to unit RMS."""
     covariance = result.residual_covariance / np.outer(y_scale, y_scale)
-    # data without noise may leave no errors, or the same ones in two outputs
+    # regularized: data without noise may have zero errors, or equal ones in two outputs
     covariance = covariance + (1e-12 * np.trace(covariance) + _ROUNDING**2) * np.eye(len(y_scale))
     return NoiseModel(result.arx.alpha * y_scale / y_scale[:, None], covariance)
 
@@ -168,9 +172,9 @@ class _Modal:
         return flags
 
     def signals(self, u: FloatArray) -> tuple[FloatArray, list[FloatArray], list[FloatArray]]:
-        """Response (m, N) to inputs (r, N); its slopes; free oscillations."""
+        """Response (m, N) to inputs (r, N), its derivatives, and the free oscillations."""
         response = self.d @ u
-        slopes: list[FloatArray] = []
+        derivatives: list[FloatArray] = []
         free: list[FloatArray] = []
         outputs = len(self.d)
         decay = np.arange(u.shape[1])
@@ -178,18 +182,18 @@ class _Modal:
             inputs = _filtered(pole, u.astype(np.complex128))
             state = b @ inputs
             twice = _filtered(pole, state[None])[0]
-            moves = [np.outer(c, twice)]
-            moves += [np.outer(unit, state) for unit in np.eye(outputs)]
-            moves += [np.outer(c, part) for part in inputs]
+            terms = [np.outer(c, twice)]
+            terms += [np.outer(unit, state) for unit in np.eye(outputs)]
+            terms += [np.outer(c, part) for part in inputs]
             response = response + _both(np.outer(c, state), real)[0]
-            for move in moves:
-                slopes += _both(move, real)
+            for term in terms:
+                derivatives += _both(term, real)
             free += _both(np.outer(c, pole**decay), real)
-        slopes += [np.outer(unit, part) for unit in np.eye(outputs) for part in u]
-        return response, slopes, free
+        derivatives += [np.outer(unit, part) for unit in np.eye(outputs) for part in u]
+        return response, derivatives, free
 
     def moved(self, step: FloatArray) -> "_Modal":
-        """The model a step away, in the order of the slopes."""
+        """The model after a step of its parameters, in the order of the derivatives."""
         m, r = self.d.shape
         poles, c, b = self.poles.copy(), self.c.copy(), self.b.copy()
         start = 0
@@ -209,7 +213,7 @@ class _Modal:
     def state_space(
         self, y_scale: FloatArray, u_scale: FloatArray, sample_time_s: float
     ) -> "StateSpace":
-        """Real block-diagonal form, scaling undone."""
+        """Real block-diagonal form in the record's units."""
         from control import ss  # here, because importing it brings plotting into the process
 
         blocks, rows, columns = [], [], []
@@ -238,53 +242,53 @@ class _Problem:
         self._m = m
         self._order = noise.order
         self._samples = len(z)
-        self._stretches = [(a, b) for a, b in unbroken(z) if b - a > noise.order]
+        self._segment_bounds = [(a, b) for a, b in segment_bounds(z) if b - a > noise.order]
         self._segments = LagRegression(z, m, noise.order, functions).segments
         self._taps = noise.whitening()
 
     def squares(self, model: _Modal) -> float:
-        """Squared errors."""
-        errors, _ = self._projected(model, with_slopes=False)
+        """Sum of squared errors."""
+        errors, _ = self._projected(model, linearize=False)
         return float(errors @ errors)
 
     def errors(self, model: _Modal) -> FloatArray:
-        """Errors in their places, shape (N, m), NaN where there are none."""
-        found, _ = self._projected(model, with_slopes=False)
+        """Errors by sample, shape (N, m), NaN in gaps."""
+        found, _ = self._projected(model, linearize=False)
         placed = np.full((self._samples, self._m), np.nan)
         start = 0
-        for a, b in self._stretches:
+        for a, b in self._segment_bounds:
             stop = start + self._m * (b - a - self._order)
             placed[a + self._order : b] = found[start:stop].reshape(self._m, -1).T
             start = stop
         return placed
 
     def linearized(self, model: _Modal) -> tuple[FloatArray, FloatArray]:
-        """Errors (rows,) and slopes of the model's output (rows, parameters), both projected."""
-        return self._projected(model, with_slopes=True)
+        """Errors (rows,) and Jacobian of the model's output (rows, parameters), both projected."""
+        return self._projected(model, linearize=True)
 
-    def _projected(self, model: _Modal, with_slopes: bool) -> tuple[FloatArray, FloatArray]:
+    def _projected(self, model: _Modal, linearize: bool) -> tuple[FloatArray, FloatArray]:
         columns, linear = [], []
         for i, segment in enumerate(self._segments):
-            response, slopes, free = model.signals(segment.channels[self._m :])
-            signals = [segment.channels[: self._m] - response, *(slopes if with_slopes else [])]
+            response, derivatives, free = model.signals(segment.channels[self._m :])
+            signals = [segment.channels[: self._m] - response, *(derivatives if linearize else [])]
             white = self._filtered(np.array(signals + free))
             columns.append(white[:, : len(signals)])
             waves = np.einsum("ao,fk->akof", self._taps[0], segment.basis)
             waves = waves.reshape(len(white), -1)
-            # each stretch oscillates freely by itself; the disturbance is one for all
+            # free oscillations differ between segments; the disturbance is common
             own = np.zeros((len(white), len(free) * len(self._segments)))
             own[:, i * len(free) : (i + 1) * len(free)] = white[:, len(signals) :]
             linear.append(np.hstack([own, waves]))
         basis = np.vstack(linear)
         size = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
         basis, values, _ = np.linalg.svd(basis / size, full_matrices=False)
-        basis = basis[:, values > _DEPENDENT]  # a stretch may be shorter than its oscillations
+        basis = basis[:, values > _DEPENDENT]  # dependent in short segments
         stacked = np.vstack(columns)
         stacked = stacked - basis @ (basis.T @ stacked)
         return stacked[:, 0], stacked[:, 1:]
 
     def _filtered(self, signals: FloatArray) -> FloatArray:
-        """A(q) over signals (s, m, N), whitened; shape (m (N - p), s)."""
+        """Signals (s, m, N) through the whitening filter; shape (m (N - p), s)."""
         order, samples = len(self._taps) - 1, signals.shape[2]
         size = 1 << (samples + order).bit_length()
         spectrum = np.fft.rfft(self._taps, size, axis=0)
@@ -302,7 +306,7 @@ def _filtered(pole: complex, signals: ComplexArray) -> ComplexArray:
 
 
 def _both(signal: ComplexArray, real: bool) -> list[FloatArray]:
-    """Sum of a term and its conjugate: as it is, and for a step in its imaginary part."""
+    """Sum of a term and its conjugate, and its derivative by the imaginary part."""
     return [signal.real] if real else [2 * signal.real, -2 * signal.imag]
 
 
@@ -319,11 +323,11 @@ def _modal(system: "StateSpace", y_scale: FloatArray, u_scale: FloatArray) -> _M
 
 def _confidence(
     model: _Modal, problem: _Problem, y_scale: FloatArray, sample_time_s: float
-) -> ModeConfidence:
-    """Modes with standard deviations from the slopes (the Cramer-Rao bound at the estimate)."""
-    errors, slopes = problem.linearized(model)
-    size = np.linalg.norm(slopes, axis=0)
-    _, values, right = np.linalg.svd(slopes / size, full_matrices=False)
+) -> ModalConfidence:
+    """Modal parameters with standard deviations: the Cramer-Rao bound at the estimate."""
+    errors, derivatives = problem.linearized(model)
+    size = np.linalg.norm(derivatives, axis=0)
+    _, values, right = np.linalg.svd(derivatives / size, full_matrices=False)
     kept = values > _NULL * values[0]
     root = right[kept].T / values[kept] / size[:, None]
     root *= np.sqrt(errors @ errors / (len(errors) - np.count_nonzero(kept)))
@@ -334,15 +338,15 @@ def _confidence(
     frequency_std, damping_std = np.zeros(len(s)), np.zeros(len(s))
     for position, k in enumerate(order):
         per_pole = 1 / (model.poles[k] * sample_time_s)
-        moves = np.array([per_pole]) if model.real[k] else np.array([per_pole, 1j * per_pole])
-        spread = moves @ root[starts[k] : starts[k] + len(moves)]
+        terms = np.array([per_pole]) if model.real[k] else np.array([per_pole, 1j * per_pole])
+        spread = terms @ root[starts[k] : starts[k] + len(terms)]
         block = np.array([spread.real, spread.imag])
         frequency_std[position], damping_std[position] = frequency_and_damping_std(
             s[k], block @ block.T
         )
     shapes = model.c[order] * y_scale
     peak = np.take_along_axis(shapes, np.argmax(np.abs(shapes), axis=1)[:, None], axis=1)
-    modes = Modes(
+    modes = ModalParameters(
         model.poles[order], np.abs(s[order]), -s[order].real / np.abs(s[order]), shapes / peak
     )
-    return ModeConfidence(modes, frequency_std, damping_std)
+    return ModalConfidence(modes, frequency_std, damping_std)

@@ -1,27 +1,27 @@
-"""The ship and tank behind an identified model, by what is known of their physics.
+"""Fit of a physical model of ship and tank to an identified model (grey-box identification).
 
-In a storm the waves move the ship ten times as much as the pump does, and what is realized from a
-high-order ARX model alone is tens of per cent off. But the form of the model is known
-(`utank_hil.dynamics.linear`), and loading changes few of its numbers. With A(q) y = B(q) u + e from
-OKID and G(q, theta) the sampled ship and tank::
+In a storm the waves move the ship ten times as much as the pump does, and a realization of a
+high-order ARX model alone has errors of tens of per cent. But the structure of the model is known
+(`utank_hil.dynamics.linear`), and loading changes only some parameters. With A(q) y = B(q) u + e
+from OKID and G(q, theta) the sampled ship and tank::
 
     min over theta = (log (I, k1, d1, tank damping ratio, pressure), a delay for each output):
         sum over w of |L (B - A G(theta))|^2 Phi_u + sum (theta / sigma)^2,   L^T L = cov(e)^-1
 
-These are the prediction errors of G(theta) with 1 / A for the spectrum of the waves, so the fit
-looks where the pump can be told from the sea (Wahlberg 1989; Ljung, System Identification, 10.4).
-Where it cannot be told, the given ship's numbers stand. When the misfit is larger than the errors
-explain, they are taken to be as much larger.
+The first sum is that of the prediction errors of G(theta), with 1 / A as the spectrum of the waves.
+So the fit is weighted to frequencies where the pump's effect exceeds the sea's (Wahlberg 1989;
+Ljung, System Identification, 10.4). The second sum is a prior: parameters that the record does not
+determine keep the given ship's values. A misfit above the stated errors scales these up.
 
-The last numbers are not the ship's. A gauge is heard sooner than the motion sensor, a drive's loop
-is not quite the lag it is taken for, and the pressure is not quite the command: 10 ms or half a
-per cent, which a record without irregular waves shows, and which would be laid to inertia and
-damping, ten of their deviations off. At these frequencies a longer lag is a longer delay.
+The last parameters are not the ship's. Level gauge and motion sensor differ in delay, the drive's
+pressure loop is not exactly a first-order lag, and the pressure differs from the command: by 10 ms
+or 0.5 %. A record without irregular waves resolves this. Without these parameters it would bias
+inertia and damping by ten standard deviations. At these frequencies lag and delay are equivalent.
 
-A is estimated from the waves of the same record and knows them better than it should, so the
-misfit looks surer than it is. With n coefficients from N equations the deviations are stated
-(1 + n / N) / (1 - n / N) times larger. The form is that of Akaike's final prediction error; that it
-is right for deviations, and not for their squares, was measured (docs/retuning.md).
+A is estimated from the same record and overfits its waves, so the misfit is too small. With n
+coefficients from N equations the standard deviations are enlarged by (1 + n / N) / (1 - n / N). The
+form is that of Akaike's final prediction error; that it applies to the deviations, not to their
+squares, was found by measurement (docs/retuning.md).
 """
 
 import dataclasses
@@ -38,39 +38,39 @@ from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.okid import OkidResult
 from utank_hil.tick import TICK_S
 
-_BAND_RAD_S = 2.5  # above it neither ship nor tank move
-_LINES = 64  # in the band; an ARX model of order 120 resolves no more
-_SPREAD = (0.1, 0.7, 0.5, 0.2)  # sigma: how far loading changes each number
-_PRESSURE_SPREAD = 0.005  # of a pressure sensor's slope, and of a loop that holds it
-_DELAY_SPREAD_S = 2 * TICK_S  # sensors and drive are heard in one or the next
-_PRESSURE = len(_SPREAD)  # its place among the fitted numbers, the delays after it
-_STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # stiffness to begin with
+_BAND_RAD_S = 2.5  # above it ship and tank hardly respond
+_LINES = 64  # frequencies in the band; an ARX model of order 120 resolves no more
+_SPREAD = (0.1, 0.7, 0.5, 0.2)  # sigma of the prior: relative changes by loading
+_PRESSURE_SPREAD = 0.005  # gain errors of pressure sensor and pressure loop
+_DELAY_SPREAD_S = 2 * TICK_S  # a frame arrives in one tick or the next
+_PRESSURE = len(_SPREAD)  # index of the pressure gain in theta; the delays follow
+_STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # initial values of the stiffness factor
 _PASSES = 5
-_SETTLED = 1e-3
+_CONVERGED = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShipFit:
-    """Ship and tank of a record.
+    """Ship and tank fitted to a record.
 
     Attributes
     ----------
     ship : RollShip
-        The given one with inertia, stiffness and linear damping of the record.
+        The given ship with fitted inertia, stiffness and linear damping.
     tank : Tank
-        The given one with the damping ratio of the record.
+        The given tank with fitted damping ratio.
     deviation : ndarray, shape (4,)
-        Standard deviations of inertia, stiffness, ship damping and tank damping ratio, each as a
-        part of its value. In an irregular sea the interval of two of them holds the truth in about
-        nine records of ten.
+        Relative standard deviations of inertia, stiffness, ship damping and tank damping ratio. In
+        an irregular sea, intervals of two deviations contain the true value in about 90 % of
+        records.
     period_deviation : float
-        Standard deviation of the ship's roll period, as a part of it.
+        Relative standard deviation of the ship's roll period.
     dispersion : float
-        Root mean square of the misfit over what the prediction errors explain.
-    later_s : ndarray, shape (m,)
-        By how much each output is later than the plant's delay and lag have it.
-    pressure : float
-        Pressure over command.
+        RMS of the misfit relative to the stated errors.
+    extra_delay_s : ndarray, shape (m,)
+        Delay of each output in addition to the plant's delay and lag.
+    pressure_gain : float
+        Ratio of pressure to command.
     """
 
     ship: RollShip
@@ -78,8 +78,8 @@ class ShipFit:
     deviation: FloatArray
     period_deviation: float
     dispersion: float
-    later_s: FloatArray
-    pressure: float
+    extra_delay_s: FloatArray
+    pressure_gain: float
 
 
 def fit_ship(
@@ -88,18 +88,18 @@ def fit_ship(
     plant: DesignPlant,
     measured: tuple[str, ...],
 ) -> ShipFit:
-    """Fit ship and tank to what OKID found.
+    """Fit ship and tank to the result of OKID.
 
     Parameters
     ----------
     result : OkidResult
-        One input.
+        With one input.
     u : array_like, shape (N,)
-        The input it was found with, gaps included.
+        Input of the identification, gaps included.
     plant : DesignPlant
-        Where the fit begins; what is not fitted stays as it is there.
+        Initial values; parameters that are not fitted keep these.
     measured : tuple of str
-        Outputs of the model, by their names in `utank_hil.dynamics.linear.STATES`.
+        Outputs of the model, names in `utank_hil.dynamics.linear.STATES`.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def fit_ship(
     Raises
     ------
     ValueError
-        If outputs or inputs do not fit the model.
+        If outputs or inputs do not match the model.
     IdentificationError
         If no ship can be fitted.
     """
@@ -126,7 +126,7 @@ def fit_ship(
     spread = np.array([*_SPREAD, _PRESSURE_SPREAD, *[_DELAY_SPREAD_S] * arx.outputs])
     amplitude = _amplitude(np.asarray(u, dtype=np.float64).ravel(), arx.sample_time_s)
 
-    def changed(theta: FloatArray) -> DesignPlant:
+    def physical_model(theta: FloatArray) -> DesignPlant:
         factor = np.exp(theta[:_PRESSURE]).tolist()
         return dataclasses.replace(
             plant,
@@ -140,12 +140,12 @@ def fit_ship(
         )
 
     def response(theta: FloatArray) -> ComplexArray:
-        model = changed(theta).sampled(measured, arx.sample_time_s)
+        model = physical_model(theta).sampled(measured, arx.sample_time_s)
         resolvent = z[:, None, None] * np.eye(len(model.A)) - model.A
         exact = model.C @ np.linalg.solve(resolvent, model.B + 0j) + model.D
-        later = np.exp(theta[_PRESSURE] - 1j * np.outer(lines, theta[_PRESSURE + 1 :]))
-        found: ComplexArray = later[:, :, None] * exact
-        return found
+        correction = np.exp(theta[_PRESSURE] - 1j * np.outer(lines, theta[_PRESSURE + 1 :]))
+        corrected: ComplexArray = correction[:, :, None] * exact
+        return corrected
 
     def misfit(theta: FloatArray, weight: FloatArray) -> FloatArray:
         errors = weight @ (right - left @ response(theta)) * amplitude[:, None, None]
@@ -159,22 +159,22 @@ def fit_ship(
         for _ in range(_PASSES):
             solution = least_squares(misfit, theta, x_scale=spread, args=(weight / dispersion,))
             theta = solution.x
-            excess = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
-            dispersion = max(1.0, dispersion * excess)
-            if abs(excess - 1) < _SETTLED or dispersion == 1:
+            residual_rms = float(np.sqrt(np.mean(solution.fun[: -len(theta)] ** 2)))
+            dispersion = max(1.0, dispersion * residual_rms)
+            if abs(residual_rms - 1) < _CONVERGED or dispersion == 1:
                 break
         covariance = np.linalg.inv(solution.jac.T @ solution.jac)[:_PRESSURE, :_PRESSURE]
     except (np.linalg.LinAlgError, ValueError) as error:  # overflow on the way, or singular
         raise IdentificationError(f"no ship fits the identified model: {error}") from None
-    of_period = np.array([0.5, -0.5, 0.0, 0.0])
-    part = len(result.column_scale) / result.rows
-    wider = (1 + part) / (1 - part)
-    found = changed(theta)
+    period_gradient = np.array([0.5, -0.5, 0.0, 0.0])
+    coefficients_per_row = len(result.column_scale) / result.rows
+    inflation = (1 + coefficients_per_row) / (1 - coefficients_per_row)
+    fitted = physical_model(theta)
     return ShipFit(
-        found.ship,
-        found.tank,
-        wider * np.sqrt(covariance.diagonal()),
-        wider * float(np.sqrt(of_period @ covariance @ of_period)),
+        fitted.ship,
+        fitted.tank,
+        inflation * np.sqrt(covariance.diagonal()),
+        inflation * float(np.sqrt(period_gradient @ covariance @ period_gradient)),
         dispersion,
         theta[_PRESSURE + 1 :],
         float(np.exp(theta[_PRESSURE])),
@@ -182,7 +182,7 @@ def fit_ship(
 
 
 def _amplitude(u: FloatArray, sample_time_s: float) -> FloatArray:
-    """Root of the input's energy in each line's band, negative frequencies too; shape (_LINES,)."""
+    """Root of the input's two-sided energy around each frequency; shape (_LINES,)."""
     here = np.isfinite(u)
     energy = 2 * np.abs(np.fft.rfft(np.where(here, u - u[here].mean(), 0.0))) ** 2 / len(u)
     frequency = 2 * np.pi * np.fft.rfftfreq(len(u), sample_time_s)

@@ -1,12 +1,11 @@
-"""Input coefficients of a regression whose input excites some directions hardly at all.
+"""Shrinkage (ridge regression) of input coefficients that the input excites too weakly.
 
-A pump that is slow, or a signal within a band, leaves the fast part of the pulse responses to the
-noise; least squares then returns that noise, hundreds of times the signal, and ERA realizes it.
-Here the input coefficients of each output have a Gaussian prior of zero mean and one variance
-tau^2, and tau^2 / sigma^2 = kappa is what makes the data most likely (empirical Bayes, restricted
+With a slow pump or a narrow-band input, the record does not determine the fast part of the pulse
+responses. Least squares then amplifies noise to hundreds of times the signal, and ERA realizes it.
+Here the input coefficients of each output have a Gaussian prior of zero mean and variance tau^2,
+and kappa = tau^2 / sigma^2 maximizes the likelihood of the data (empirical Bayes, restricted
 likelihood; Pillonetto et al., Automatica 2014). With the Schur complement S = V diag(l) V^T of the
-inputs in the normal equations and c its right-hand side, sums over the eigenvalues are all it
-takes::
+inputs in the normal equations and its right-hand side c::
 
     beta = V kappa / (1 + kappa l) V^T c
 """
@@ -18,32 +17,32 @@ from scipy.optimize import minimize_scalar
 from utank_hil.arrays import FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 
-_NULL = 1e-12  # eigenvalues below this part of the largest are rounding
-_LOG_KAPPA = (-15.0, 30.0)  # from no input at all to plain least squares
+_NULL = 1e-12  # smallest eigenvalue, relative to the largest
+_LOG_KAPPA = (-15.0, 30.0)  # from zero input coefficients to plain least squares
 
 
-def shrunk(
+def shrinkage_estimate(
     regression: LagRegression, gram: FloatArray, right: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients with shrunk input coefficients.
+    """Coefficients of a regression, with shrinkage of the input coefficients.
 
     Parameters
     ----------
     regression : LagRegression
     gram : ndarray, shape (n, n)
-        Upper triangle of its normal equations.
+        Upper triangle of the Gram matrix.
     right : ndarray, shape (n, m)
 
     Returns
     -------
     coefficients : ndarray, shape (n, m)
     penalty : ndarray, shape (m,)
-        1 / kappa of each output.
+        1 / kappa for each output.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the regression is singular in its other columns.
+        If the other columns of the regression are dependent.
     """
     full = np.triu(gram) + np.triu(gram, 1).T
     inputs = regression.input_rows
@@ -62,7 +61,7 @@ def shrunk(
     penalty = np.empty(right.shape[1])
     for j, part in enumerate(seen.T):
         rounding = float(np.finfo(np.float64).eps * all_squares[j])
-        kappa = _likeliest(values, part**2, float(squares[j]), freedom, rounding)
+        kappa = _maximum_likelihood(values, part**2, float(squares[j]), freedom, rounding)
         beta = vectors @ (kappa * part / (1 + kappa * values))
         coefficients[inputs, j] = beta
         coefficients[others, j] = solve_triangular(
@@ -72,10 +71,10 @@ def shrunk(
     return coefficients, penalty
 
 
-def _likeliest(
+def _maximum_likelihood(
     values: FloatArray, squares: FloatArray, total: float, freedom: int, rounding: float
 ) -> float:
-    """Return the kappa of largest restricted likelihood; residuals below rounding count as such."""
+    """Return the kappa of maximum restricted likelihood, with residuals of at least rounding."""
 
     def cost(log_kappa: float) -> float:
         kappa = np.exp(log_kappa)

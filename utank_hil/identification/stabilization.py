@@ -1,4 +1,4 @@
-"""Data of a stabilization diagram: which modes stay where they are as the model order grows."""
+"""Stabilization diagram: changes of the modes with the model order."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.identification.era import era
-from utank_hil.identification.modes import Modes, modal_assurance, modes
+from utank_hil.identification.modal import ModalParameters, modal_assurance, modal_parameters
 
 _FREQUENCY = 0.01  # relative changes from one order to the next that count as stable
 _DAMPING = 0.05
@@ -16,14 +16,15 @@ _SHAPE = 0.98  # modal assurance
 
 @dataclass(frozen=True, slots=True)
 class StabilizationPoint:
-    """A mode at one model order, against the nearest mode at the order before.
+    """A mode at one model order, compared with the nearest mode at the order before.
 
     Parameters
     ----------
     order : int
     frequency_rad_s, damping_ratio : float
     frequency_stable, damping_stable, shape_stable : bool
-        Within 1 % in frequency, 5 % in damping ratio, 0.98 in modal assurance.
+        Whether it changes by 1 % in frequency or less, by 5 % in damping ratio or less, and has a
+        modal assurance of 0.98 or more.
     """
 
     order: int
@@ -37,26 +38,26 @@ class StabilizationPoint:
 def stabilization(
     markov: FloatArray, orders: Sequence[int], sample_time_s: float = 0.2
 ) -> tuple[StabilizationPoint, ...]:
-    """Modes of ERA models of rising order.
+    """Modes of ERA models of increasing order.
 
     Parameters
     ----------
     markov : ndarray, shape (K, m, r)
     orders : sequence of int
-        Rising; orders beyond the rank of the Markov parameters are refused as by `era`.
+        Increasing, at most the rank of the Markov parameters.
     sample_time_s : float
 
     Returns
     -------
     tuple of StabilizationPoint
-        By order, then frequency; nothing is stable at the first order.
+        By order, then frequency; no mode is stable at the first order.
     """
     points = []
-    before: Modes | None = None
+    before: ModalParameters | None = None
     size = np.sqrt(np.sum(np.asarray(markov)[1:] ** 2, axis=(0, 2)))
     size[size == 0] = 1.0
     for order in orders:
-        now = modes(era(markov, order, sample_time_s))
+        now = modal_parameters(era(markov, order, sample_time_s))
         for j, frequency in enumerate(now.frequency_rad_s):
             stable = (False, False, False)
             if before is not None:

@@ -1,8 +1,8 @@
-"""How an identified model does on data it has not seen.
+"""Validation of an identified model on data that it was not fitted to.
 
-Fit, whiteness of the prediction errors, and their correlation with the input. Errors that are not
-white say that there is more to predict (a wave, a higher order); errors that go with past inputs
-say that the way from input to output is wrong. Ljung, System Identification, 16.6.
+Fit, whiteness of the prediction errors, and their correlation with the input. Coloured errors mean
+unmodelled dynamics or disturbances (a wave, a higher order). Errors correlated with past inputs
+mean a wrong transfer function. Ljung, System Identification, 16.6.
 """
 
 from collections.abc import Sequence
@@ -18,31 +18,31 @@ from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import channel_scale, stacked_record
 
-_STILL = 1e-12  # of a channel's root mean square: rounding
+_STILL = 1e-12  # smallest peak-to-peak value, relative to a channel's root mean square
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
-    """How a model does on a record.
+    """Validation results of a model on a record.
 
     Parameters
     ----------
     one_step_fit : ndarray, shape (m,)
         1 - rms(prediction error) / rms(y - mean y); 1 is perfect.
     simulation_fit : ndarray, shape (m,)
-        The same for the free response to input and disturbance basis, begun with the first p
-        samples of each stretch. What no model of the pump can know, an irregular sea, is in it.
-        Minus infinity where the response grows out of all bounds.
+        The same for the simulated response to input and disturbance basis, with the first p samples
+        of each segment as initial state. It includes the effect of an irregular sea. Minus
+        infinity for a response that overflows.
     residual_correlation : ndarray, shape (lags, m)
         Autocorrelation of the prediction errors at lags 1, 2, ...
     whiteness_probability : ndarray, shape (m,)
-        Of a larger Ljung-Box statistic if the errors were white.
+        p-value of the Ljung-Box test for white errors.
     input_correlation : ndarray, shape (lags + 1, m, r)
-        Correlation of the errors with the input 0, 1, ... samples before.
+        Correlation of the errors with the input at lags 0, 1, ...
     independence_probability : ndarray, shape (m, r)
-        Of a larger correlation statistic if the errors were white and apart from the input.
+        p-value of the test for errors independent of the input.
     rows : int
-        Predictions compared.
+        Number of predictions.
     """
 
     one_step_fit: FloatArray
@@ -62,7 +62,7 @@ def validate(
     lags: int = 25,
     disturbance_polynomial_degree: int | None = None,
 ) -> Validation:
-    """Compare a model with a record, best one it was not identified from.
+    """Validate a model on a record, preferably one that it was not identified from.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def validate(
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.
     disturbance_frequencies_rad_s : sequence of float
-        Known regular waves; amplitude and phase are fitted to this record.
+        Frequencies of regular waves; their amplitudes and phases are fitted to this record.
     lags : int
-        Over which errors and inputs are correlated, 1 or more.
+        Largest lag of the correlations, 1 or more.
     disturbance_polynomial_degree : int or None
-        0 allows for an offset, 1 for a drift too, both fitted to this record: a heel, or the bias
-        of a sensor, that the model was identified beside (`okid`) is no error of the model.
+        0 for an offset, 1 also for a drift, both fitted to this record: a heel or the bias of a
+        sensor, which `okid` fits as well, is not an error of the model.
 
     Returns
     -------
@@ -85,11 +85,11 @@ def validate(
     Raises
     ------
     ValueError
-        If the record does not fit the model, or `lags` is below 1.
+        If the record's channels do not match the model, or `lags` is below 1.
     IdentificationError
-        If the record cannot tell how good the model is: no unbroken stretch is longer than order
-        and lags, fewer predictions than lags are left, a channel does not move in what is left, an
-        output is clipped, or the predictions overflow.
+        If the record does not allow a validation: no segment longer than order and lags, fewer
+        predictions than lags, a channel that does not move, a clipped output, or predictions that
+        overflow.
     """
     if int(lags) != lags or lags < 1:
         raise ValueError(f"lags must be a positive integer, got {lags}")
@@ -103,7 +103,7 @@ def validate(
     basis = DisturbanceBasis(tuple(disturbance_frequencies_rad_s), disturbance_polynomial_degree)
     functions = basis.evaluate(len(z), arx.sample_time_s)
     regression = LagRegression(z / scale, m, max(arx.order, int(lags)), functions)
-    _refuse_stillness(regression, lags)
+    _refuse_unusable(regression, lags)
     coefficients = _coefficients(arx, scale, regression)
     errors = _errors(regression, coefficients)
     if basis.size:
@@ -125,8 +125,8 @@ def validate(
     )
 
 
-def _refuse_stillness(regression: LagRegression, lags: int) -> None:
-    """Refuse a record whose usable stretches leave nothing to judge by.
+def _refuse_unusable(regression: LagRegression, lags: int) -> None:
+    """Refuse a record with too few predictions, or with channels that do not move.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def _refuse_stillness(regression: LagRegression, lags: int) -> None:
             "on a longer record, mend its gaps or ask for fewer lags"
         )
     for c in range(regression.channels):
-        # an output is compared at the predictions; an input at each of the lags before them too
+        # outputs are compared at the predictions, inputs also at every lag before them
         for lag in range(1 if c < m else lags + 1):
             parts = [
                 s.channels[c, p - lag : s.channels.shape[1] - lag] for s in regression.segments
@@ -153,7 +153,7 @@ def _refuse_stillness(regression: LagRegression, lags: int) -> None:
 
 
 def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """Prediction errors by segment, refused if they overflow."""
+    """One-step prediction errors by segment, refused if they overflow."""
     with np.errstate(over="ignore", invalid="ignore"):
         errors = regression.residuals(coefficients)
         if not all(np.isfinite(e @ e.T).all() for e in errors):
@@ -167,7 +167,7 @@ def _errors(regression: LagRegression, coefficients: FloatArray) -> list[FloatAr
 def _simulation_fit(
     regression: LagRegression, coefficients: FloatArray, spread: FloatArray
 ) -> FloatArray:
-    """Fit of the free response; minus infinity where that overflows."""
+    """Fit of the simulated response; minus infinity if it overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         simulated = [
             s.channels[: regression.outputs, regression.order :] - free
@@ -180,7 +180,7 @@ def _simulation_fit(
 
 
 def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> FloatArray:
-    """The model as coefficients of a scaled regression, zero beyond its order and for the basis."""
+    """Coefficients of the model in a scaled regression; zero beyond its order and for the basis."""
     m = arx.outputs
     by_lag = np.zeros((regression.order + 1, m, regression.channels))
     by_lag[1 : arx.order + 1, :, :m] = arx.alpha
@@ -192,7 +192,7 @@ def _coefficients(arx: ARX, scale: FloatArray, regression: LagRegression) -> Flo
 
 
 def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[FloatArray]:
-    """Free response of each segment, (m, N - p), begun with its first p samples."""
+    """Simulated response of each segment, (m, N - p), with its first p samples as initial state."""
     p, q, m = regression.order, regression.channels, regression.outputs
     split = (p + 1) * q - m
     past = coefficients[q - m : split].reshape(p, q, m)[:, :m]
@@ -203,7 +203,7 @@ def _simulated(regression: LagRegression, coefficients: FloatArray) -> list[Floa
     for segment, left in zip(regression.segments, regression.residuals(inputs_only), strict=True):
         forced = segment.channels[:m, p:] - left
         samples = segment.channels.shape[1]
-        history = np.zeros((samples, m))  # backwards in time, so that the newest comes first
+        history = np.zeros((samples, m))  # reversed in time: newest first
         history[samples - p :] = segment.channels[:m, :p].T[::-1]
         for k in range(samples - p):
             now = samples - p - 1 - k
@@ -218,7 +218,7 @@ def _rms(errors: list[FloatArray]) -> FloatArray:
 
 
 def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatArray]:
-    """Ljung-Box probability and autocorrelation of each output's errors."""
+    """Ljung-Box p-value and autocorrelation of each output's errors."""
     total = sum(np.sum(e**2, axis=1) for e in errors)
     correlation = np.array(
         [
@@ -234,7 +234,7 @@ def _whiteness(errors: list[FloatArray], lags: int) -> tuple[FloatArray, FloatAr
 def _independence(
     errors: list[FloatArray], regression: LagRegression, lags: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Probability that errors and past inputs are unrelated, and their correlation."""
+    """p-value of the independence of errors and past inputs, and their correlation."""
     p, m = regression.order, regression.outputs
     inputs = regression.channels - m
     probability = np.empty((m, inputs))
@@ -252,7 +252,7 @@ def _independence(
         scale = np.sqrt(power.diagonal())
         crossed = sum(w @ e.T for w, e in zip(lagged, errors, strict=True))
         correlation[:, :, j] = crossed / scale[:, None] / size
-        # inputs are correlated among themselves, and a slow one is so nearly completely
+        # lagged inputs are correlated, those of a slow input almost completely
         values, vectors = np.linalg.eigh(power / np.outer(scale, scale))
         kept = values > 1e-6 * values[-1]
         along = vectors[:, kept].T @ correlation[:, :, j] / np.sqrt(values[kept])[:, None]

@@ -1,13 +1,14 @@
-"""Frequencies of regular waves, found in the same data that the model is identified from.
+"""Frequencies of regular waves, estimated from the identification's record.
 
-For each trial frequency the regression is solved with and without its sine and cosine; the drop in
-squared prediction error is the evidence for a line there (variable projection; the coefficients are
-never formed)::
+For each trial frequency the regression is solved with and without a sine and cosine. The reduction
+of the squared prediction error is the evidence for a spectral line (variable projection, without
+computing the coefficients)::
 
-    drop(w) = e^T Psi (Psi^T P Psi)^-1 Psi^T e,   P = I - Phi (Phi^T Phi + mu I)^-1 Phi^T,   e = P y
+    reduction(w) = e^T Psi (Psi^T P Psi)^-1 Psi^T e,   e = P y
+    P = I - Phi (Phi^T Phi + mu I)^-1 Phi^T
 
-A high-order ARX predicts any sine wave from its own past and would leave nothing to see; so the
-order is low here, and the small ridge mu stands for measurement noise where the data have none.
+The order is low, because a high-order ARX model predicts any sine wave from its own past. The small
+ridge parameter mu represents measurement noise in data without noise.
 """
 
 import numpy as np
@@ -20,9 +21,9 @@ from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import channel_scale, stacked_record
 
 _ORDER = 12
-_RIDGE = 1e-4  # squared relative noise: 1 %
-_STEPS_A_CYCLE = 4  # trial frequencies for each cycle more over the record
-_EVIDENCE = 30.0  # drop over error variance, a coefficient: noise stays below 6, a sea below 20
+_RIDGE = 1e-4  # squared relative noise of 1 %
+_STEPS_A_CYCLE = 4  # trial frequencies per DFT bin (one cycle over the record)
+_EVIDENCE = 30.0  # least F statistic of a line; noise reaches 6, an irregular sea 20
 
 
 def find_disturbance_frequencies(
@@ -32,7 +33,7 @@ def find_disturbance_frequencies(
     most: int = 1,
     band_rad_s: tuple[float, float] = (0.2, 2.0),
 ) -> tuple[float, ...]:
-    """Frequencies of sinusoidal disturbances, to hand to `okid`.
+    """Frequencies of sinusoidal disturbances, an argument of `okid`.
 
     Parameters
     ----------
@@ -41,14 +42,14 @@ def find_disturbance_frequencies(
         NaN rows are gaps, as in `okid`.
     sample_time_s : float
     most : int
-        Largest number of lines looked for.
+        Largest number of lines.
     band_rad_s : tuple of float
-        Where to look.
+        Search band.
 
     Returns
     -------
     tuple of float
-        rad/s, the strongest first; empty when no line stands out of the prediction errors.
+        rad/s, the strongest first; empty if no line is significant.
 
     Raises
     ------
@@ -70,15 +71,15 @@ def find_disturbance_frequencies(
     lines: list[float] = []
     while len(lines) < most:
         search = _Search(z, m, lines, sample_time_s)
-        # no second line within a cycle of one that was found
-        fresh = [w for w in grid if all(abs(w - old) > _STEPS_A_CYCLE * step for old in lines)]
-        if not fresh:
+        # no second line within one DFT bin of another
+        candidates = [w for w in grid if all(abs(w - old) > _STEPS_A_CYCLE * step for old in lines)]
+        if not candidates:
             break
-        line = search.refined(max(fresh, key=search.drop), step)
-        if search.drop(line) < _EVIDENCE * 2 * m:
+        line = search.refined(max(candidates, key=search.reduction), step)
+        if search.reduction(line) < _EVIDENCE * 2 * m:
             break
         lines.append(line)
-        if len(lines) > 1:  # the lines pull at each other: each once more beside the others
+        if len(lines) > 1:  # lines interact: refine each one with the others in place
             for i, old in enumerate(lines):
                 others = lines[:i] + lines[i + 1 :]
                 lines[i] = _Search(z, m, others, sample_time_s).refined(old, step)
@@ -86,7 +87,7 @@ def find_disturbance_frequencies(
 
 
 class _Search:
-    """Evidence for one more line beside those already found."""
+    """Evidence for one more line in addition to known ones."""
 
     def __init__(self, z: FloatArray, m: int, lines: list[float], sample_time_s: float) -> None:
         time_s = np.arange(len(z), dtype=np.float64) * sample_time_s
@@ -98,12 +99,12 @@ class _Search:
         self._errors = self._regression.residuals(cho_solve(self._factor, right))
         squares = sum(np.sum(e**2, axis=1) for e in self._errors)
         self._variance = squares / self._regression.rows + _RIDGE
-        # e = P y belongs to the rows of the regression; their times tell the basis
+        # times of the regression's rows, for the sines and cosines
         marks = LagRegression(z, m, _ORDER, time_s[None])
         self._times = [segment.basis[0] for segment in marks.segments]
 
-    def drop(self, frequency_rad_s: float) -> float:
-        """Squared error that a line takes away, over the error variance; summed over outputs."""
+    def reduction(self, frequency_rad_s: float) -> float:
+        """Reduction of the squared error by a line over its variance, summed over outputs."""
         waves = [
             np.array([np.sin(frequency_rad_s * t), np.cos(frequency_rad_s * t)])
             for t in self._times
@@ -115,9 +116,9 @@ class _Search:
         return float(np.sum(gain / self._variance))
 
     def refined(self, frequency_rad_s: float, step: float) -> float:
-        """Frequency of the most evidence within a step of a trial."""
+        """Frequency of the largest reduction within a step of a trial frequency."""
         found = minimize_scalar(
-            lambda w: -self.drop(w),
+            lambda w: -self.reduction(w),
             bounds=(max(frequency_rad_s - step, step / 2), frequency_rad_s + step),
             method="bounded",
             options={"xatol": 1e-3 * step},

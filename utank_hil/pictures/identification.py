@@ -15,7 +15,7 @@ from utank_hil.identification import (
     stabilization,
 )
 from utank_hil.pictures.style import COLORS, picture
-from utank_hil.retuning.record_length import first_part
+from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
 SHOWN_S = 120.0
@@ -46,7 +46,7 @@ def draw_identification(
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx
     step_s = arx.sample_time_s
-    split = first_part(len(record))
+    split = estimation_samples(len(record))
     shown = slice(split, min(len(record), split + arx.order + round(SHOWN_S / step_s)))
     here = np.nan_to_num(record[shown])
     basis = DisturbanceBasis(found.wave_frequencies_rad_s, 0).evaluate(len(here), step_s)

@@ -1,7 +1,7 @@
-"""How long a record an ARX model takes, and how long a memory a ship: known before any pulse.
+"""Least record length for an ARX model, and least model order for a ship.
 
-Both the configuration and the retuner ask here, so that no ship is pulsed for a record that can
-only be refused. Loads nothing: every start of a controller reads its configuration.
+The configuration and the retuner use the same checks, so that a record that would be refused is
+never taken. Imports little, because the configuration needs it at every start of a controller.
 """
 
 import math
@@ -9,29 +9,29 @@ from typing import Final
 
 from utank_hil.parameters import Problem
 
-HELD_OUT: Final = 0.2
-"""Part of the record, its end, that the model is judged on."""
+VALIDATION_SHARE: Final = 0.2
+"""Share of the record, at its end, for the validation of the model."""
 LEAST_PREDICTIONS: Final = 100
-"""On held-out data, for a verdict on the model."""
+"""Least number of predictions on validation data."""
 LAGS: Final = 25
-"""Samples over which prediction errors are to be uncorrelated."""
+"""Largest lag of the whiteness test, in samples."""
 
-_OFFSET_AND_WAVE: Final = 3  # functions of time that are fitted beside the model
+_OFFSET_AND_WAVE: Final = 3  # disturbance functions fitted with the model
 
 
 def record_problems(
     order: int, samples: int, outputs: int, sample_time_s: float, shortest_period_s: float
 ) -> list[Problem]:
-    """What makes a record useless whatever is in it.
+    """Problems of a record's length and the model's order, known before any measurement.
 
     Parameters
     ----------
     order : int
-        Of the ARX model.
+        Order of the ARX model.
     samples : int
-        Of the record.
+        Length of the record.
     outputs : int
-        Measured.
+        Number of measured outputs.
     sample_time_s : float
     shortest_period_s : float
         Shortest roll period of the stability booklet.
@@ -39,11 +39,11 @@ def record_problems(
     Returns
     -------
     list of (str, str)
-        "order" and "identification_s", each with the reason.
+        Key, "order" or "identification_s", and reason.
     """
     problems = []
     if order * sample_time_s < shortest_period_s:
-        # such a model takes waves for the ship, and is sure of it
+        # such a model is fitted to the waves, with small stated errors
         problems.append(
             (
                 "order",
@@ -65,22 +65,22 @@ def record_problems(
 
 
 def least_samples(order: int, outputs: int) -> int:
-    """Samples with which an order can be fitted to the first part and judged on the rest."""
-    lost = max(order, LAGS)  # predictions, at the start of each part
+    """Least number of samples of a record, for estimation and validation of a model."""
+    skipped = max(order, LAGS)  # samples without a prediction, at the start of each part
     columns = (order + 1) * (outputs + 1) - outputs + _OFFSET_AND_WAVE
-    judged = (LEAST_PREDICTIONS + lost) / HELD_OUT
-    fitted = (order + columns + 1) / (1 - HELD_OUT)
+    judged = (LEAST_PREDICTIONS + skipped) / VALIDATION_SHARE
+    fitted = (order + columns + 1) / (1 - VALIDATION_SHARE)
     least = math.floor(max(judged, fitted)) - 2
-    while not _enough(least, order, lost, columns):  # the parts are whole samples
+    while not _enough(least, order, skipped, columns):  # the parts are whole samples
         least += 1
     return least
 
 
-def first_part(samples: int) -> int:
-    """Samples that the model is made from."""
-    return round((1 - HELD_OUT) * samples)
+def estimation_samples(samples: int) -> int:
+    """Number of samples for the estimation of the model; the rest is for its validation."""
+    return round((1 - VALIDATION_SHARE) * samples)
 
 
-def _enough(samples: int, order: int, lost: int, columns: int) -> bool:
-    first = first_part(samples)
-    return first - order > columns and samples - first - lost >= LEAST_PREDICTIONS
+def _enough(samples: int, order: int, skipped: int, columns: int) -> bool:
+    first = estimation_samples(samples)
+    return first - order > columns and samples - first - skipped >= LEAST_PREDICTIONS

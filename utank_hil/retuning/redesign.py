@@ -30,13 +30,13 @@ from utank_hil.identification import (
     validate,
 )
 from utank_hil.identification.acceptance import ModelLimits, model_objections
-from utank_hil.identification.lag_regression import unbroken
+from utank_hil.identification.lag_regression import segment_bounds
 from utank_hil.identification.ship_fit import ShipFit, fit_ship
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.record_length import (
     LAGS,
     LEAST_PREDICTIONS,
-    first_part,
+    estimation_samples,
     record_problems,
 )
 from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
@@ -168,10 +168,10 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         names = {"order": "order", "identification_s": "the record"}
         reasons = (f"{names[name]} {reason}" for name, reason in problems)
         raise IdentificationError("; ".join(reasons))
-    split = first_part(len(record))
+    split = estimation_samples(len(record))
     _refuse_unusable(record[:split])
     _refuse_unusable(record[split:])
-    stretches = [stop - start for start, stop in unbroken(record[split:])]
+    stretches = [stop - start for start, stop in segment_bounds(record[split:])]
     skipped = max(task.order, LAGS)  # without a prediction, at the start and after every gap
     predictions = sum(max(0, length - skipped) for length in stretches)
     if predictions < LEAST_PREDICTIONS:

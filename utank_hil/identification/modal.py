@@ -1,14 +1,14 @@
-"""Modes of an identified model: frequency, damping, shape, and how well they are known.
+"""Modal parameters of an identified model: frequency, damping ratio, shape, and their accuracy.
 
 The least-squares estimate of the ARX coefficients has covariance Sigma (x) (Phi^T Phi)^-1. To first
-order a pole of ERA moves with the Markov parameters as ::
+order the change of an ERA pole with the Markov parameters is ::
 
     d lambda = psi^H S^-1/2 U^T (dH1 - lambda dH0) V S^-1/2 phi / (psi^H phi)
 
-and those move with the coefficients by the recursion of `markov`, whose adjoint gives the gradient
-in one backward pass (delta method; Pintelon, Guillaume and Schoukens 2007 for the subspace case).
-The covariance is right when the prediction errors are white, which a high order sees to and
-`validate` shows.
+and theirs with the coefficients follows from the recursion of `markov`, whose adjoint gives the
+gradient in one backward pass (delta method; Pintelon, Guillaume and Schoukens 2007 for the subspace
+case). The covariance is valid for white prediction errors, which a high order makes and `validate`
+checks.
 """
 
 from dataclasses import dataclass
@@ -20,29 +20,29 @@ from scipy.special import ndtri
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.identification.era import Realization, realize
 from utank_hil.identification.errors import IdentificationError
-from utank_hil.identification.markov import gradient
+from utank_hil.identification.markov import markov_gradient
 from utank_hil.identification.okid import OkidResult
 
 if TYPE_CHECKING:
     from control import StateSpace
 
-_NULL = 1e-12  # eigenvalues of the Gram matrix below this part of the largest are rounding
+_NULL = 1e-12  # smallest eigenvalue of the Gram matrix, relative to the largest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Modes:
-    """Modes in rising frequency, one of each conjugate pair.
+class ModalParameters:
+    """Modes in order of frequency, one of each conjugate pair.
 
     Parameters
     ----------
     poles : ndarray, shape (k,)
-        Of the discrete model, imaginary part zero or more.
+        Poles of the discrete model, imaginary part zero or more.
     frequency_rad_s : ndarray, shape (k,)
         Undamped natural frequency; infinite for a pole at 0.
     damping_ratio : ndarray, shape (k,)
         1 for a real pole, negative when unstable.
     shapes : ndarray, shape (k, m)
-        Complex amplitudes of the outputs, the largest being 1; zero for a mode that none shows.
+        Mode shapes: complex amplitudes of the outputs, the largest 1; zero if unobservable.
     """
 
     poles: ComplexArray
@@ -52,22 +52,27 @@ class Modes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ModeConfidence:
-    """Modes with standard deviations.
+class ModalConfidence:
+    """Modal parameters with standard deviations.
 
     Parameters
     ----------
-    modes : Modes
+    modes : ModalParameters
     frequency_std_rad_s : ndarray, shape (k,)
     damping_ratio_std : ndarray, shape (k,)
     """
 
-    modes: Modes
+    modes: ModalParameters
     frequency_std_rad_s: FloatArray
     damping_ratio_std: FloatArray
 
     def intervals(self, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Intervals that hold frequency and damping ratio with probability `level`.
+        """Confidence intervals of frequency and damping ratio.
+
+        Parameters
+        ----------
+        level : float
+            Confidence level.
 
         Returns
         -------
@@ -80,8 +85,8 @@ class ModeConfidence:
         )
 
 
-def modes(system: "StateSpace") -> Modes:
-    """Modes of a discrete python-control model.
+def modal_parameters(system: "StateSpace") -> ModalParameters:
+    """Modal parameters of a discrete python-control model.
 
     Raises
     ------
@@ -90,31 +95,31 @@ def modes(system: "StateSpace") -> Modes:
     """
     if not system.dt or system.dt is True:
         raise ValueError(f"modes need a discrete model with a sample time, its dt is {system.dt}")
-    return _modes(np.asarray(system.A), np.asarray(system.C), float(system.dt)).modes
+    return _eigen(np.asarray(system.A), np.asarray(system.C), float(system.dt)).modes
 
 
-def mode_confidence(result: OkidResult, order: int) -> ModeConfidence:
-    """Modes of the ERA model of an identification, with standard deviations.
+def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
+    """Modal parameters of an identification's ERA model, with standard deviations.
 
     Parameters
     ----------
     result : OkidResult
     order : int
-        Of the model, as in `era`.
+        Order of the model, as in `era`.
 
     Returns
     -------
-    ModeConfidence
-        The modes are those of ``modes(era(result.markov, order, sample_time_s))``.
+    ModalConfidence
+        Its modes are ``modal_parameters(era(result.markov, order, sample_time_s))``.
 
     Raises
     ------
     ValueError, IdentificationError
-        As `era`; and if poles coincide or lie at 0 or 1, where to first order they do not move.
+        As `era`; and if poles coincide or lie at 0 or 1, where the gradient is not defined.
     """
     found = realize(result.markov, order)
     sample_time_s = result.arx.sample_time_s
-    model, vectors, kept = _modes(found.a, found.c, sample_time_s)
+    model, vectors, kept = _eigen(found.a, found.c, sample_time_s)
     left_vectors: ComplexArray | None
     try:
         left_vectors = np.linalg.inv(vectors).T[:, kept].astype(np.complex128)
@@ -131,7 +136,7 @@ def mode_confidence(result: OkidResult, order: int) -> ModeConfidence:
     directions = np.zeros((rows, m, 2 * len(model.poles)))
     for j, pole in enumerate(model.poles):
         weights = _pole_weights(found, result, pole, right_vectors[:, j], left_vectors[:, j])
-        slope = gradient(result.arx, result.markov, weights)
+        slope = markov_gradient(result.arx, result.markov, weights)
         slope = slope / result.column_scale[: len(slope), None] / (pole * sample_time_s)
         directions[: len(slope), :, 2 * j] = slope.real
         directions[: len(slope), :, 2 * j + 1] = slope.imag
@@ -142,7 +147,7 @@ def mode_confidence(result: OkidResult, order: int) -> ModeConfidence:
     for j, pole in enumerate(s):
         block = covariance[2 * j : 2 * j + 2, 2 * j : 2 * j + 2]
         frequency_std[j], damping_std[j] = frequency_and_damping_std(pole, block)
-    return ModeConfidence(model, frequency_std, damping_std)
+    return ModalConfidence(model, frequency_std, damping_std)
 
 
 def frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[float, float]:
@@ -159,7 +164,7 @@ def frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[float
 def modal_assurance(first: ComplexArray, second: ComplexArray) -> FloatArray:
     """Modal assurance criterion of two sets of shapes, (k, m) and (l, m); shape (k, l), 0 to 1.
 
-    Outputs of different kinds must be scaled alike first; with one output all shapes are alike.
+    Scale outputs of different units first. With one output the result is always 1.
     """
     inner = np.abs(first.conj() @ second.T) ** 2
     norms = np.sum(np.abs(first) ** 2, axis=1)[:, None] * np.sum(np.abs(second) ** 2, axis=1)
@@ -168,14 +173,14 @@ def modal_assurance(first: ComplexArray, second: ComplexArray) -> FloatArray:
 
 
 class _Eigen(NamedTuple):
-    """Modes, all right eigenvectors, and the numbers of those that the modes belong to."""
+    """Modes, all right eigenvectors, and the indices of the modes' eigenvectors."""
 
-    modes: Modes
+    modes: ModalParameters
     vectors: ComplexArray
     kept: np.ndarray
 
 
-def _modes(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
+def _eigen(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
     values, vectors = np.linalg.eig(a)
     with np.errstate(divide="ignore", invalid="ignore"):  # the logarithm of 0
         s = np.log(values.astype(np.complex128)) / sample_time_s
@@ -187,7 +192,7 @@ def _modes(a: FloatArray, c: FloatArray, sample_time_s: float) -> _Eigen:
     damping[oscillating] = -s[oscillating].real / np.abs(s[oscillating])
     shapes = (c @ vectors[:, kept]).T.astype(np.complex128)
     peak = np.take_along_axis(shapes, np.argmax(np.abs(shapes), axis=1)[:, None], axis=1)
-    model = Modes(
+    model = ModalParameters(
         values[kept].astype(np.complex128),
         np.abs(s),
         damping,
@@ -203,7 +208,7 @@ def _pole_weights(
     right_vector: ComplexArray,
     left_vector: ComplexArray,
 ) -> ComplexArray:
-    """How a pole moves with each Markov parameter, shape (K, m, r)."""
+    """Gradient of a pole with respect to the Markov parameters, shape (K, m, r)."""
     count, m, r = result.markov.shape
     down = (found.left @ left_vector).reshape(-1, m)
     across = (found.right @ right_vector).reshape(-1, r)
@@ -217,7 +222,7 @@ def _pole_weights(
 
 
 def _inverse_root(result: OkidResult, output: int) -> FloatArray:
-    """Symmetric root of the coefficients' covariance of one output, over the error variance."""
+    """Symmetric square root of one output's coefficient covariance, for unit error variance."""
     gram = result.gram.copy()
     m, r = result.arx.outputs, result.arx.inputs
     inputs = (np.arange(result.arx.order + 1)[:, None] * (m + r) + np.arange(r)).ravel()

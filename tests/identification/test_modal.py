@@ -16,8 +16,8 @@ from utank_hil.identification import (
     era,
     markov_parameters,
     modal_assurance,
-    mode_confidence,
-    modes,
+    modal_confidence,
+    modal_parameters,
     okid,
 )
 
@@ -31,7 +31,7 @@ def _true_modes(truth: Plant) -> FloatArray:
 
 def test_modes_of_the_true_model() -> None:
     truth = plant()
-    found = modes(truth.state_space())
+    found = modal_parameters(truth.state_space())
     np.testing.assert_allclose(
         np.concatenate([found.frequency_rad_s, found.damping_ratio]), _true_modes(truth), rtol=1e-9
     )
@@ -46,12 +46,12 @@ def test_modes_ask_for_a_discrete_model() -> None:
     system = plant().state_space()
     system.dt = 0
     with pytest.raises(ValueError, match="discrete"):
-        modes(system)
+        modal_parameters(system)
 
 
 def test_integrators_dead_poles_and_modes_that_no_output_shows_have_figures_all_the_same() -> None:
     a = np.diag([1.0, 0.5, 0.0])
-    found = modes(control.ss(a, np.ones((3, 1)), [[1.0, 0.0, 1.0]], [[0.0]], 0.2))
+    found = modal_parameters(control.ss(a, np.ones((3, 1)), [[1.0, 0.0, 1.0]], [[0.0]], 0.2))
     assert found.frequency_rad_s.tolist() == [0.0, pytest.approx(5 * np.log(2)), np.inf]
     assert found.damping_ratio.tolist() == [1.0, 1.0, 1.0]
     assert found.shapes[:, 0].tolist() == [1.0, 0.0, 1.0]
@@ -63,7 +63,7 @@ def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
     markov = np.zeros_like(result.markov)
     markov[2] = 1.0  # a delay: two poles at zero
     with pytest.raises(IdentificationError, match="order 2 has poles that coincide"):
-        mode_confidence(replace(result, markov=markov), 2)
+        modal_confidence(replace(result, markov=markov), 2)
 
 
 def test_orthogonal_shapes_have_no_assurance() -> None:
@@ -76,7 +76,7 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
     # draws from the coefficients' own distribution, each through recursion and ERA
     u, truth = pulses(1, limits), plant()
     result = okid(u, noisy(truth.respond(u, 0 * u), NOISE, 1), 25)
-    stated = mode_confidence(result, 4)
+    stated = modal_confidence(result, 4)
     p, m = 25, 2
     gram = np.triu(result.gram) + np.triu(result.gram, 1).T
     inputs = np.arange(p + 1) * 3
@@ -95,7 +95,7 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
         shift /= result.column_scale[:, None]
         by_lag = np.vstack([np.zeros((m, m)), shift]).reshape(p + 1, 3, m).transpose(0, 2, 1)
         moved = ARX(result.arx.alpha + by_lag[1:, :, :m], result.arx.beta + by_lag[:, :, m:], 0.2)
-        found = modes(era(markov_parameters(moved, len(result.markov))[0], 4))
+        found = modal_parameters(era(markov_parameters(moved, len(result.markov))[0], 4))
         draws.append(np.concatenate([found.frequency_rad_s, found.damping_ratio]))
     spread = np.std(draws, axis=0)
     expected = np.concatenate([stated.frequency_std_rad_s, stated.damping_ratio_std])
@@ -104,7 +104,7 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
 
 def test_data_without_noise_leave_no_doubt() -> None:
     u = pulses(1)
-    stated = mode_confidence(okid(u, plant().respond(u, 0 * u), 60), 4)
+    stated = modal_confidence(okid(u, plant().respond(u, 0 * u), 60), 4)
     assert stated.frequency_std_rad_s.max() < 1e-10
     low, high = stated.intervals()[0].T
     assert np.all(low <= stated.modes.frequency_rad_s)
@@ -118,7 +118,7 @@ def test_bias_variance_and_coverage_against_the_cramer_rao_bound() -> None:
     right = _true_modes(truth)
     found, stated = np.empty((runs, 4)), np.empty((runs, 4))
     for run in range(runs):
-        confidence = mode_confidence(okid(u, noisy(clean, NOISE, run), 120), 4)
+        confidence = modal_confidence(okid(u, noisy(clean, NOISE, run), 120), 4)
         found[run] = np.concatenate(
             [confidence.modes.frequency_rad_s, confidence.modes.damping_ratio]
         )
