@@ -63,7 +63,7 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
         The first is the reference, the passive tank: drawn in grey, and searched for the largest
         roll.
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
 

@@ -35,7 +35,7 @@ def draw_identification(
         Result for that record.
     task : RetuningTask
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
 
     Returns

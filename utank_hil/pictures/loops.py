@@ -38,7 +38,7 @@ def draw_bode(
         One to seven laws; the passive tank is always drawn.
     plant : DesignPlant
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
 

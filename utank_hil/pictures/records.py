@@ -22,7 +22,7 @@ def draw_time(
         Records by name, of each panel by its label; records are in the unit of the label. A name
         has the same colour in all panels, the first one grey.
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
 
@@ -73,7 +73,7 @@ def draw_phase(
     labels : tuple of str
         Labels of the two axes, units included.
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
 

@@ -42,7 +42,7 @@ def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[F
     Parameters
     ----------
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
     size_in : tuple of float

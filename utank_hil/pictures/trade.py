@@ -29,7 +29,7 @@ def draw_trade(
     ----------
     trade : Trade
     path : Path
-        The `.png` file; written anew.
+        The `.png` file; overwritten.
     title : str
         Title of the figure.
     pressure_limit_pa, level_limit_m : float

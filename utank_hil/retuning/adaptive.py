@@ -52,7 +52,7 @@ EARLY_FACTOR: Final = 1.5
 MOST_TRIES: Final = 3
 """Identifications of one change of the ship; if all are refused, the new ship counts as normal."""
 RETRY_NS: Final = 600_000_000_000
-"""Least time from the end of a retuning to the next one caused by a change: the monitor learns."""
+"""Least time from one retuning to the next because of a change, for the monitor to learn."""
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (

@@ -27,23 +27,19 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
     from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
     limits = plant.limits
-    pump_limits = PumpLimits(
+    bounds = PumpLimits(
         pressure_pa=min(settings.pulse_pa, limits.pressure_pa), rate_pa_s=limits.rate_pa_s
     )
     duration_s, seed = settings.identification_s, settings.seed
     match settings.excitation.kind:
         case "random_pulses":
-            pulses = random_pulses(
-                duration_s, pump_limits, seed, settings.pulse_hold_s, sample_time_s
-            )
+            pulses = random_pulses(duration_s, bounds, seed, settings.pulse_hold_s, sample_time_s)
         case "prbs":
-            pulses = prbs(duration_s, pump_limits, seed, settings.pulse_hold_s[0], sample_time_s)
+            pulses = prbs(duration_s, bounds, seed, settings.pulse_hold_s[0], sample_time_s)
         case "multisine":
-            pulses = multisine(
-                duration_s, pump_limits, seed, settings.excitation.band, sample_time_s
-            )
+            pulses = multisine(duration_s, bounds, seed, settings.excitation.band, sample_time_s)
         case "chirp":
-            pulses = chirp(duration_s, pump_limits, settings.excitation.band, sample_time_s)
+            pulses = chirp(duration_s, bounds, settings.excitation.band, sample_time_s)
     sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
     model = ARX.from_state_space(sampled, len(sampled.A))
     response_limits = np.array([settings.added_roll_rad, limits.level_m])

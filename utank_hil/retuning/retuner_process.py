@@ -1,7 +1,7 @@
 """The retuner in processes of its own: records go out and answers come back through mailboxes.
 
 The controller's loop writes one mailbox and polls one number of the other. There is no other
-connection, so the loop never waits. If the retuner hangs, dies or writes nonsense, the number never
+connection, so the loop never waits. If the retuner hangs, dies or writes garbage, the number never
 arrives or the message is refused, and the controller keeps its law. There are two processes:
 
     watchdog   started before the loop; forks the worker, again whenever it has died or hangs

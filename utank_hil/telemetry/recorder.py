@@ -68,7 +68,7 @@ def record_ring(
     ring : str
         Name of the ring.
     file : Path
-        The `.rrd` file; written anew.
+        The `.rrd` file; overwritten.
     live_port : int, optional
         Serve viewers on this loopback port as well.
     events : str, optional
@@ -141,7 +141,7 @@ class RecorderProcess(Closing):
     ring : str
         Name of the ring.
     file : Path
-        The `.rrd` file; written anew.
+        The `.rrd` file; overwritten.
     live : bool
         Serve viewers on a free loopback port.
     events : str, optional

@@ -44,7 +44,7 @@ def write_recording(
     Parameters
     ----------
     path : Path
-        The `.rrd` file; written anew.
+        The `.rrd` file; overwritten.
     columns : sequence of str
         Names of a row's values, in SI units, `time_s` among them.
     runs : mapping of str to array (n, len(columns))
