@@ -1,5 +1,6 @@
 """docs/can-catalogue.md, made from the DBC."""
 
+import textwrap
 from pathlib import Path
 
 from cantools.database.can import Database, Message, Signal
@@ -15,41 +16,55 @@ INTRODUCTION = """\
 
 <!-- Written by tools/documents/catalogue.py from utank_hil/canbus/utank.dbc; do not edit. -->
 
+## What it does
 {comment}
 
-Catalogue version: {version} (12-bit hash of the DBC). HEARTBEAT and CTRL_STATUS carry it; nodes
-whose versions differ keep the controller from arming.
+* Identifiers are 29 bits in the manner of SAE J1939: priority, parameter group, and in the low byte
+  the sender's source address.
+* Frames have 8 bytes. Signals are unsigned and little endian.
+* Physical value = raw * scale + offset, so all ones can mean "not available" for signed quantities
+  too.
+* Encoding saturates at the range. A value that is out of range, not available or not in a value
+  table decodes to NaN or None and counts as missing.
+* Catalogue version: {version} (12-bit hash of the DBC). HEARTBEAT and CTRL_STATUS carry it. Nodes
+  whose versions differ keep the controller from arming.
 
-Identifiers are 29 bits in the manner of SAE J1939: priority, parameter group, and in the low byte
-the sender's source address. Frames have 8 bytes, signals are unsigned and little endian; physical
-value = raw * scale + offset, so that all ones can mean "not available" for signed quantities too.
-Encoding saturates at the range; what is out of range, not available or not in a value table decodes
-to NaN or None and counts as missing.
-
-## Protection
-
+### Protection
 All messages but ADDRESS_CLAIM are protected in the style of AUTOSAR E2E Profile 2:
 
-* Byte 0 is a CRC-8 (polynomial 0x2F, start value and final exclusive-or 0xFF) over bytes 1 to 7
-  and one byte that is not sent: the data ID, which the counter picks from the message's list of
-  sixteen (attribute `DataIDs`). A frame of another message fails this check.
-* The low nibble of byte 1 is a counter that steps by one with every frame, 15 followed by 0; the
+* Byte 0 is a CRC-8 (polynomial 0x2F, start value and final exclusive-or 0xFF) over bytes 1 to 7 and
+  the data ID. The data ID is one byte that is not sent. The counter picks it from the message's
+  list of sixteen (attribute `DataIDs`). A frame of another message fails this check.
+* The low nibble of byte 1 is a counter that steps by one with every frame, 15 followed by 0. The
   first frame after a start has 1.
 * The lists: message number n = 1, 2, ... as the eight bits `2 n + parity(n)`, exclusive-or 0x06,
-  0x03, 0x0A, 0x11 for the counter's bits 0 to 3. With them any three flipped bits of a frame are
-  found (Hamming distance 4), flips in the counter included, and no message passes for another,
-  not even with one flipped bit.
+  0x03, 0x0A, 0x11 for the counter's bits 0 to 3.
 
-A receiver accepts the first good frame, then every frame whose counter follows, up to {lost}
-missing ones forgiven and counted. Anything else (wrong length, wrong CRC or data ID, counter
-repeated or out of sequence) is discarded and changes nothing: no value, no trusted counter. After a
-longer gap or a restart of the sender, the last of {resync} frames in a row that follow one another
-is trusted again. A leaky bucket judges the stream: a discarded frame +1, an accepted one -1,
-invalid from {bucket} until it is empty.
+A receiver accepts the first good frame, then every frame whose counter follows:
 
-What four bits can't show: a gap of 16 frames looks like a repetition and one of 17 like none, and a
-frame delayed by 12 to 15 places looks like the next one. Receivers therefore judge age with their
-own clock too. The CRC is for safety, not security: whoever may send on the bus can compute it.
+* Up to {lost} missing frames are forgiven and counted.
+* Anything else is discarded: wrong length, CRC or data ID, counter repeated or out of sequence. A
+  discarded frame changes nothing: no value, no trusted counter.
+* After a longer gap or a restart of the sender, the last of {resync} frames that follow one
+  another is trusted again.
+* A leaky bucket judges the stream: a discarded frame +1, an accepted one -1. The stream is invalid
+  from {bucket} until the bucket is empty.
+
+Four bits have limits. A gap of 16 frames looks like a repetition and one of 17 like none. A frame
+delayed by 12 to 15 places looks like the next one. Receivers therefore judge age with their own
+clock too. The CRC is for safety, not security: whoever may send on the bus can compute it.
+
+## How to use it
+* The DBC, `utank_hil/canbus/utank.dbc`, is the only source. Any CAN tool reads it.
+* Add a sensor or a message: [how-to/message.md](how-to/message.md). `make docs` writes this page
+  anew, `make check` fails if it is stale.
+* In Python: `load_catalogue()`, then a `Transmitter` or `Receiver` a message
+  (`canbus/endpoints.py`).
+
+## What was measured
+By exhaustion (`tests/canbus/test_e2e.py`): any three flipped bits of a frame are found (Hamming
+distance 4), flips in the counter included. No message passes for another, not even with one flipped
+bit.
 
 ## Messages
 
@@ -99,7 +114,7 @@ def signal_row(signal: Signal) -> str:
 def section(message: Message) -> str:
     """The description of one message."""
     data_ids = read_data_ids(message)
-    lines = [f"### {message.name}", "", str(message.comment), ""]
+    lines = [f"### {message.name}", "", textwrap.fill(str(message.comment), 100), ""]
     if data_ids is not None:
         lines += [f"Data IDs: `{data_ids.hex(' ').upper()}`", ""]
     lines += [
@@ -115,7 +130,7 @@ def page() -> str:
     database = Database()
     database.add_dbc_file(DBC_PATH)
     head = INTRODUCTION.format(
-        comment=database.buses[0].comment,
+        comment=textwrap.fill(str(database.buses[0].comment), 100),
         version=load_catalogue().version,
         lost=MAX_LOST,
         resync=RESYNC_FRAMES,
