@@ -34,7 +34,7 @@ from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
-from utank_hil.tick import TICK_NS, TICK_S
+from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
 MILLISECOND_NS: Final = 1_000_000
@@ -145,8 +145,7 @@ class ControllerNode:
         sink: Callable[[FloatArray], None] | None = None,
         event_sink: EventSink | None = None,
     ) -> None:
-        sample_ticks = controller.sample_time_s / TICK_S
-        if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
+        if not is_whole_ticks(controller.sample_time_s):
             raise ValueError(
                 f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
                 f"{TICK_S} s; design the controller for a multiple of it"
@@ -174,7 +173,7 @@ class ControllerNode:
         self._seen = Observations()
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
-        self._samples = Schedule(round(sample_ticks) * TICK_NS)
+        self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
