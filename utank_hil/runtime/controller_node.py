@@ -13,8 +13,6 @@ from utank_hil.canbus import (
     Catalogue,
     ControllerStatus,
     ControlWord,
-    DriveFault,
-    DriveState,
     Fault,
     Frame,
     Mode,
@@ -29,7 +27,7 @@ from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
@@ -37,12 +35,6 @@ from utank_hil.runtime.supervisor import Demand, Supervisor
 from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
-MILLISECOND_NS: Final = 1_000_000
-LOAD_WINDOW_NS: Final = 100 * TICK_NS
-# an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
-MEAN_FRAME_BITS: Final = 143
-HEEL_TIME_CONSTANT_S: Final = 60.0
-HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
 DEGRADED_SHARE: Final = 0.5
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
@@ -50,9 +42,6 @@ FRESH_MS: Final = 50.0
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
-_DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
-_DRIVE_FAULT: Final = DriveState.FAULT
-_NO_DRIVE_FAULT: Final = DriveFault.NONE
 _CONTROL: Final = Demand.CONTROL
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
@@ -109,13 +98,13 @@ class ControllerNode:
     start_ns, last_ns : int
         Time of the first and of the last tick.
     inbox : Inbox
-        What was heard.
+        What was received.
+    seen : Observations
+        What the supervisor judges.
     supervisor : Supervisor
         As given.
     command_pa : float
         Pressure commanded.
-    bus_load : float
-        Share of the bus in use over the last second.
     statistics : LoopStatistics
         Of the loop; without any, in lockstep, all zero.
     law_error : str
@@ -170,24 +159,17 @@ class ControllerNode:
         )
         self._commands = catalogue.transmitter(PumpCommand)
         self._status = catalogue.transmitter(ControllerStatus)
-        self._seen = Observations()
+        self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
+        self.seen = self._observer.seen
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
-        self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._started = self._answered = False
         self.start_ns = self.last_ns = 0
-        self._late_history = 0
-        self._link_lost_ns: int | None = None
         self._observed_ns = 0
-        self._heel_rad = 0.0
-        self._arm_bit = self._reset_bit = True  # a bit that is set before we look is no edge
         self._frames_sent = 0
-        self._frames_counted = 0
-        self._load_since_ns = 0
-        self.bus_load = 0.0
         self._law_pa = 0.0
         self._law_failed = self._law_raised = False  # raised: until the operator resets
         self.law_error = ""
@@ -234,16 +216,16 @@ class ControllerNode:
 
     def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
         """Take note that the bus could not be read or written."""
-        self._link_lost_ns = now_ns
+        self._observer.link_error(now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
         if not self._started:
             self._started = True
-            self.start_ns = self.last_ns = self._load_since_ns = now_ns
+            self.start_ns = now_ns
         self._estimate()
         self._observe(now_ns)
-        self.supervisor.update(self._seen, now_ns)
+        self.supervisor.update(self.seen, now_ns)
         self._control(now_ns)
         self._limit()
         frames = self._encode(now_ns)
@@ -258,62 +240,17 @@ class ControllerNode:
         return [self._command_frame(ControlWord.QUICK_STOP)]
 
     def _estimate(self) -> None:
-        """Level and its rate, and the mean heel, from what was measured."""
+        """Level and its rate from what was measured."""
         inbox = self.inbox
         if inbox.tank_ns != self._observed_ns:
             self._level.update(inbox.level_m, inbox.pressure_pa)
             self._observed_ns = inbox.tank_ns
-        self._heel_rad += HEEL_SHARE * (inbox.roll_rad - self._heel_rad)
 
     def _observe(self, now_ns: int) -> None:
         """Ages, states and operator's edges, for the supervisor."""
-        inbox, seen = self.inbox, self._seen
-        late_ns = max(0, now_ns - self.last_ns - TICK_NS)
-        self._late_history = (self._late_history << 1 | (late_ns > 0)) & 0x3FF
-        seen.tick_late_ms = late_ns / MILLISECOND_NS
-        seen.overruns_in_ten = self._late_history.bit_count()
-        seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
-        seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
-        seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
-        seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
-        seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
-        seen.panel_age_ms = (now_ns - inbox.panel_ns) / MILLISECOND_NS
-        seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
-        seen.drive_fault = (
-            inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
-        )
-        # an error heals when a whole command cycle passed without one
-        seen.link_lost = (
-            self._link_lost_ns is not None
-            and now_ns - self._link_lost_ns <= self._commands.cycle_ns
-        )
-        seen.address_conflict = inbox.address_conflict
-        seen.versions_match = inbox.versions_match
-        seen.protection_valid = inbox.protection_valid
-        seen.high_level = inbox.high_level
-        seen.roll_rad = inbox.roll_rad
-        seen.heel_rad = self._heel_rad
-        if self._load_schedule.due(now_ns):
-            heard = inbox.frames + self._frames_sent
-            # at the first tick nothing but a backlog was heard
-            window_s = (now_ns - self._load_since_ns) * NANOSECONDS
-            bits = (heard - self._frames_counted) * MEAN_FRAME_BITS
-            if window_s > 0:
-                self.bus_load = bits / (self._settings.bit_rate * window_s)
-            self._load_since_ns = now_ns
-            self._frames_counted = heard
-        seen.bus_load = self.bus_load
-        seen.law_failed = self._law_failed
-        seen.command_pa = self.command_pa
-        order = inbox.operator
-        seen.requested_mode = inbox.requested_mode
-        seen.armed = order is not None and order.arm
-        seen.stop = order is not None and order.stop
-        seen.arm_edge = seen.armed and not self._arm_bit
-        reset = order is not None and order.reset
-        seen.reset_edge = reset and not self._reset_bit
-        if order is not None:
-            self._arm_bit, self._reset_bit = seen.armed, reset
+        seen = self.seen
+        self._observer.observe(now_ns, self._frames_sent)
+        seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         if seen.reset_edge:
             self._drive_sequence.request_reset()
 
@@ -344,7 +281,7 @@ class ControllerNode:
 
     def _start_anew(self) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""
-        seen, anew = self._seen, self._starts_anew
+        seen, anew = self.seen, self._starts_anew
         # in charge nothing but disarming and arming again brings back a law that has ended
         if anew and (seen.arm_edge or seen.reset_edge) and self.supervisor.mode is not _ACTIVE:
             anew.reset()
@@ -358,7 +295,7 @@ class ControllerNode:
         if self._answered:
             self._controller.applied(self._applied)
         if self._retuning is not None:
-            seen = self._seen
+            seen = self.seen
             self._retuning.update(
                 now_ns,
                 self.inbox.operator,
@@ -400,7 +337,7 @@ class ControllerNode:
                         degraded=supervisor.degraded,
                         saturated=self._limiter.limiting,
                         not_realtime=not self.statistics.real_time,
-                        bus_load=self.bus_load,
+                        bus_load=self.seen.bus_load,
                         catalogue_version=self._catalogue_version,
                         configuration_version=self._settings.configuration_version,
                         retuning=None if self._retuning is None else self._retuning.state,

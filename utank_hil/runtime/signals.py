@@ -14,7 +14,7 @@ _SOURCES: Final = {
     "pump_power_w": "inbox.power_w",
     "mode": "supervisor.mode",
     "fault": "fault",
-    "bus_load": "bus_load",
+    "bus_load": "seen.bus_load",
     "wakeup_lateness_s": "statistics.lateness.last_s",
     "tick_duration_s": "statistics.duration.last_s",
     "overruns": "statistics.overruns",

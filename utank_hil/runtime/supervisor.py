@@ -14,10 +14,8 @@ from typing import Final
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime import judging
 from utank_hil.runtime.faults import Condition, Reaction
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import MILLISECOND_NS, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
-
-MILLISECOND_NS: Final = 1_000_000
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
