@@ -52,7 +52,7 @@ EventSink = Callable[[RetuningEvent, int], None]
 
 @dataclass(frozen=True, slots=True)
 class ControllerSettings:
-    """What the controller node needs beside its law and its limits.
+    """Settings of the controller node beside its law and its limits.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class ControllerNode:
         self.statistics = statistics or LoopStatistics(real_time=True)
         self._sink = sink
         self._event_sink = event_sink
-        self._events_told = 0
+        self._events_sent = 0
         self.inbox = Inbox(catalogue, settings.configuration_version)
         self._catalogue_version = catalogue.version
         self._level = level
@@ -187,7 +187,7 @@ class ControllerNode:
 
     @property
     def fault(self) -> Fault:
-        """Fault of the supervisor, see there; if it has none, the limit on which the law ended."""
+        """Fault of the supervisor, or else that of the limit on which the law ended."""
         return self.supervisor.fault or self._law_fault
 
     @property
@@ -275,9 +275,9 @@ class ControllerNode:
         if self._law_failed:
             self._law_pa = 0.0
         if self._retuning is not None and self._event_sink is not None:
-            for event in self._retuning.events[self._events_told :]:
+            for event in self._retuning.events[self._events_sent :]:
                 self._event_sink(event, self.start_ns)
-                self._events_told += 1
+                self._events_sent += 1
 
     def _start_anew(self) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""

@@ -41,7 +41,7 @@ class Observations:
     arming_ms : float
         Time since arming was accepted; the supervisor counts it.
     drive_fault : bool
-        The drive's status tells of a fault.
+        The drive's status reports a fault.
     link_lost : bool
         The bus could not be read or written in the last command cycle.
     address_conflict : bool

@@ -2,8 +2,8 @@
 
 The pump pressure is non-zero only while armed by an operator, fed by fresh and plausible
 measurements and inside limits. Everything else ends at zero pressure, latched until an operator
-resets and arms again. Arming needs a *rising* edge of the arm bit that this very supervisor saw
-while ready, so neither a restart nor a fault is ever followed by pressure on its own.
+resets and arms again. Arming needs a *rising* edge of the arm bit that this supervisor saw while
+ready, so neither a restart nor a fault is ever followed by pressure on its own.
 
 What counts as a fault, and what it does, is the table in `utank_hil.runtime.faults`.
 """

@@ -1,8 +1,8 @@
 """How a telemetry column is shown: the unit people read, and the plot it belongs to.
 
 Columns carry SI values and name their unit (`roll_rad`); recordings hold what is plotted
-(`roll_deg`), because the viewer cannot convert. The suffix alone decides the unit and the plot, so
-a new column needs no line here.
+(`roll_deg`), because the viewer cannot convert. The suffix alone decides, so a column nobody has
+thought of yet finds its plot, its unit and its way back.
 """
 
 import math
