@@ -11,7 +11,6 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.controller import is_whole
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.parameters import ParameterError
@@ -25,7 +24,7 @@ from utank_hil.runtime.controller_node import (
 from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
-from utank_hil.tick import TICK_S
+from utank_hil.tick import TICK_S, is_whole_ticks
 
 if TYPE_CHECKING:
     from utank_hil.retuning.redesign import RetuningTask
@@ -94,7 +93,7 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
     if not finite:
         reason = "gives no finite law: a weight or a noise is too large or too small by far"
         raise ParameterError("", [("law", reason)])
-    if not is_whole(period_s / TICK_S):
+    if not is_whole_ticks(period_s):
         reason = f"has a sample time of {period_s:g} s, which is not a whole number of {TICK_S:g} s"
         raise ParameterError("", [("law", reason)])
     return law

@@ -24,6 +24,7 @@ from utank_hil.canbus import (
     Mode,
     NodeState,
     Quality,
+    RetuningState,
     SensorMotion,
     SensorPump,
 )
@@ -163,7 +164,10 @@ def test_drive_fault_is_reset_only_on_the_operators_order() -> None:
 
 
 def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
-    bench = ControllerBench(START_NS)
+    statistics = LoopStatistics(overruns=4)
+    statistics.lateness.add(2_000_000)
+    statistics.duration.add(300_000)
+    bench = ControllerBench(START_NS, statistics=statistics)
     bench.drive_at(LEVEL)
     bench.motion = SensorMotion(0.0123, -0.02, Quality.GOOD)
     bench.tank = bench.tank._replace(port_level_m=-0.25, starboard_level_m=0.5)
@@ -179,6 +183,9 @@ def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
     assert row["pump_power_w"] == pytest.approx(12e3)
     assert row["mode"] == Mode.ACTIVE
     assert row["fault"] == Fault.NONE
+    assert row["bus_load"] > 0
+    assert (row["wakeup_lateness_s"], row["tick_duration_s"]) == pytest.approx((2e-3, 3e-4))
+    assert (row["overruns"], row["retuning"]) == (4, RetuningState.IDLE)
     assert len(bench.rows) == round(bench.ms / 10)
     np.testing.assert_allclose(np.diff(bench.column("time_s")), 0.01, atol=1e-9)
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime.faults import FAULTS, Condition, Reaction
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import MILLISECOND_NS, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
-from utank_hil.runtime.supervisor import MILLISECOND_NS, Demand, Supervisor
+from utank_hil.runtime.supervisor import Demand, Supervisor
 from utank_hil.tick import TICK_NS
 
 HEALTHY = Observations(

@@ -19,7 +19,7 @@ from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
 from utank_hil.runtime.safety_limits import SafetyLimits
-from utank_hil.tick import TICK_S
+from utank_hil.tick import TICK_S, is_whole_ticks
 
 MOST_PULSES_S: Final = 3600.0
 """Longest identification: the pulses and the record are kept in memory."""
@@ -133,7 +133,7 @@ class ControllerConfig(Section):
 
     def _law_problems(self) -> list[Problem]:
         found = sample_time(self.law)
-        if found is None or is_whole(found[1] / TICK_S):
+        if found is None or is_whole_ticks(found[1]):
             return []
         name, period_s = found
         reason = f"must be a whole number of ticks of {TICK_S:g} s, got {period_s:g}"
@@ -144,8 +144,3 @@ class ControllerConfig(Section):
         """What the law is designed for."""
         vessel = self.vessel
         return DesignPlant(vessel.ship, vessel.tank, self.delay_s, vessel.pump.lag_s, self.limits)
-
-
-def is_whole(ticks: float) -> bool:
-    """Whether a time in ticks is a whole number of them, one or more."""
-    return round(ticks) >= 1 and abs(ticks - round(ticks)) <= 1e-6

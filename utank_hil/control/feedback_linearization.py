@@ -48,6 +48,7 @@ from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
+from utank_hil.tick import TICK_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +125,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
     _: KW_ONLY
     ship: RollShip
     tank: Tank
-    sample_time_s: SampleTime = 0.01
+    sample_time_s: SampleTime = TICK_S
     model: RollModel = field(init=False, repr=False, compare=False)
     _brake_pa_s_m: float = field(init=False, repr=False, compare=False)
 

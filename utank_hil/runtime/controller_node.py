@@ -13,8 +13,6 @@ from utank_hil.canbus import (
     Catalogue,
     ControllerStatus,
     ControlWord,
-    DriveFault,
-    DriveState,
     Fault,
     Frame,
     Mode,
@@ -29,20 +27,14 @@ from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
-from utank_hil.tick import TICK_NS, TICK_S
+from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
-MILLISECOND_NS: Final = 1_000_000
-LOAD_WINDOW_NS: Final = 100 * TICK_NS
-# an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
-MEAN_FRAME_BITS: Final = 143
-HEEL_TIME_CONSTANT_S: Final = 60.0
-HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
 DEGRADED_SHARE: Final = 0.5
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
@@ -50,9 +42,6 @@ FRESH_MS: Final = 50.0
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
-_DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
-_DRIVE_FAULT: Final = DriveState.FAULT
-_NO_DRIVE_FAULT: Final = DriveFault.NONE
 _CONTROL: Final = Demand.CONTROL
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
@@ -63,7 +52,7 @@ EventSink = Callable[[RetuningEvent, int], None]
 
 @dataclass(frozen=True, slots=True)
 class ControllerSettings:
-    """What the controller node needs beside its law and its limits.
+    """Settings of the controller node beside its law and its limits.
 
     Attributes
     ----------
@@ -106,8 +95,18 @@ class ControllerNode:
 
     Attributes
     ----------
-    start_ns : int
-        Time of the first tick.
+    start_ns, last_ns : int
+        Time of the first and of the last tick.
+    inbox : Inbox
+        What was received.
+    seen : Observations
+        What the supervisor judges.
+    supervisor : Supervisor
+        As given.
+    command_pa : float
+        Pressure commanded.
+    statistics : LoopStatistics
+        Of the loop; without any, in lockstep, all zero.
     law_error : str
         The first exception that the law raised; empty if there was none.
 
@@ -135,8 +134,7 @@ class ControllerNode:
         sink: Callable[[FloatArray], None] | None = None,
         event_sink: EventSink | None = None,
     ) -> None:
-        sample_ticks = controller.sample_time_s / TICK_S
-        if round(sample_ticks) < 1 or abs(sample_ticks - round(sample_ticks)) > 1e-6:
+        if not is_whole_ticks(controller.sample_time_s):
             raise ValueError(
                 f"sample time {controller.sample_time_s} s is not a whole number of ticks of "
                 f"{TICK_S} s; design the controller for a multiple of it"
@@ -146,13 +144,13 @@ class ControllerNode:
         self._retuning = retuning
         self._measure = measure
         self._limiter = limiter
-        self._supervisor = supervisor
+        self.supervisor = supervisor
         self._settings = settings
-        self._statistics = statistics
+        self.statistics = statistics or LoopStatistics(real_time=True)
         self._sink = sink
         self._event_sink = event_sink
-        self._events_told = 0
-        self._inbox = Inbox(catalogue, settings.configuration_version)
+        self._events_sent = 0
+        self.inbox = Inbox(catalogue, settings.configuration_version)
         self._catalogue_version = catalogue.version
         self._level = level
         self._drive_sequence = DriveSequence()
@@ -161,39 +159,36 @@ class ControllerNode:
         )
         self._commands = catalogue.transmitter(PumpCommand)
         self._status = catalogue.transmitter(ControllerStatus)
-        self._seen = Observations()
+        self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
+        self.seen = self._observer.seen
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(1)
-        self._samples = Schedule(round(sample_ticks) * TICK_NS)
+        self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
-        self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._started = self._answered = False
-        self.start_ns = 0
-        self._last_ns = 0
-        self._late_history = 0
-        self._link_lost_ns: int | None = None
+        self.start_ns = self.last_ns = 0
         self._observed_ns = 0
-        self._heel_rad = 0.0
-        self._arm_bit = self._reset_bit = True  # a bit that is set before we look is no edge
         self._frames_sent = 0
-        self._frames_counted = 0
-        self._load_since_ns = 0
-        self._bus_load = 0.0
         self._law_pa = 0.0
         self._law_failed = self._law_raised = False  # raised: until the operator resets
         self.law_error = ""
-        self._command_pa = 0.0
+        self.command_pa = 0.0
+
+    @property
+    def time_s(self) -> float:
+        """Time from the first tick to the last."""
+        return (self.last_ns - self.start_ns) * NANOSECONDS
 
     @property
     def mode(self) -> Mode:
         """Mode of the supervisor."""
-        return self._supervisor.mode
+        return self.supervisor.mode
 
     @property
     def fault(self) -> Fault:
-        """Fault of the supervisor, see there; if it has none, the limit on which the law ended."""
-        return self._supervisor.fault or self._law_fault
+        """Fault of the supervisor, or else that of the limit on which the law ended."""
+        return self.supervisor.fault or self._law_fault
 
     @property
     def fallbacks(self) -> int | None:
@@ -206,96 +201,56 @@ class ControllerNode:
         return _FAULT_OF_LIMIT.get(law.passed_limit, _NO_FAULT) if law else _NO_FAULT
 
     @property
+    def retuning_state(self) -> RetuningState:
+        """Where retuning stands; IDLE without it."""
+        return RetuningState.IDLE if self._retuning is None else self._retuning.state
+
+    @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:
         """What was done so far to retune the controller."""
         return () if self._retuning is None else tuple(self._retuning.events)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
-        self._inbox.receive(frame, now_ns)
+        self.inbox.receive(frame, now_ns)
 
     def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
         """Take note that the bus could not be read or written."""
-        self._link_lost_ns = now_ns
+        self._observer.link_error(now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Do one tick: the way of a sample from measurement to pump command, top to bottom."""
         if not self._started:
             self._started = True
-            self.start_ns = self._last_ns = self._load_since_ns = now_ns
+            self.start_ns = now_ns
         self._estimate()
         self._observe(now_ns)
-        self._supervisor.update(self._seen, now_ns)
+        self.supervisor.update(self.seen, now_ns)
         self._control(now_ns)
         self._limit()
         frames = self._encode(now_ns)
-        self._show(now_ns)
-        self._last_ns = now_ns
+        self.last_ns = now_ns
+        self._show()
         self._frames_sent += len(frames)
         return frames
 
     def stop(self, now_ns: int) -> Iterable[Frame]:  # noqa: ARG002
         """Leave the pump at zero: the last command before the node goes."""
-        self._command_pa = 0.0
+        self.command_pa = 0.0
         return [self._command_frame(ControlWord.QUICK_STOP)]
 
     def _estimate(self) -> None:
-        """Level and its rate, and the mean heel, from what was measured."""
-        inbox = self._inbox
+        """Level and its rate from what was measured."""
+        inbox = self.inbox
         if inbox.tank_ns != self._observed_ns:
             self._level.update(inbox.level_m, inbox.pressure_pa)
             self._observed_ns = inbox.tank_ns
-        self._heel_rad += HEEL_SHARE * (inbox.roll_rad - self._heel_rad)
 
     def _observe(self, now_ns: int) -> None:
         """Ages, states and operator's edges, for the supervisor."""
-        inbox, seen = self._inbox, self._seen
-        late_ns = max(0, now_ns - self._last_ns - TICK_NS)
-        self._late_history = (self._late_history << 1 | (late_ns > 0)) & 0x3FF
-        seen.tick_late_ms = late_ns / MILLISECOND_NS
-        seen.overruns_in_ten = self._late_history.bit_count()
-        seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
-        seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
-        seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
-        seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
-        seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
-        seen.panel_age_ms = (now_ns - inbox.panel_ns) / MILLISECOND_NS
-        seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
-        seen.drive_fault = (
-            inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
-        )
-        # an error heals when a whole command cycle passed without one
-        seen.link_lost = (
-            self._link_lost_ns is not None
-            and now_ns - self._link_lost_ns <= self._commands.cycle_ns
-        )
-        seen.address_conflict = inbox.address_conflict
-        seen.versions_match = inbox.versions_match
-        seen.protection_valid = inbox.protection_valid
-        seen.high_level = inbox.high_level
-        seen.roll_rad = inbox.roll_rad
-        seen.heel_rad = self._heel_rad
-        if self._load_schedule.due(now_ns):
-            heard = inbox.frames + self._frames_sent
-            # at the first tick nothing but a backlog was heard
-            window_s = (now_ns - self._load_since_ns) * NANOSECONDS
-            bits = (heard - self._frames_counted) * MEAN_FRAME_BITS
-            if window_s > 0:
-                self._bus_load = bits / (self._settings.bit_rate * window_s)
-            self._load_since_ns = now_ns
-            self._frames_counted = heard
-        seen.bus_load = self._bus_load
-        seen.law_failed = self._law_failed
-        seen.command_pa = self._command_pa
-        order = inbox.operator
-        seen.requested_mode = inbox.requested_mode
-        seen.armed = order is not None and order.arm
-        seen.stop = order is not None and order.stop
-        seen.arm_edge = seen.armed and not self._arm_bit
-        reset = order is not None and order.reset
-        seen.reset_edge = reset and not self._reset_bit
-        if order is not None:
-            self._arm_bit, self._reset_bit = seen.armed, reset
+        seen = self.seen
+        self._observer.observe(now_ns, self._frames_sent)
+        seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         if seen.reset_edge:
             self._drive_sequence.request_reset()
 
@@ -320,15 +275,15 @@ class ControllerNode:
         if self._law_failed:
             self._law_pa = 0.0
         if self._retuning is not None and self._event_sink is not None:
-            for event in self._retuning.events[self._events_told :]:
+            for event in self._retuning.events[self._events_sent :]:
                 self._event_sink(event, self.start_ns)
-                self._events_told += 1
+                self._events_sent += 1
 
     def _start_anew(self) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""
-        seen, anew = self._seen, self._starts_anew
+        seen, anew = self.seen, self._starts_anew
         # in charge nothing but disarming and arming again brings back a law that has ended
-        if anew and (seen.arm_edge or seen.reset_edge) and self._supervisor.mode is not _ACTIVE:
+        if anew and (seen.arm_edge or seen.reset_edge) and self.supervisor.mode is not _ACTIVE:
             anew.reset()
         if self._law_raised and seen.reset_edge:
             self._law_raised = False
@@ -340,35 +295,35 @@ class ControllerNode:
         if self._answered:
             self._controller.applied(self._applied)
         if self._retuning is not None:
-            seen = self._seen
+            seen = self.seen
             self._retuning.update(
                 now_ns,
-                self._inbox.operator,
-                engaged=self._supervisor.demand is Demand.CONTROL,
+                self.inbox.operator,
+                engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )
         self._answered = True
-        return float(self._controller.step(self._measure(self._inbox, self._level))[0])
+        return float(self._controller.step(self._measure(self.inbox, self._level))[0])
 
     def _limit(self) -> None:
         """Turn the law's pressure, or zero, into a permitted one."""
-        demand, limiter, level = self._supervisor.demand, self._limiter, self._level
+        demand, limiter, level = self.supervisor.demand, self._limiter, self._level
         if demand is _CONTROL:
-            share = DEGRADED_SHARE if self._supervisor.degraded else 1.0
-            self._command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
+            share = DEGRADED_SHARE if self.supervisor.degraded else 1.0
+            self.command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
         elif demand is Demand.RAMP:
-            self._command_pa = limiter.ramp_to_zero()
+            self.command_pa = limiter.ramp_to_zero()
         else:
-            self._command_pa = limiter.cut()
+            self.command_pa = limiter.cut()
 
     def _encode(self, now_ns: int) -> list[Frame]:
         """Protected frames for what is due."""
-        supervisor, statistics = self._supervisor, self._statistics
+        supervisor = self.supervisor
         # first, because an address is claimed before anything is said from it
         frames = self._housekeeping.frames(now_ns, faulted=supervisor.mode is _FAULT)
         if self._command_schedule.due(now_ns):
             word = self._drive_sequence.next_word(
-                self._inbox.drive_state, wanted=supervisor.drive_wanted
+                self.inbox.drive_state, wanted=supervisor.drive_wanted
             )
             frames.append(self._command_frame(word))
         if self._status_schedule.due(now_ns):
@@ -381,8 +336,8 @@ class ControllerNode:
                         alarm=supervisor.mode is _FAULT or bool(self._law_fault),
                         degraded=supervisor.degraded,
                         saturated=self._limiter.limiting,
-                        not_realtime=statistics is not None and not statistics.real_time,
-                        bus_load=self._bus_load,
+                        not_realtime=not self.statistics.real_time,
+                        bus_load=self.seen.bus_load,
                         catalogue_version=self._catalogue_version,
                         configuration_version=self._settings.configuration_version,
                         retuning=None if self._retuning is None else self._retuning.state,
@@ -393,34 +348,11 @@ class ControllerNode:
 
     def _command_frame(self, word: ControlWord) -> Frame:
         return self._commands.frame(
-            PumpCommand(self._command_pa, word, self._settings.command_timeout_s)
+            PumpCommand(self.command_pa, word, self._settings.command_timeout_s)
         )
 
-    def _show(self, now_ns: int) -> None:
+    def _show(self) -> None:
         """Hand one telemetry row to the sink."""
-        if self._sink is None:
-            return
-        inbox, statistics = self._inbox, self._statistics
-        lateness_s = duration_s = overruns = 0.0
-        if statistics is not None:
-            lateness_s = statistics.lateness.last_ns * NANOSECONDS
-            duration_s = statistics.duration.last_ns * NANOSECONDS
-            overruns = statistics.overruns
-        self._row[:] = (
-            (now_ns - self.start_ns) * NANOSECONDS,
-            inbox.roll_rad,
-            inbox.roll_rate_rad_s,
-            inbox.port_level_m,
-            inbox.starboard_level_m,
-            self._command_pa,
-            inbox.pressure_pa,
-            inbox.power_w,
-            self._supervisor.mode,
-            self.fault,
-            self._bus_load,
-            lateness_s,
-            duration_s,
-            overruns,
-            RetuningState.IDLE if self._retuning is None else self._retuning.state,
-        )
-        self._sink(self._row)
+        if self._sink is not None:
+            self._row[:] = values_of(self)
+            self._sink(self._row)

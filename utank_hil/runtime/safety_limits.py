@@ -19,16 +19,16 @@ class SafetyLimits:
     The defaults are those of `docs/safety.md`. A ship or a machine may need others, but none at
     which a protection is as good as switched off:
 
-    * Messages, the drive and the loop itself may be away for 1 s at most, the longest that the
-      table lets any sensor be silent under pressure: a tenth of the roll of a ship like the first.
-    * The operator's panel while armed, and a drive that is being enabled, get 10 s at most: a roll
-      period, for which an operator may find his stop unheard, or his arming come late.
+    * Messages and the drive may be silent, and a tick late, for 1 s at most: the longest silence of
+      a sensor under pressure in the table, a tenth of the roll period of a ship like the first.
+    * The panel while armed, and a drive that is being enabled, get 10 s at most: a roll period, in
+      which a stop may not be received, or an arming take effect late.
     * Roll 0.7 rad at most: 40 degrees, to which the IS Code 2008 (part A, 2.2.1) counts a ship's
       righting levers. Heel 0.28 rad at most: 16 degrees, which it lets a steady wind cause (2.3.1).
     * Bus load 0.85 at most: it is counted in mean frames of 143 bits, of which a bus that is full
       of the longest, 160 bits, shows 0.89.
-    * Late ticks 10 of ten at most. They may be left to the limit of a single one and the drive's
-      own timeout (None), for a bench under a kernel that keeps no time: `run` tells of it.
+    * Late ticks 10 of ten at most. None leaves them to the limit of a single one and to the drive's
+      own timeout, for a bench in an emulated kernel; `run` reports it.
 
     Attributes
     ----------

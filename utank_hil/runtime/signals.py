@@ -1,21 +1,32 @@
-"""The columns of one telemetry row: what the controller node shows of itself every tick."""
+"""The telemetry signals: what the controller node shows of itself every tick."""
 
+from operator import attrgetter
 from typing import Final
 
-SIGNALS: Final = (
-    "time_s",
-    "roll_rad",
-    "roll_rate_rad_s",
-    "port_level_m",
-    "starboard_level_m",
-    "pressure_command_pa",
-    "pressure_actual_pa",
-    "pump_power_w",
-    "mode",
-    "fault",
-    "bus_load",
-    "wakeup_lateness_s",
-    "tick_duration_s",
-    "overruns",
-    "retuning",
-)
+_SOURCES: Final = {
+    "time_s": "time_s",
+    "roll_rad": "inbox.roll_rad",
+    "roll_rate_rad_s": "inbox.roll_rate_rad_s",
+    "port_level_m": "inbox.port_level_m",
+    "starboard_level_m": "inbox.starboard_level_m",
+    "pressure_command_pa": "command_pa",
+    "pressure_actual_pa": "inbox.pressure_pa",
+    "pump_power_w": "inbox.power_w",
+    "mode": "supervisor.mode",
+    "fault": "fault",
+    "bus_load": "seen.bus_load",
+    "wakeup_lateness_s": "statistics.lateness.last_s",
+    "tick_duration_s": "statistics.duration.last_s",
+    "overruns": "statistics.overruns",
+    "retuning": "retuning_state",
+}
+"""Each signal in SI units, its unit in its name, and the attribute of `ControllerNode` it shows.
+
+A new signal is one line here. Its unit gives it its plot, see `utank_hil.telemetry.units`.
+"""
+
+SIGNALS: Final = tuple(_SOURCES)
+"""Columns of a telemetry row."""
+
+values_of: Final = attrgetter(*_SOURCES.values())
+"""Values of a node's signals, in the order of `SIGNALS`."""

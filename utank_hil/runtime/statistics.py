@@ -50,6 +50,11 @@ class Histogram:
         self.last_ns = 0
         self.max_ns = 0
 
+    @property
+    def last_s(self) -> float:
+        """The latest duration in seconds."""
+        return self.last_ns * 1e-9
+
     def add(self, value_ns: int) -> None:
         """Count one duration, 0 ns or more."""
         self.counts[_bin_of(value_ns)] += 1

@@ -2,8 +2,8 @@
 
 The pump pressure is non-zero only while armed by an operator, fed by fresh and plausible
 measurements and inside limits. Everything else ends at zero pressure, latched until an operator
-resets and arms again. Arming needs a *rising* edge of the arm bit that this very supervisor saw
-while ready, so neither a restart nor a fault is ever followed by pressure on its own.
+resets and arms again. Arming needs a *rising* edge of the arm bit that this supervisor saw while
+ready, so neither a restart nor a fault is ever followed by pressure on its own.
 
 What counts as a fault, and what it does, is the table in `utank_hil.runtime.faults`.
 """
@@ -14,10 +14,8 @@ from typing import Final
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime import judging
 from utank_hil.runtime.faults import Condition, Reaction
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import MILLISECOND_NS, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
-
-MILLISECOND_NS: Final = 1_000_000
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE

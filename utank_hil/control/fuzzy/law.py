@@ -27,6 +27,7 @@ from utank_hil.parameters import (
     range_problems,
     refuse,
 )
+from utank_hil.tick import TICK_S
 
 _OBEYED = 0.9  # part of a command that must have left for the law to learn from what followed
 _REACH = 2.0  # the inputs are held within so many times their ranges
@@ -59,7 +60,7 @@ class FuzzyLaw(ABC):
     gain_rad_s2_pa: Positive
     _: KW_ONLY
     brake_pa_s_m: NotNegative = 0.0
-    sample_time_s: SampleTime = 0.01
+    sample_time_s: SampleTime = TICK_S
 
     def __post_init__(self) -> None:
         refuse("fuzzy law", self._problems())
