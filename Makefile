@@ -4,6 +4,7 @@ PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 # a worker on each core; a file's tests stay together, for their fixtures
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
+ON_VCAN := tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence"
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -11,20 +12,23 @@ COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 
 
 # the matrices here are small: threads of the linear-algebra library only get in each other's way
 export OPENBLAS_NUM_THREADS := 1
+# bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup bench test test-fast test-quiet search check format benchmark peers docs lock clean
+.PHONY: help setup bench test test-retuning test-bus test-fast evidence search check format benchmark peers docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
-	@echo "make test       lint, types and all tests, those on a real CAN bus included"
-	@echo "make test-fast  the tests that take seconds, without CAN"
-	@echo "make test-quiet retuning of order 200 from 500 s on a real CAN bus; 12 min, an idle machine"
+	@echo "make test       lint, types and the tests, those on a real CAN bus included: ten minutes"
+	@echo "make test-fast  the quick tests, without CAN: half a minute"
+	@echo "make evidence   what takes longer, where its result is missing or out of date: hours at first;"
+	@echo "                $(PYTHON) -m tools.evidence --list shows the parts, --part runs one"
 	@echo "make search     the property tests with new random examples, until one fails or they end"
 	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
 	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
-	@echo "make docs       write the generated documents anew"
+	@echo "make docs       write the generated documents and tables anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
 
@@ -47,23 +51,30 @@ check: setup
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
-	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents peers studies thesis)
+	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence peers studies thesis)
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
 test: check
-	$(PARALLEL) -m "not socketcan"
-	tools/vcan $(VENV)/bin/pytest -m "socketcan and not quiet_machine" tests/socketcan
+	$(PARALLEL) -m "not socketcan and not evidence"
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-retuning test-bus
 
-test-quiet: setup
-	tools/vcan $(VENV)/bin/pytest -m quiet_machine tests/socketcan
+# they mostly wait, each in a kernel of its own on a core of its own
+test-retuning:
+	$(ON_VCAN) tests/socketcan/test_retuning.py
+
+test-bus:
+	$(ON_VCAN) tests/socketcan --ignore=tests/socketcan/test_retuning.py
 
 test-fast: setup
-	$(PARALLEL) -m "not socketcan and not slow"
+	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few
+
+evidence: setup peers
+	$(PYTHON) -m tools.evidence
 
 # in `make test` they draw the same examples each time
 search: setup
-	$(PARALLEL) -m "not socketcan" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
+	$(PARALLEL) -m "not socketcan and not evidence" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
 
 format: setup
 	$(VENV)/bin/ruff check --fix .

@@ -164,6 +164,7 @@ def test_controller_without_margins_does_not_run(tmp_path: Path) -> None:
     assert "misses its margins" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("application", "arguments"),
     [
@@ -238,6 +239,7 @@ def wait_for_workers(process: subprocess.Popen[str], cpu_s: float) -> None:
             used_s = max(used_s, ticks / os.sysconf("SC_CLK_TCK"))
 
 
+@pytest.mark.slow
 def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     tmp_path: Path,
 ) -> None:
@@ -271,6 +273,7 @@ def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
     assert not list((tmp_path / "out").iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["file", "/proc/nowhere", "taken"])
 def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, place: str) -> None:
     (tmp_path / "file").write_text("mine")
@@ -284,6 +287,7 @@ def test_bench_that_could_not_write_its_results_does_not_begin(tmp_path: Path, p
     assert (tmp_path / "file").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

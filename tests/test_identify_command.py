@@ -16,6 +16,8 @@ from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import random_pulses
 from utank_hil.telemetry import write_recording
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
 COLUMNS = ("time_s", "roll_rad", "port_level_m", "starboard_level_m", "pressure_command_pa")
 

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim")
 
 COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.panel"

@@ -47,6 +47,7 @@ def by_cantools(dbc, message, data):
     return dbc.encode(values, strict=False)
 
 
+@pytest.mark.slow
 @EVERY_MESSAGE
 @settings(max_examples=50)
 @given(st.data())
@@ -90,6 +91,7 @@ def test_decode_equals_cantools_on_random_bytes(case, data):
     assert same(codec.decode(frame), expected)
 
 
+@pytest.mark.slow
 @EVERY_MESSAGE
 @settings(max_examples=50)
 @given(st.data())
@@ -108,6 +110,7 @@ def test_decode_gives_back_what_was_encoded_to_half_a_step(case, data):
     assert same(codec.decode(codec.encode(back, 2)), back)
 
 
+@pytest.mark.slow
 @EVERY_MESSAGE
 @settings(max_examples=50)
 @given(st.data())

@@ -17,6 +17,8 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import ModelSummary, RetuningEvent
 from utank_hil.telemetry import EventReader, RingError
 
+pytestmark = pytest.mark.slow
+
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
 FOUND = ModelSummary(9.0, 0.01, 1.8e9, 8.8e8, 5e7, 0.12, 0.99, 1.4, 0.3)
 SECOND_NS = 1_000_000_000

@@ -195,6 +195,7 @@ def test_ship_is_recognised_and_shown_in_numbers() -> None:
         assert word in text
 
 
+@pytest.mark.slow
 def test_scenario_is_recognised_and_shown_with_the_margins_of_all_its_controllers(
     tmp_path: Path,
 ) -> None:
@@ -251,6 +252,7 @@ def test_file_of_no_kind_is_told_what_each_kind_has(tmp_path: Path, text: str) -
         assert word in reason
 
 
+@pytest.mark.slow
 def test_limitless_margins_say_how_far_they_were_searched() -> None:
     path = CONFIGS / "controllers" / "gpc.yaml"
     text = invoke("check", path).stdout
@@ -357,6 +359,7 @@ def test_nonlinear_law_that_is_unstable_at_rest_is_refused_unless_the_file_accep
     assert "accepted by the configuration" in accepted.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("weight", "hardly"), [(1e-6, True), (1.23e12, False)])
 def test_law_that_hardly_acts_is_told_so(tmp_path: Path, weight: float, hardly: bool) -> None:
     text = invoke("check", controller(tmp_path, "gpc", law__output_weight=[weight])).stdout

@@ -50,6 +50,7 @@ class Instant:
         return RecorderReport(rows=5, lost=2)
 
 
+@pytest.mark.slow
 def test_every_row_is_in_a_file_named_by_the_time(tmp_path: Path) -> None:
     summary = record(tmp_path / "new" / "folder", 30)
     assert summary.file is not None

@@ -75,6 +75,7 @@ def test_missing_file_is_a_problem_even_where_nothing_is_required(tmp_path: Path
     assert key == "ship"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "key", "reason"),
     [

@@ -53,6 +53,7 @@ def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> 
     assert naval.sensors.high_level_m < naval.vessel.tank.level_limit_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda p: p.stem)
 def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path) -> None:
     config = load_config(path, ControllerConfig)

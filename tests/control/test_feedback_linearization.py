@@ -95,6 +95,7 @@ def test_zero_dynamics_swing_with_the_frequency_of_4_10_and_do_not_decay(ship, t
     np.testing.assert_allclose(x[:, 2], 0.4 * np.cos(frequency * times), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_zero_dynamics_of_the_shifted_output_decay():
     law = law_of(shift_rad_m=1.0, shift_length_m=5.0)
     # on s = s' = 0 at a small level
@@ -107,6 +108,7 @@ def test_zero_dynamics_of_the_shifted_output_decay():
     assert decay * 150 > 0.1
 
 
+@pytest.mark.slow
 def test_printed_output_without_a_shift_is_driven_to_the_limits_where_blending_holds_the_level():
     # a wave at the frequency of the undamped zero dynamics makes the level grow for ever
     law = law_of(damping_ratio=0.5)

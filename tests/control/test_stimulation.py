@@ -59,6 +59,7 @@ def test_ship_rolls_with_the_wanted_amplitude_and_period():
     assert np.abs(pressure).max() <= 50e3
 
 
+@pytest.mark.slow
 def test_a_ship_of_other_stiffness_and_damping_is_brought_to_the_wanted_amplitude():
     other = replace(SHIP, damping_nms_rad=3 * SHIP.damping_nms_rad, stiffness_nm_rad=4.5e8)
     time, roll, *_ = record(PLAN.controller(), RollModel(other, TANK), 1200.0)
@@ -171,6 +172,7 @@ class SharingLimiter(CommandLimiter):
         return super().limit(desired_pa, level_m, level_rate_m_s, share)
 
 
+@pytest.mark.slow
 def test_correction_does_not_wind_up_while_pressure_is_cut():
     limits = PumpLimits(pressure_pa=14e3)
     controller = PLAN.controller()
@@ -185,6 +187,7 @@ def test_correction_does_not_wind_up_while_pressure_is_cut():
     assert amplitude(time, roll, 1450) == pytest.approx(math.radians(3.0), rel=0.03)
 
 
+@pytest.mark.slow
 def test_correction_does_not_wind_up_at_the_plan_s_own_pressure_but_may_fall_there():
     plan = replace(PLAN, pressure_pa=14e3)
     heavy = replace(SHIP, damping_nms_rad=5 * SHIP.damping_nms_rad)

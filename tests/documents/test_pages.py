@@ -109,7 +109,8 @@ def test_files_and_names_on_a_page_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     made = {block.file for block in blocks(text)}
     paths = re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|dbc|md|toml|yaml))`", text)
-    paths += [name.replace(".", "/") + ".py" for name in re.findall(r"-m (tools\.[\w.]+)", text)]
+    modules = [name.replace(".", "/") for name in re.findall(r"-m (tools\.[\w.]+)", text)]
+    paths += [f"{name}{'/__main__' if (ROOT / name).is_dir() else ''}.py" for name in modules]
     assert [path for path in paths if not (path in made or found(path))] == []
     tests = re.findall(r"`(test_\w+\.py)`", text)
     assert [name for name in tests if not list((ROOT / "tests").rglob(name))] == []

@@ -1,30 +1,27 @@
 """The symbolic derivation, the errata's table and `tank_wrench` say the same."""
 
-import importlib.util
-import subprocess
-import sys
+import json
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-SCRIPT = ROOT / "tools" / "derive_tank_forces.py"
+from tools.thesis.derive_tank_forces import derive, errata, worst_difference
+
+pytestmark = pytest.mark.slow
+
+ROWS = Path("docs/evidence/thesis_derivation.json")
 
 
-@pytest.mark.slow
-def test_errata_hold_every_term_that_the_derivation_finds():
-    done = subprocess.run(
-        [sys.executable, SCRIPT, "--errata"], capture_output=True, text=True, check=True
-    )
-    rows = done.stdout.splitlines()
+@pytest.fixture(scope="module")
+def derivation():
+    return derive()
+
+
+def test_errata_are_the_terms_that_the_derivation_finds(derivation):
+    rows = errata(*derivation)
     assert len(rows) > 40
-    errata = (ROOT / "docs" / "errata.md").read_text().splitlines()
-    assert [row for row in rows if row not in errata] == []
+    assert rows == json.loads(ROWS.read_text())["result"]["errata"]
 
 
-@pytest.mark.slow
-def test_derivation_agrees_with_tank_wrench():
-    spec = importlib.util.spec_from_file_location("derive_tank_forces", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    assert module.worst_difference(*module.derive(), states=50) < 1e-12
+def test_derivation_agrees_with_tank_wrench(derivation):
+    assert worst_difference(*derivation, states=50) < 1e-12

@@ -39,6 +39,7 @@ def worst_drift(ship, tank, start, duration_s):
     return np.ptp(values) / (values[0] - energy(ship, tank, REST)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_energy_is_constant_at_large_angles(name):
     ship, tank = PAIRS[name]
@@ -46,7 +47,7 @@ def test_energy_is_constant_at_large_angles(name):
         assert worst_drift(ship, tank, start, 50.0) < 1e-10
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("name", PAIRS)
 def test_energy_is_constant_to_1e_9_over_1000_s(name):
     ship, tank = PAIRS[name]

@@ -236,6 +236,7 @@ def test_small_pump_at_its_torque_limit_stays_steady_at_the_longest_step():
     assert torque == pytest.approx(weak.max_torque_nm, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_work_of_the_shaft_goes_into_water_losses_and_the_rotor():
     step_s = 1e-4
 
@@ -280,6 +281,7 @@ def test_coasting_rotor_adds_the_inertia_of_its_gear_ratio_to_the_water():
     assert 0.8 * expected < in_phase / weight < expected
 
 
+@pytest.mark.slow
 def test_compiled_pump_does_the_same():
     step, coast = compile_pump(numba.njit)
     rng = np.random.default_rng(5)

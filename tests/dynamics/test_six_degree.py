@@ -15,6 +15,8 @@ from utank_hil.dynamics import (
 )
 from utank_hil.dynamics.kinematics import body_to_earth, euler_rates
 
+pytestmark = pytest.mark.slow
+
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lx_m=-12.0, lz_m=1.83)
 ROLL = replace(LEVERS, offset_moment_nm=1e6, wind_moment_nm=5e5)
 ADDED = np.diag([2e5, 4e6, 6e6, 3e8, 5e9, 4e9])

@@ -147,6 +147,7 @@ FAULTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("victim", "failure", "fault", "within_ns"),
     FAULTS,
@@ -263,6 +264,7 @@ def test_same_seed_same_trace_with_a_fault_in_it() -> None:
     assert traces[0] == traces[1]
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
 def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
@@ -296,6 +298,7 @@ failures = st.lists(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(script=scripts, failures=failures, seed=st.integers(0, 100))
 def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:

@@ -24,6 +24,8 @@ from utank_hil.runtime import Lockstep
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import Action, TimedAction
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = RetuningSettings(
     (6.0, 20.0), identification_s=20.0, answer_within_s=5.0, trial_s=60.0, pulse_pa=10e3
 )

@@ -14,6 +14,8 @@ from firmware_sim.scenario import Scenario
 from utank_hil.canbus import RetuningState
 from utank_hil.configuration import load_config
 
+pytestmark = pytest.mark.slow
+
 SCENARIOS = Path("configs/scenarios")
 IDENTIFY, DESIGN, TRIAL, RETUNED = list(RetuningState)[1:5]
 
@@ -39,8 +41,9 @@ def cached_run_of(name: str, controller: str) -> Run:
     return run_of(name, controller)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("controller", ["dpc", "dpc-roll", "gpc-roll"])
+@pytest.mark.parametrize(
+    "controller", ["dpc", pytest.param("dpc-roll", marks=pytest.mark.evidence), "gpc-roll"]
+)
 def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controller: str) -> None:
     run = cached_run_of("adaptive.yaml", controller)
     assert [event.state for event in run.retuning] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
@@ -54,7 +57,7 @@ def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controlle
     assert run.refused_commands == 0
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_heeled_by_the_wind_and_measured_askew_she_is_retuned_all_the_same() -> None:
     loaded = scenario("adaptive.yaml")
     heeled = loaded.model_copy(
@@ -82,7 +85,6 @@ def test_heeled_by_the_wind_and_measured_askew_she_is_retuned_all_the_same() -> 
     assert roll[last].std() == pytest.approx(upright.column("true_roll_rad")[last].std(), rel=0.1)
 
 
-@pytest.mark.slow
 def test_swap_makes_no_larger_steps_than_the_rate_limit_lets() -> None:
     run = cached_run_of("adaptive.yaml", "dpc")
     rate = scenario("adaptive.yaml").controllers["dpc"].limits.rate_pa_s
@@ -96,14 +98,14 @@ def test_swap_makes_no_larger_steps_than_the_rate_limit_lets() -> None:
     assert slope.max() <= before.max() * (1 + 1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_retuning_in_lockstep_is_the_same_bit_for_bit() -> None:
     first, second = cached_run_of("adaptive.yaml", "gpc-roll"), run_of("adaptive.yaml", "gpc-roll")
     assert first.retuning == second.retuning
     assert np.array_equal(first.rows, second.rows, equal_nan=True)
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_load_change_in_a_storm_is_noticed_and_retuned_for() -> None:
     run = cached_run_of("load_change.yaml", "gpc")
     changed_ns = scenario("load_change.yaml").actual_from_s * 1e9

@@ -21,6 +21,8 @@ from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
 from utank_hil.telemetry import read_recording
 
+pytestmark = pytest.mark.slow
+
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 DURATION_S = 120.0
 SETTLE_S = 40.0

@@ -9,6 +9,8 @@ from typer.testing import CliRunner
 from utank_hil.analysis.loop import trade
 from utank_hil.cli import app
 
+pytestmark = pytest.mark.slow
+
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 GPC = CONFIGS / "controllers" / "gpc.yaml"
 

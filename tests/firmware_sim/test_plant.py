@@ -76,6 +76,7 @@ class ExactShip:
         self.x = self._step @ self.x
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("enabled", [True, False])
 def test_plant_equals_a_matrix_exponential_with_the_same_moment_and_pump(enabled: bool) -> None:
     plant, exact = plant_in(SWELL), ExactShip(SWELL)
@@ -170,6 +171,7 @@ def test_with_the_motor_off_and_no_wave_energy_never_grows() -> None:
     assert plant.pump_energy_j > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after_s", [0.0, 2.0])
 def test_wind_and_cargo_heel_the_ship_and_the_water_runs_to_the_low_side(after_s: float) -> None:
     heeled = replace(VESSEL.ship, wind_moment_nm=2.5e7, offset_moment_nm=-5e6)

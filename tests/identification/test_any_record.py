@@ -1,6 +1,7 @@
 """Whatever a record holds, it ends in a finite model or in a refusal that says why."""
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -20,6 +21,8 @@ from utank_hil.identification import (
     okid,
     validate,
 )
+
+pytestmark = pytest.mark.slow
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 KINDS = "stuck", "still", "saturated", "clipped", "gap", "holes"

@@ -21,6 +21,8 @@ from utank_hil.identification import (
     okid,
 )
 
+pytestmark = pytest.mark.slow
+
 NOISE = 0.02
 
 
@@ -111,9 +113,9 @@ def test_data_without_noise_leave_no_doubt() -> None:
     assert np.all(stated.modes.frequency_rad_s <= high)
 
 
-@pytest.mark.slow
-def test_bias_variance_and_coverage_against_the_cramer_rao_bound() -> None:
-    runs, truth, u = 120, plant(), pulses(1)
+@pytest.mark.parametrize("runs", [25, pytest.param(120, marks=pytest.mark.evidence)])
+def test_bias_variance_and_coverage_against_the_cramer_rao_bound(runs: int) -> None:
+    truth, u = plant(), pulses(1)
     clean = truth.respond(u, 0 * u)
     right = _true_modes(truth)
     found, stated = np.empty((runs, 4)), np.empty((runs, 4))

@@ -272,6 +272,7 @@ def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
     return u, y, int(rng.integers(1, 30))
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.integers(0, 2**31))
 def test_any_record_ends_in_a_finite_model_or_a_refusal(seed: int) -> None:

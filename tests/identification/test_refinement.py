@@ -21,6 +21,8 @@ from utank_hil.arrays import FloatArray
 from utank_hil.identification import era, okid, refine
 from utank_hil.identification.refinement import _Modal
 
+pytestmark = pytest.mark.slow
+
 
 def test_slopes_are_finite_differences_for_real_and_complex_poles() -> None:
     rng = np.random.default_rng(1)
@@ -175,9 +177,15 @@ def test_ahead_of_era_in_an_irregular_sea() -> None:
     assert after < 0.7 * before
 
 
-@pytest.mark.slow
-def test_spread_is_at_the_cramer_rao_bound_with_white_noise() -> None:
-    runs, truth, u, noise = 60, plant(), pulses(1), 0.02
+# so many runs know the spread to 18 % and to 9 %
+@pytest.mark.parametrize(
+    ("runs", "least", "most"),
+    [(15, 0.6, 1.5), pytest.param(60, 0.8, 1.3, marks=pytest.mark.evidence)],
+)
+def test_spread_is_at_the_cramer_rao_bound_with_white_noise(
+    runs: int, least: float, most: float
+) -> None:
+    truth, u, noise = plant(), pulses(1), 0.02
     clean = truth.respond(u, 0 * u)
     poles = truth.poles_rad_s()
     right = np.concatenate([np.abs(poles), -poles.real / np.abs(poles)])
@@ -194,8 +202,8 @@ def test_spread_is_at_the_cramer_rao_bound_with_white_noise() -> None:
     coverage = np.mean(np.abs(found - right) < 1.96 * stated, axis=0)
     print(f"\nspread / Cramer-Rao {ratio.round(2)}, bias / spread {(bias / spread).round(2)}")
     print(f"stated / spread {(stated.mean(axis=0) / spread).round(2)}, coverage {coverage}")
-    assert np.all(ratio > 0.8)
-    assert np.all(ratio < 1.3)
+    assert np.all(ratio > least)
+    assert np.all(ratio < most)
     assert np.all(bias < 0.4 * spread)
     assert np.all(coverage > 0.89)
 

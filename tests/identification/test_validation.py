@@ -41,6 +41,7 @@ def test_true_model_has_white_errors_apart_from_the_input() -> None:
     assert result.input_correlation.shape == (26, 2, 1)
 
 
+@pytest.mark.slow
 def test_probabilities_of_the_true_model_are_uniform() -> None:
     results = [validate(*_arx_record(seed, 1000), lags=10) for seed in range(60)]
     for values in (

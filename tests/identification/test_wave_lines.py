@@ -7,6 +7,8 @@ from roll_plant import FAST_PUMP, SAMPLE_TIME_S, jonswap_moment, noisy, plant, p
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import find_disturbance_frequencies
 
+pytestmark = pytest.mark.slow
+
 
 def _record(*waves: tuple[float, float], noise: float = 0.01) -> tuple[FloatArray, FloatArray]:
     u = pulses(1, FAST_PUMP)

@@ -12,6 +12,8 @@ import pytest
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS
 
+pytestmark = pytest.mark.slow
+
 BLUE = np.array([0x00, 0x72, 0xB2]) / 255
 YELLOW_BAND = np.array([0xF0, 0xE4, 0x42]) / 255 * 0.35 + 0.65
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -12,6 +13,8 @@ from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX, PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, Refusal
 from utank_hil.retuning.law_bank import MonitoredLaw
+
+pytestmark = pytest.mark.slow
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 BUSY = (IDENTIFY, DESIGN, TRIAL)

@@ -70,6 +70,7 @@ def _echo(there: Mailbox, back: Mailbox) -> None:
     back.post(5, there.read(there.number) or b"nothing")
 
 
+@pytest.mark.slow
 def test_message_crosses_to_another_process_and_back() -> None:
     there, back = Mailbox(100), Mailbox(100)
     process = multiprocessing.get_context("spawn").Process(target=_echo, args=(there, back))

@@ -12,6 +12,8 @@ from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.recorded_waves import RecordedWaves, tank_motion
 
+pytestmark = pytest.mark.slow
+
 MEASURED = ("roll_rad", "level_m")
 PLANT = sample(pump_model(CONFIGURED, TANK, MEASURED), 0.2, DELAY_S, LAG_S)
 LAW = DPC_ROLL_LEVEL.law(DesignPlant(CONFIGURED, TANK))

@@ -9,6 +9,8 @@ import pytest
 
 from utank_hil.runtime import real_time_scheduling
 
+pytestmark = pytest.mark.slow
+
 STATE = """
 import gc, json, os, pathlib, resource, sys
 from utank_hil.runtime import real_time_scheduling

@@ -8,16 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from two_processes import (
-    CHANNEL,
-    Candump,
-    HeldUpError,
-    Program,
-    Watcher,
-    patient_controller,
-    persistent,
-    running,
-)
+from busy_machine import first_that_can_be_judged, judged_by
+from two_processes import CHANNEL, Candump, Program, Watcher, patient_controller, running
 
 from utank_hil.canbus import Mode
 
@@ -47,13 +39,13 @@ def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
     sensors = subprocess.Popen([sys.executable, *said["python"][1:]])
     try:
         with (
+            judged_by(watcher.machine.failure),
             running(Program(folder, *said["firmware-sim"], "--duration", 1200, "--json")) as ship,
             running(Program(folder, *said["utank-hil"], "--json")) as controller,
         ):
             watcher.wait_in_charge(PRESSURE_PA)
             watcher.watch(1.0)
-            if watcher.mode is not Mode.ACTIVE:
-                raise HeldUpError
+            assert watcher.mode is Mode.ACTIVE
             assert sensors.poll() is None
             controller.end()
             report, notes = ship.end()
@@ -69,7 +61,7 @@ def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
 def test_controller_works_with_sensors_that_know_nothing_of_this_repository(
     tmp_path: Path,
 ) -> None:
-    report, candump = persistent(arm_with_stand_in, tmp_path)
+    report, candump = first_that_can_be_judged(arm_with_stand_in, tmp_path)
     log = candump.stop("SENSOR_MOTION", "HEARTBEAT_SENSORS", "PUMP_CMD", "ADDRESS_CLAIM_SENSORS")
     rolls = [frame.signals["roll_rad"] for frame in log if frame.name == "SENSOR_MOTION"]
     # the stand-in's ship, of one degree, and no emulated sensor's in the storm

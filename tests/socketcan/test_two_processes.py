@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from busy_machine import first_that_can_be_judged, judged_by
 from two_processes import (
     CHANNEL,
     Candump,
@@ -15,7 +16,6 @@ from two_processes import (
     Program,
     Watcher,
     patient_controller,
-    persistent,
     running,
     set_link,
 )
@@ -61,7 +61,7 @@ class Story:
 
 @pytest.fixture(scope="module")
 def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
-    return persistent(tell_story, tmp_path_factory.mktemp("story"))
+    return first_that_can_be_judged(tell_story, tmp_path_factory.mktemp("story"))
 
 
 def tell_story(folder: Path) -> Story:
@@ -71,7 +71,7 @@ def tell_story(folder: Path) -> Story:
     again.mkdir()
     candump, watcher = Candump(folder), Watcher()
     try:
-        with running(ship_program(folder)) as ship:
+        with judged_by(watcher.machine.failure), running(ship_program(folder)) as ship:
             watcher.wait(lambda w: w.drive is not None)
             with running(controller_program(folder, folder / "first")) as controller:
                 watcher.wait_in_charge(15e3)
@@ -219,6 +219,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
     (folder / "ship").mkdir()
     try:
         with (
+            judged_by(watcher.machine.failure),
             running(ship_program(folder / "ship")) as ship,
             running(controller_program(folder, folder / "out")) as controller,
         ):
@@ -244,7 +245,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
 def test_interface_that_goes_down_under_an_armed_controller_latches_a_fault(
     tmp_path: Path,
 ) -> None:
-    report, file = persistent(take_the_link_down, tmp_path)
+    report, file = first_that_can_be_judged(take_the_link_down, tmp_path)
     assert (report["mode"], report["fault"]) == ("FAULT", "BUS_LOST")
     recording = read_recording(file)["live"]
     faulted = recording["mode"] == Mode.FAULT

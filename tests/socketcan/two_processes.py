@@ -12,10 +12,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import cantools
 import yaml
+from busy_machine import Timekeeping
 
 from utank_hil.canbus import (
     ControllerStatus,
@@ -30,7 +31,6 @@ CHANNEL = "vcan0"
 BIN = Path(sys.executable).parent
 CONFIGS = Path("configs").resolve()
 DBC = Path("utank_hil/canbus/utank.dbc")
-T = TypeVar("T")
 START_S = 180.0  # imports take long in a user-mode kernel
 LINE = re.compile(r"\((?P<s>\d+)\.(?P<us>\d{6})\) \S+ (?P<id>[0-9A-F]{8})#(?P<data>[0-9A-F]*)")
 
@@ -68,22 +68,6 @@ def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
     path = folder / "patient.yaml"
     path.write_text(yaml.safe_dump(content))
     return path
-
-
-class HeldUpError(Exception):
-    """The machine held a process up for longer than the drive's command timeout."""
-
-
-def persistent(attempt: Callable[[Path], T], folder: Path) -> T:
-    """Try again when the machine was too busy."""
-    for number in range(2):
-        try:
-            (folder / str(number)).mkdir()
-            return attempt(folder / str(number))
-        except HeldUpError:
-            continue
-    (folder / "last").mkdir()
-    return attempt(folder / "last")
 
 
 class Logged(NamedTuple):
@@ -144,6 +128,7 @@ class Watcher:
         self.status: ControllerStatus | None = None
         self.drive: DriveStatus1 | None = None
         self.statuses = 0
+        self.machine = Timekeeping()
 
     def close(self) -> None:
         self._port.close()
@@ -166,7 +151,7 @@ class Watcher:
         deadline = time.monotonic() + timeout_s
         while not until(self):
             assert time.monotonic() < deadline, f"controller {self.status}, drive {self.drive}"
-            time.sleep(0.02)
+            self.machine.nap()
             self.look()
 
     @property
@@ -175,18 +160,13 @@ class Watcher:
         return None if self.status is None else self.status.mode
 
     def wait_in_charge(self, pressure_pa: float = 0.0) -> None:
-        """Look until the controller is active and the pump gives so much pressure.
-
-        Raises
-        ------
-        HeldUpError
-            If it has faulted by then.
-        """
+        """Look until the controller is active and the pump gives so much pressure."""
+        self.wait(lambda watcher: watcher.mode is not None)
+        self.machine.begin_anew()
 
         def done(watcher: Watcher) -> bool:
-            if watcher.mode is Mode.FAULT:
-                raise HeldUpError
             drive = watcher.drive
+            assert watcher.mode is not Mode.FAULT, f"controller {watcher.status}, drive {drive}"
             driven = drive is not None and abs(drive.pressure_pa) >= pressure_pa
             return driven and watcher.mode is Mode.ACTIVE
 
@@ -196,7 +176,7 @@ class Watcher:
         """Look for so long."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
-            time.sleep(0.02)
+            self.machine.nap()
             self.look()
 
     def forget(self) -> None:
@@ -226,9 +206,11 @@ class Program:
     def signal(self, number: int) -> None:
         self._process.send_signal(number)
 
-    def end(self, timeout_s: float = 60.0) -> tuple[dict[str, object], str]:
-        """Interrupt it as Ctrl-C does; what it printed as JSON, and its notes."""
-        if self._process.poll() is None:
+    def end(
+        self, *, interrupt: bool = True, timeout_s: float = 60.0
+    ) -> tuple[dict[str, object], str]:
+        """Interrupt it as Ctrl-C does, or wait for it; what it printed as JSON, and its notes."""
+        if interrupt and self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
         self._process.wait(timeout_s)
         self._output.seek(0)

@@ -26,6 +26,8 @@ from utank_hil.telemetry import (
     read_recording,
 )
 
+pytestmark = pytest.mark.slow
+
 
 def table(rows: int) -> np.ndarray:
     """Rows of 10 ms that tell their number in every column."""
@@ -252,7 +254,6 @@ def test_live_server_listens_on_loopback_only(tmp_path: Path) -> None:
         assert listening_addresses(recorder._process.pid) == {"0100007F"}
 
 
-@pytest.mark.slow
 def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     limit = 300_000
@@ -280,7 +281,6 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
     np.testing.assert_allclose(recorded(file)[:100], table(100), rtol=4e-16)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rows", [300, 3000])
 def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
     tmp_path: Path, rows: int

@@ -237,6 +237,7 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_no_torn_row_from_a_writer_at_full_speed() -> None:
     name = f"utank-{os.getpid()}-stress"
     seen = 0

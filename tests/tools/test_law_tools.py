@@ -2,38 +2,20 @@
 
 import json
 import math
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-LIMIT_S = 280
+from tools.studies import model_errors
+
+pytestmark = pytest.mark.slow
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", f"tools.{arguments[0]}", *arguments[1:]],
-        capture_output=True,
-        text=True,
-        timeout=LIMIT_S,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        check=False,
-    )
-
-
-def answer(*arguments: str):
-    done = run(*arguments, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-@pytest.mark.slow
-def test_campaign_compares_seed_by_seed_and_draws(tmp_path: Path):
-    found = answer(
-        "studies.constrained_campaign", "--seeds", "2", "--seconds", "60", "--out", str(tmp_path)
-    )
+def test_campaign_compares_seed_by_seed_and_draws(tool, tmp_path: Path):
+    arguments = ("--seeds", "2", "--seconds", "60", "--out", str(tmp_path), "--json")
+    found = tool("studies.constrained_campaign", *arguments).found
     assert len(found["cases"]) >= 4
     assert (tmp_path / "campaign.png").stat().st_size > 10_000
     for case in found["cases"]:
@@ -49,9 +31,9 @@ def test_campaign_compares_seed_by_seed_and_draws(tmp_path: Path):
     assert swell["below"]["clipped"]["mean"] == pytest.approx(0, abs=1e-6)
 
 
-@pytest.mark.slow
-def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passive():
-    rows = answer("studies.share_of_possible", "--seeds", "2", "--seconds", "90")["rows"]
+def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passive(tool):
+    found = tool("studies.share_of_possible", "--seeds", "2", "--seconds", "90", "--json").found
+    rows = found["rows"]
     passive, best = rows["passive"]["roll_rms_deg"], rows["clairvoyant"]["roll_rms_deg"]
     for name, row in rows.items():
         if "share" in row:
@@ -60,17 +42,18 @@ def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passiv
     assert rows["clairvoyant"]["level_peak_m"] <= 4.0 + 1e-6
 
 
-@pytest.mark.slow
-def test_model_errors_change_what_the_laws_take_away():
-    found = answer("studies.model_errors", "--seeds", "2", "--seconds", "60")
+def test_model_errors_change_what_the_laws_take_away(tool, monkeypatch):
+    names = ("none", "pump gain 0.8", "roll period x 0.7")
+    some = [error for error in model_errors.ERRORS if error.name in names]
+    monkeypatch.setattr(model_errors, "ERRORS", some)
+    found = tool("studies.model_errors", "--seeds", "2", "--seconds", "60", "--json").found
     nominal, weak = (found[name]["below_passive"] for name in ("none", "pump gain 0.8"))
     assert nominal["GPC"]["mean"] != weak["GPC"]["mean"]
     assert "GPC, designed for her" in found["roll period x 0.7"]["below_passive"]
 
 
-@pytest.mark.slow
-def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best():
-    found = answer("studies.forecast_errors", "--seeds", "2", "--seconds", "900")
+def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best(tool):
+    found = tool("studies.forecast_errors", "--seeds", "2", "--seconds", "900", "--json").found
     errors = {
         name: [sum(column) / 2 for column in zip(*model["error_shares"], strict=True)]
         for name, model in found["models"].items()
@@ -80,16 +63,14 @@ def test_forecasts_grow_worse_with_time_and_the_spectrum_s_factor_is_the_best():
     assert all(one <= min(others) for one, *others in zip(factor, *errors.values(), strict=True))
 
 
-@pytest.mark.slow
-def test_tables_of_the_linear_laws_hold_the_printed_ratios():
-    found = answer("studies.linear_law_tables", "index")["index"]
+def test_tables_of_the_linear_laws_hold_the_printed_ratios(tool):
+    found = tool("studies.linear_law_tables", "index", "--json").found["index"]
     assert found["printed"]["GPC (roll)"] == pytest.approx(578 / 499)
     assert found["printed laws, 25.2 m²"]["GPC (roll)"] == pytest.approx(578 / 499, rel=0.01)
 
 
-@pytest.mark.slow
-def test_undelayed_linearization_without_brake_or_shift_hardly_grows():
-    found = answer("studies.nonlinear_law_tables", "growth")["growth"]
+def test_undelayed_linearization_without_brake_or_shift_hardly_grows(tool):
+    found = tool("studies.nonlinear_law_tables", "growth", "--json").found["growth"]
     assert 0 < found["first ship, kL = 0"]["ideal, 10 ms: 1/s"] < 0.01
     assert all(
         value < 0
@@ -98,9 +79,11 @@ def test_undelayed_linearization_without_brake_or_shift_hardly_grows():
     )
 
 
-@pytest.mark.slow
 def test_benchmark_times_every_kind_of_controller():
-    found = answer("benchmarks.controllers", "--steps", "100")
+    # in a process of its own, whose scheduling it changes
+    command = [sys.executable, "-m", "tools.benchmarks.controllers", "--steps", "100", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)
     assert {"gpc", "constrained_gpc", "fuzzy_indirect", "clipped valve"} <= set(found)
     for cost in found.values():
         assert 0 < cost["p50_us"] <= cost["p99_us"] <= cost["max_us"] < math.inf
@@ -117,7 +100,7 @@ def test_benchmark_times_every_kind_of_controller():
         (("thesis.chapter4_contest", "--pump-pa", "-1"), "--pump-pa must be positive"),
     ],
 )
-def test_wrong_arguments_are_refused_with_the_remedy(arguments, message):
-    done = run(*arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
+def test_wrong_arguments_are_refused_with_the_remedy(tool, arguments, message):
+    done = tool(*arguments)
+    assert done.code == 2
+    assert message in done.errors

@@ -8,6 +8,8 @@ from tools.peers import peers_environment
 from tools.peers.memory import peak_mb
 from tools.peers.turns import in_turns, percentiles_us
 
+pytestmark = pytest.mark.slow
+
 
 def test_each_does_all_tasks_in_order_before_the_next_does():
     calls = []

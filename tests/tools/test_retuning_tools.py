@@ -1,8 +1,5 @@
 """What the tools around identification and retuning compute beside what they run."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -87,10 +84,7 @@ def test_both_forms_of_the_true_model_are_the_ship_of_the_records() -> None:
         (("benchmarks.retuning", "--turns", "0"), "--turns must be 2 or more"),
     ],
 )
-def test_wrong_arguments_are_refused_with_the_remedy(arguments, message) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", f"tools.{arguments[0]}", *arguments[1:]],
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert message in done.stderr
+def test_wrong_arguments_are_refused_with_the_remedy(tool, arguments, message) -> None:
+    done = tool(*arguments)
+    assert done.code == 2
+    assert message in done.errors

@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 VCAN = str(Path(__file__).resolve().parents[2] / "tools" / "vcan")
 NESTED = "User Mode Linux" in Path("/proc/cpuinfo").read_text()
 WAY = "--native" if NESTED else "--uml"

@@ -1,8 +1,10 @@
 """Time what telemetry costs: a write and a read of the ring, and a recording of an hour.
 
-Usage: python -m tools.benchmarks.telemetry
+python -m tools.benchmarks.telemetry [--json]
 """
 
+import argparse
+import json
 import tempfile
 import time
 from pathlib import Path
@@ -13,7 +15,7 @@ from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RingReader, RingWriter, read_recording, write_recording
 
 
-def ring() -> None:
+def ring() -> dict[str, float]:
     """Time single writes, and reads of all that a full ring holds."""
     row = np.zeros(len(SIGNALS))
     writes_s = []
@@ -26,12 +28,10 @@ def ring() -> None:
         rows = len(reader.read())
         read_s = time.perf_counter() - start
     p50, p99 = np.percentile(writes_s, (50, 99)) * 1e6
-    print(
-        f"ring write: p50 {p50:.2f} us, p99 {p99:.2f} us; read: {read_s / rows * 1e6:.2f} us a row"
-    )
+    return {"write_p50_us": p50, "write_p99_us": p99, "read_us_a_row": read_s / rows * 1e6}
 
 
-def recording() -> None:
+def recording() -> dict[str, float]:
     """Time an hour of three runs at 20 Hz, to a file and back."""
     rows = np.random.default_rng(1).standard_normal((72_000, len(SIGNALS)))
     rows[:, 0] = np.arange(len(rows)) / 20
@@ -46,9 +46,23 @@ def recording() -> None:
         read_recording(file)
         read_s = time.perf_counter() - start
         size = file.stat().st_size / 1e6
-    print(f"an hour of three runs: write {write_s:.2f} s, read {read_s:.2f} s, {size:.1f} MB")
+    return {"write_s": write_s, "read_s": read_s, "size_mb": size}
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    arguments = parser.parse_args()
+    found = {"ring": ring(), "an hour of three runs": recording()}
+    if arguments.json:
+        print(json.dumps(found))
+        return
+    for name, figures in found.items():
+        print(f"{name}: " + ", ".join(f"{key} {value:.2f}" for key, value in figures.items()))
 
 
 if __name__ == "__main__":
-    ring()
-    recording()
+    main()

@@ -5,8 +5,17 @@ Usage: python -m tools.documents.write [--check]
 
 import argparse
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 
-from tools.documents import catalogue, faults
+from tools.documents import catalogue, faults, tables
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """Each generated document and what it should hold."""
+    yield catalogue.PAGE, catalogue.page()
+    yield faults.PAGE, faults.page()
+    yield from tables.pages()
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -14,17 +23,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Write the generated documents.")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if one is stale")
     check = parser.parse_args(arguments).check
-    stale = 0
-    for document in (catalogue, faults):
-        text = document.page()
-        if document.PAGE.exists() and document.PAGE.read_text(encoding="utf-8") == text:
-            continue
-        if check:
-            print(f"{document.PAGE} is stale: run `make docs`", file=sys.stderr)
-            stale += 1
-        else:
-            document.PAGE.write_text(text, encoding="utf-8")
-    return min(stale, 1)
+    stale = False
+    try:
+        for place, text in pages():
+            if place.exists() and place.read_text(encoding="utf-8") == text:
+                continue
+            if check:
+                print(f"{place} is stale: run `make docs`", file=sys.stderr)
+                stale = True
+            else:
+                place.write_text(text, encoding="utf-8")
+    except tables.TableError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return int(stale)
 
 
 if __name__ == "__main__":

@@ -7,13 +7,14 @@ script
 
 1. prints the derived expressions (`--print`),
 2. checks them against `utank_hil.dynamics.tank_wrench` at random states, and
-3. prints, as the table of docs/errata.md, every term of the printed (2.11), (2.12), (2.14), (2.16),
-   (4.2), (4.3) that differs (`--errata`).
+3. prints every term of the printed (2.11), (2.12), (2.14), (2.16), (4.2), (4.3) that differs
+   (`--errata`), of which docs/errata.md has the table.
 
 The printed text is known through an optical character recognition; a slip may be its own.
 """
 
 import argparse
+import json
 import sys
 
 import numpy as np
@@ -205,6 +206,15 @@ def differences(
     return rows
 
 
+def errata(force: sp.Matrix, moment: sp.Matrix, residual: sp.Expr) -> list[list[str]]:
+    """The rows of `differences` as text."""
+    found = differences(printed(), derived(force, moment, residual))
+    return [
+        [name, *(str(cell).replace("**", "^").replace("*", " ") for cell in cells)]
+        for name, *cells in found
+    ]
+
+
 def worst_difference(
     force: sp.Matrix, moment: sp.Matrix, residual: sp.Expr, states: int = 200
 ) -> float:
@@ -247,19 +257,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--print", action="store_true", help="print the derived expressions")
     parser.add_argument("--errata", action="store_true", help="print the terms that differ")
+    parser.add_argument("--json", action="store_true", help="one JSON object with those terms")
     arguments = parser.parse_args()
     force, moment, residual = derive()
     if arguments.print:
         for name, expression in zip("XYZKMN", [*force, *moment], strict=True):
             print(f"{name} =", sp.collect(expression, MOTION), "\n")
         print("residual =", sp.collect(residual, MOTION), "\n")
-    if arguments.errata:
-        print("| equation | term | printed coefficient | first principles |\n|---|---|---|---|")
-        for name, product, other, one in differences(printed(), derived(force, moment, residual)):
-            cells = (str(x).replace("**", "^").replace("*", " ") for x in (product, other, one))
-            print(f"| {name} | " + " | ".join(f"`{cell}`" for cell in cells) + " |")
+    rows = errata(force, moment, residual) if arguments.errata or arguments.json else []
     worst = worst_difference(force, moment, residual)
-    print(f"tank_wrench agrees with the derivation to {worst:.1e}", file=sys.stderr)
+    if arguments.json:
+        print(json.dumps({"worst_difference": worst, "errata": rows}))
+        return 0 if worst < 1e-10 else 1
+    for name, *cells in rows:
+        print(f"{name}: " + " | ".join(cells))
+    print(f"tank_wrench agrees with the derivation to {worst:.1e}")
     return 0 if worst < 1e-10 else 1
 
 

@@ -9,6 +9,8 @@ from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.pictures import draw_capsize_maps
 
+pytestmark = pytest.mark.slow
+
 BARE = without_tank(PATTI_B)
 
 

@@ -95,12 +95,17 @@ def test_unknown_law_is_refused():
         contest("sliding mode")
 
 
+# as printed, and long enough for the fourth wave to capsize her with the passive tank
+DURATION_S = [100.0, pytest.param(300.0, marks=pytest.mark.evidence)]
+
+
 @pytest.mark.slow
-def test_contest_at_the_printed_amplitudes():
-    none = contest("no tank")
-    passive = contest("passive")
-    linearized = contest("feedback linearization, level braked", pump_pa=20e3)
-    printed = contest("feedback linearization (4.11)")
+@pytest.mark.parametrize("duration_s", DURATION_S)
+def test_contest_at_the_printed_amplitudes(duration_s):
+    none = contest("no tank", duration_s=duration_s)
+    passive = contest("passive", duration_s=duration_s)
+    linearized = contest("feedback linearization, level braked", 20e3, duration_s)
+    printed = contest("feedback linearization (4.11)", duration_s=duration_s)
     # without a tank the first printed amplitude capsizes her, as printed
     assert none.survivable_nm < 5.086e4
     assert [math.isinf(run.capsized_s) for run in none.runs] == [False] * 4
@@ -118,8 +123,9 @@ def test_contest_at_the_printed_amplitudes():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("duration_s", DURATION_S)
 @pytest.mark.parametrize("law", [law for law in LAWS if law.startswith("fuzzy")])
-def test_fuzzy_laws_survive_what_the_passive_tank_does_up_to_the_second_amplitude(law):
-    found = contest(law)
+def test_fuzzy_laws_survive_what_the_passive_tank_does_up_to_the_second_amplitude(law, duration_s):
+    found = contest(law, duration_s=duration_s)
     assert [math.isinf(run.capsized_s) for run in found.runs[:2]] == [True, True]
     assert found.survivable_nm > 5.086e4

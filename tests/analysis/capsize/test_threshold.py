@@ -91,6 +91,7 @@ def test_threshold_separates_survival_from_capsize():
         assert math.isfinite(run.capsized_s) == capsizes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "printed", "phases_deg"),
     [
@@ -109,6 +110,7 @@ def test_printed_thresholds_lie_within_the_range_over_the_phase_which_the_source
     assert max(each.safe_nm for each in found) > printed
 
 
+@pytest.mark.slow
 def test_threshold_at_another_phase_is_the_reference_integrator_s():
     """The start at 150 degrees capsizes her latest; an adaptive integrator finds the same."""
     bare, phase = without_tank(MODEL), math.radians(150)

@@ -20,6 +20,8 @@ from utank_hil.pictures.records import draw_phase, draw_time
 from utank_hil.pictures.style import COLORS
 from utank_hil.sea import Harmonics
 
+pytestmark = pytest.mark.slow
+
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 WAVES = Harmonics(np.array([1e7, 2e7]), np.array([0.48, 0.62]), np.zeros(2))

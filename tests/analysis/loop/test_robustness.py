@@ -20,6 +20,8 @@ from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import sample
 
+pytestmark = pytest.mark.slow
+
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 

@@ -16,6 +16,8 @@ from utank_hil.dynamics import RollShip, Tank
 from utank_hil.pictures.trade import draw_trade
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 
+pytestmark = pytest.mark.slow
+
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 MOMENT = Sea.irregular(ittc(4.7, 10.0), 1).roll_moment(SHIP.stiffness_nm_rad, EffectiveSlope(0.5))

@@ -13,6 +13,8 @@ from utank_hil.analysis.motion.comfort import (
     motion_induced_interruptions,
 )
 
+pytestmark = pytest.mark.slow
+
 G, STEP_S = 9.80665, 0.02
 TIME = np.arange(0, 600, STEP_S)
 

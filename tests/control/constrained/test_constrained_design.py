@@ -71,6 +71,7 @@ def heeled(slope_rad: float, seconds: float):
     return passive_motion(SHIP, TANK, moment, TICK_S, round(seconds / TICK_S) + 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "left"), [(0.0, 1.0), (0.5, 0.5), (1.0, 0.0)])
 def test_of_a_steady_heel_the_tank_takes_out_the_share_asked_for(share, left):
     design = dataclasses.replace(DESIGN, heel_share=share)

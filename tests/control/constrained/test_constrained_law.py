@@ -125,6 +125,7 @@ def independent(arx, past_u, past_y, limits, last, hc, hp, weight, penalty):
     return solution.x[0]
 
 
+@pytest.mark.slow
 def test_thousand_limited_steps_equal_an_independent_optimum():
     rng = np.random.default_rng(7)
     hc, hp, limited, worst = 6, 9, 0, 0.0

@@ -119,6 +119,7 @@ def test_robust_law_meets_its_lyapunov_inequality_everywhere(x, gain, bound, d):
         assert fall < 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [SMALL_GAIN, ROBUST])
 def test_stepped_parameters_follow_their_differential_equation(law):
     controller = law.controller()

@@ -1,0 +1,113 @@
+"""A machine too busy for what is judged on it: found out, said, tried again.
+
+The emulated kernel has one processor and shares it with all that the machine does besides. What
+fails there while the machine held processes up says nothing about them.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+T = TypeVar("T")
+ATTEMPTS = 3
+NAP_S = 0.02
+PUNCTUAL_S = 0.005  # by which a process may be woken late
+HELD_UP_S = 0.03  # what the drive's shortest command timeout leaves
+LOST_SHARE = 0.002  # of the time; each sample that is missing spoils 30 predictions
+RETRIED: list[str] = []  # for the end of the run
+
+
+class TooBusyError(Exception):
+    """The machine did not keep time, so what was seen can't be judged."""
+
+
+def lost(share: float, longest_s: float) -> str:
+    """What the machine did that it must not; empty if it kept time.
+
+    Parameters
+    ----------
+    share : float
+        Of the time for which it held processes up.
+    longest_s : float
+        For how long at a time.
+    """
+    if share <= LOST_SHARE and longest_s <= HELD_UP_S:
+        return ""
+    return (
+        f"processes were held up for {share:.1%} of the time ({LOST_SHARE:.1%} allowed) "
+        f"and for {1e3 * longest_s:.0f} ms at a time ({1e3 * HELD_UP_S:.0f} ms allowed)"
+    )
+
+
+class Timekeeping:
+    """How late the machine wakes a process that sleeps and does nothing else."""
+
+    def __init__(self) -> None:
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget what was: programs that start take the processor from one another."""
+        self._slept_s = self._lost_s = self._longest_s = 0.0
+
+    def nap(self) -> None:
+        """Sleep for a moment, and note how much later it ends."""
+        begin_s = time.monotonic()
+        time.sleep(NAP_S)
+        slept_s = time.monotonic() - begin_s
+        self._slept_s += slept_s
+        late_s = slept_s - NAP_S - PUNCTUAL_S
+        if late_s > 0:
+            self._lost_s += late_s
+            self._longest_s = max(self._longest_s, late_s)
+
+    def failure(self) -> str:
+        """What the machine did that it must not since the beginning; empty if it kept time."""
+        return lost(self._lost_s / max(self._slept_s, NAP_S), self._longest_s)
+
+
+@contextmanager
+def judged_by(failure: Callable[[], str]) -> Iterator[None]:
+    """Let what is asserted inside fail only where the machine kept time.
+
+    Parameters
+    ----------
+    failure : callable
+        What the machine did that it must not, empty if it kept time.
+
+    Raises
+    ------
+    TooBusyError
+        In place of AssertionError if it did not.
+    """
+    try:
+        yield
+    except AssertionError as error:
+        late = failure()
+        if not late:
+            raise
+        raise TooBusyError(f"{late}; then: {str(error).partition(chr(10))[0]}") from error
+
+
+def first_that_can_be_judged(attempt: Callable[[Path], T], folder: Path) -> T:
+    """What the first attempt gives that the machine was not too busy for.
+
+    Parameters
+    ----------
+    attempt : callable
+        Does in a folder of its own what is judged, and raises `TooBusyError`.
+    folder : Path
+        Where the attempts get their folders.
+    """
+    for number in range(ATTEMPTS):
+        own = folder / str(number)
+        own.mkdir()
+        try:
+            return attempt(own)
+        except TooBusyError as error:
+            reason = str(error)
+            RETRIED.append(f"attempt {number + 1} of {ATTEMPTS}: {reason}")
+    pytest.fail(f"machine too busy to judge, {ATTEMPTS} times; at last: {reason}", pytrace=False)

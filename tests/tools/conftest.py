@@ -1,0 +1,44 @@
+"""Run a tool within the test's own process: starting one costs seconds of imports."""
+
+import importlib
+import json
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import pytest
+
+from utank_hil.analysis.loop.sea_trial import run_trial
+
+
+class Ended(NamedTuple):
+    """How a tool ended, and what it printed."""
+
+    code: int
+    output: str
+    errors: str
+
+    @property
+    def found(self) -> Any:
+        """The one JSON object of its standard output."""
+        assert self.code == 0, self.errors
+        return json.loads(self.output)
+
+
+@pytest.fixture
+def tool(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Ended]:
+    """Call as ``tool("studies.model_errors", "--seeds", "2")``; trials run one after the other."""
+
+    def run(name: str, *arguments: str) -> Ended:
+        module = importlib.import_module(f"tools.{name}")
+        monkeypatch.setattr("sys.argv", [name, *arguments])
+        if hasattr(module, "run_shown"):
+            monkeypatch.setattr(module, "run_shown", lambda trials: list(map(run_trial, trials)))
+        try:
+            code = module.main() or 0
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        return Ended(code, *capsys.readouterr())
+
+    return run

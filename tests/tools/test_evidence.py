@@ -1,0 +1,167 @@
+"""The evidence: what is run, what is kept of it, when it is out of date, the tables made of it."""
+
+import json
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tools.documents import tables, write
+from tools.evidence import record, sources
+from tools.evidence.__main__ import main
+from tools.evidence.parts import PARTS, Part
+
+TOY = Part("toy", "python -m tools.thesis.derive_tank_forces --json", "nothing", 1)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of results of its own."""
+    monkeypatch.setattr(record, "FOLDER", tmp_path)
+    return tmp_path
+
+
+def keep(part: Part, result: object) -> None:
+    kept = {"part": part.name, "command": part.command, "sources": record.sources(part)}
+    record.file_of(part).write_text(json.dumps(kept | {"date": "2026-01-01", "result": result}))
+
+
+def test_every_part_is_of_a_module_that_is_there_and_every_result_of_a_part() -> None:
+    assert len({part.name for part in PARTS}) == len(PARTS)
+    for part in PARTS:
+        words = shlex.split(part.command)
+        module = words[words.index("-m") + 1]
+        assert Path(module.replace(".", "/") + ".py").is_file(), part.name
+    assert {file.stem for file in record.FOLDER.iterdir()} <= {part.name for part in PARTS}
+
+
+def test_every_study_benchmark_and_comparison_is_a_part() -> None:
+    commands = " ".join(part.command for part in PARTS)
+    for pattern in ("studies/*", "thesis/*", "benchmarks/*", "peers/compare_*"):
+        for file in Path("tools").glob(f"{pattern}.py"):
+            if "argparse" in file.read_text() and "No command of its own" not in file.read_text():
+                assert f"tools.{file.parent.name}.{file.stem} " in commands
+
+
+def test_result_is_current_until_its_command_or_its_code_changes(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert record.state(TOY) == "not run yet"
+    keep(TOY, {})
+    assert record.state(TOY) == "current"
+    assert record.state(replace(TOY, command=TOY.command + " --more")) == "other command"
+    monkeypatch.setattr(record, "digest_of", lambda files: "another")
+    assert record.state(TOY) == "other code"
+
+
+def test_digest_is_of_what_the_code_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
+    digests = []
+    for number, text in enumerate(
+        (
+            "def f(x):\n    return x + 1\n",
+            'def f(x):\n    """Add one."""\n\n    return (x + 1)  # more\n',
+            "def f(x):\n    return x + 2\n",
+        )
+    ):
+        place = tmp_path / str(number)
+        place.mkdir()
+        monkeypatch.setattr(sources, "ROOT", place)
+        (place / "a.py").write_text(text)
+        digests.append(sources.digest_of([place / "a.py"]))
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_code_of_a_part_is_what_its_tool_imports_and_no_more() -> None:
+    tool = sources.ROOT / "tools" / "thesis" / "derive_tank_forces.py"
+    found = {file.relative_to(sources.ROOT).as_posix() for file in sources.imported([tool])}
+    assert {"utank_hil/dynamics/wrench.py", "utank_hil/__init__.py"} <= found
+    assert not {name for name in found if name.startswith(("firmware_sim", "utank_hil/canbus"))}
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("python -m tools.benchmarks.codec --help", "printed no JSON object"),
+        ("python -m tools.benchmarks.codec --nonsense", "exit code 2"),
+    ],
+)
+def test_part_that_fails_keeps_what_was_there(folder: Path, command: str, reason: str) -> None:
+    part = replace(TOY, command=command)
+    keep(part, "old")
+    with pytest.raises(record.PartError, match=reason):
+        record.run(part)
+    assert [record.read(part)["result"], *folder.iterdir()] == ["old", record.file_of(part)]
+
+
+@pytest.mark.slow
+def test_tests_as_a_part_say_how_each_ended_and_what_it_printed(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("cases") / "test_cases.py"
+    file.write_text("def test_good():\n    print('three')\n")
+    part = replace(
+        TOY, command=f"python -m tools.evidence.pytest_part --rootdir {file.parent} {file}"
+    )
+    record.run(part)
+    kept = json.loads(record.file_of(part).read_text())
+    ((name, test),) = kept["result"]["tests"].items()
+    assert name.endswith("test_good")
+    assert (test["outcome"], test["printed"]) == ("passed", ["three"])
+    assert (kept["command"], record.state(part)) == (part.command, "current")
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", kept["date"])
+    assert kept["machine"]["cores"] >= 1
+    assert kept["versions"]["numpy"]
+    file.write_text("def test_bad():\n    assert False\n")
+    with pytest.raises(record.PartError, match="exit code 1"):
+        record.run(part)
+
+
+def test_only_what_is_missing_or_out_of_date_is_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ran: list[str] = []
+
+    def run(part: Part) -> dict[str, float]:
+        ran.append(part.name)
+        if part.name == "cost_codec":
+            raise record.PartError("it is busy")
+        return {"seconds": 1.0}
+
+    monkeypatch.setattr("tools.evidence.__main__.run", run)
+    names = ["linear_law_tables", "cost_codec", "cost_slice"]
+    keep(next(part for part in PARTS if part.name == names[0]), {})
+    arguments = [word for name in names for word in ("--part", name)]
+    for force, expected in ((["--force"], names), ([], names[1:])):
+        ran.clear()
+        monkeypatch.setattr("sys.argv", ["evidence", *arguments, *force])
+        assert main() == 1  # the others are run all the same
+        assert ran == expected
+        assert "it is busy" in capsys.readouterr().out
+
+
+def test_table_of_a_document_is_made_anew_and_a_stale_one_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tables, "DOCS", tmp_path)
+    monkeypatch.setattr(write, "pages", tables.pages)
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- table: errata terms -->\nold\n<!-- end of table -->\nafter\n")
+    assert write.main(["--check"]) == 1
+    assert "page.md is stale: run `make docs`" in capsys.readouterr().err
+    assert write.main([]) == 0
+    lines = page.read_text().splitlines()
+    assert (lines[0], lines[-1]) == ("before", "after")
+    assert lines[2] == "| equation | term | printed coefficient | first principles |"
+    assert "old" not in lines
+    assert write.main(["--check"]) == 0
+    page.write_text("<!-- table: errors -->\n<!-- end of table -->\n")
+    assert write.main([]) == 1
+    assert "page.md: no table 'errors'" in capsys.readouterr().err
+
+
+def test_table_without_its_result_names_the_part_to_run(folder: Path) -> None:
+    with pytest.raises(tables.TableError, match="--part linear_law_tables"):
+        tables.table("law margins")

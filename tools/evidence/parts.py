@@ -1,0 +1,188 @@
+"""The parts of the evidence: command, what it shows, how long it takes."""
+
+from dataclasses import dataclass
+
+PEERS = ".cache/peers/bin/python"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One command that prints one JSON object.
+
+    Parameters
+    ----------
+    name : str
+        Name of the part and of its result file.
+    command : str
+        As typed from the root of the checkout; `python` is the interpreter of this environment.
+    shows : str
+        What the result is evidence of.
+    minutes : float
+        How long it takes on an idle machine of two cores, about.
+    """
+
+    name: str
+    command: str
+    shows: str
+    minutes: float
+
+
+PARTS = (
+    Part(
+        "linear_law_tables",
+        "python -m tools.studies.linear_law_tables --json",
+        "margins of the linear laws, passive optimum, printed laws and their index",
+        1,
+    ),
+    Part(
+        "nonlinear_law_tables",
+        "python -m tools.studies.nonlinear_law_tables --json",
+        "feedback linearization, valves and stimulation",
+        5,
+    ),
+    Part(
+        "share_of_possible",
+        "python -m tools.studies.share_of_possible --seeds 8 --json",
+        "roll in the storm hour beside the clairvoyant bound",
+        6,
+    ),
+    Part(
+        "constrained_campaign",
+        "python -m tools.studies.constrained_campaign --seeds 8 --out docs/pictures --json",
+        "constrained against clipped GPC, sea by sea, with its picture",
+        15,
+    ),
+    Part(
+        "forecast_errors",
+        "python -m tools.studies.forecast_errors --seeds 8 --json",
+        "how far ahead predictors see the roll, by their sea",
+        5,
+    ),
+    Part(
+        "model_errors",
+        "python -m tools.studies.model_errors --seeds 8 --json",
+        "the shipped laws on a ship other than the one they were designed for",
+        20,
+    ),
+    Part(
+        "storm_seeds",
+        "python -m tools.studies.storm_seeds configs/scenarios/storm_all.yaml --seeds 16 --json",
+        "every law on the bench over sixteen hours of the storm",
+        30,
+    ),
+    Part(
+        "identification_bound",
+        "python -m tools.studies.identification_bound --json",
+        "identification in a storm against the Cramer-Rao bound",
+        5,
+    ),
+    Part(
+        "retuned_load_change",
+        "python -m tools.studies.retuned_voyages configs/scenarios/load_change.yaml"
+        " --seeds 1 2 3 --json",
+        "what retuning is worth when the load changes",
+        10,
+    ),
+    Part(
+        "thesis_contest",
+        "python -m tools.thesis.chapter4_contest --json",
+        "thesis 4.5: who capsizes, and in what wave",
+        2,
+    ),
+    Part(
+        "thesis_capsize",
+        "python -m tools.thesis.capsize_study --json",
+        "capsizing: thresholds and probability",
+        5,
+    ),
+    Part(
+        "thesis_derivation",
+        "python -m tools.thesis.derive_tank_forces --json",
+        "every printed term of the tank's forces that differs from the derivation",
+        1,
+    ),
+    Part(
+        "cost_codec",
+        "python -m tools.benchmarks.codec --json",
+        "cost of a frame against cantools",
+        1,
+    ),
+    Part(
+        "cost_controllers",
+        "python -m tools.benchmarks.controllers --steps 5000 --json",
+        "cost of a step of each controller",
+        1,
+    ),
+    Part(
+        "cost_dynamics",
+        "python -m tools.benchmarks.dynamics --json",
+        "speed of the nonlinear model against C, scipy and python-control",
+        3,
+    ),
+    Part(
+        "cost_identification",
+        "python -m tools.benchmarks.identification --json",
+        "speed, memory and growth of identification",
+        3,
+    ),
+    Part(
+        "cost_lockstep",
+        "python -m tools.benchmarks.lockstep --json",
+        "cost of the lockstep runner alone",
+        1,
+    ),
+    Part(
+        "cost_realtime",
+        "python -m tools.benchmarks.realtime --json",
+        "lateness of the real-time loop against a bare sleep",
+        1,
+    ),
+    Part(
+        "cost_retuning",
+        "python -m tools.benchmarks.retuning --turns 8 --json",
+        "overruns of the loop with and without retuning",
+        15,
+    ),
+    Part(
+        "cost_slice",
+        "python -m tools.benchmarks.slice --json",
+        "the whole slice in lockstep: ship seconds per second",
+        1,
+    ),
+    Part(
+        "cost_telemetry",
+        "python -m tools.benchmarks.telemetry --json",
+        "ring and recording",
+        1,
+    ),
+    Part(
+        "peers_bound_solvers",
+        f"{PEERS} -m tools.peers.compare_bound_solvers --seconds 3600 --json",
+        "the clairvoyant bound's programme in other sparse solvers",
+        10,
+    ),
+    Part(
+        "peers_identification",
+        f"{PEERS} -m tools.peers.compare_identification --seeds 10 --json",
+        "identification beside published packages",
+        30,
+    ),
+    Part(
+        "peers_plan_solvers",
+        f"{PEERS} -m tools.peers.compare_plan_solvers --seconds 240 --json",
+        "a step of the constrained law beside other solvers and do-mpc",
+        5,
+    ),
+    Part(
+        "tests",
+        "python -m tools.evidence.pytest_part -n auto -m 'evidence and not socketcan'",
+        "the tests that take minutes: statistics over many seeds, long voyages",
+        10,
+    ),
+    Part(
+        "tests_on_vcan",
+        "tools/vcan python -m tools.evidence.pytest_part -m evidence tests/socketcan",
+        "retuning of order 200 from 500 s on a real CAN bus, on an idle machine",
+        13,
+    ),
+)
