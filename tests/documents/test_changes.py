@@ -33,6 +33,9 @@ def apply(folder: Path, page: str) -> None:
             continue
         head, _, hunks = block.text.partition("\n")
         file = folder / head.removeprefix("--- ")
+        if not file.exists():
+            file.write_text(lines_of(hunks, "+") + "\n", encoding="utf-8")
+            continue
         text = file.read_text(encoding="utf-8")
         for hunk in hunks.split("@@\n"):
             old, new = lines_of(hunk, " -"), lines_of(hunk, " +")

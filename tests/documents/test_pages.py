@@ -108,6 +108,7 @@ def test_links_lead_to_files(page: Path) -> None:
 def test_files_and_names_on_a_page_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     made = {block.file for block in blocks(text)}
+    made |= set(re.findall(r"^--- (\S+)$", text, re.M))  # by the changes that a page shows
     paths = re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|dbc|md|toml|yaml))`", text)
     modules = [name.replace(".", "/") for name in re.findall(r"-m (tools\.[\w.]+)", text)]
     paths += [f"{name}{'/__main__' if (ROOT / name).is_dir() else ''}.py" for name in modules]

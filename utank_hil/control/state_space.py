@@ -152,9 +152,9 @@ class SystemMatrices:
 
     def law(self) -> StateSpaceLaw:
         """The law of these matrices."""
-        n, m = len(self.A), len(self.D[0])
-        a, b = (np.array(rows, float).reshape(n, -1 if n else width)
-                for rows, width in ((self.A, n), (self.B, m)))  # fmt: skip
+        states, outputs = len(self.A), len(self.D[0])
+        a = np.array(self.A, float) if self.A else np.zeros((0, states))
+        b = np.array(self.B, float) if self.B else np.zeros((0, outputs))
         c, d = np.array(self.C, float), np.array(self.D, float)
         return StateSpaceLaw(LinearModel(a, b, c, d, self.sample_time_s))
 
