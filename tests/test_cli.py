@@ -244,7 +244,7 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     tmp_path: Path,
 ) -> None:
     with bench_process("--duration", "36000", "--out", str(tmp_path), "--json") as process:
-        wait_for_workers(process, 6.0)
+        wait_for_workers(process, 4.0)
         os.killpg(process.pid, signal.SIGINT)
         output, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors

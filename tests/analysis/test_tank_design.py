@@ -23,6 +23,7 @@ def test_figures_are_those_of_the_coupled_model():
     assert figures.frequency_ratio == pytest.approx(1.179, abs=0.001)
 
 
+@pytest.mark.slow
 def test_no_neighbour_of_the_best_tank_has_a_lower_peak():
     best = best_passive_tank(SHIP, TANK)
     least = peak(best)

@@ -173,6 +173,7 @@ def test_a_missing_message_is_named(tmp_path):
         load_catalogue(path)
 
 
+@pytest.mark.slow
 def test_importing_and_loading_needs_no_compiler_and_no_plotting():
     code = (
         "import sys; from utank_hil.canbus import load_catalogue; "

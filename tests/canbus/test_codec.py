@@ -144,6 +144,7 @@ def test_all_ones_is_not_available(case):
         assert is_missing(value) or value is True, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", PROTECTED, ids=PROTECTED_IDS)
 @settings(max_examples=50)
 @given(st.data())

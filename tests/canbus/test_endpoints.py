@@ -37,6 +37,7 @@ def state(rx):
     return rx.counter, rx.lost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", PROTECTED, ids=PROTECTED_IDS)
 @settings(max_examples=20)
 @given(st.data())

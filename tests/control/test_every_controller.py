@@ -250,6 +250,7 @@ def test_answer_is_one_command_of_the_caller_s_own(name):
     np.testing.assert_array_equal(first, kept)
 
 
+@pytest.mark.slow
 @every_law
 @settings(max_examples=30)
 @given(

@@ -66,6 +66,7 @@ def test_roll_is_the_linear_response_on_the_exact_model_at_large_angles():
     np.testing.assert_allclose(x[:, 0], expected, atol=1e-6 * 0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1.5, 2.5])
 def test_shifted_output_is_the_linear_response_on_the_exact_model(length):
     law = law_of(shift_rad_m=0.1, shift_length_m=length)
@@ -85,6 +86,7 @@ def test_target_of_the_output_is_reached():
     assert acceleration == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ship", "tank"), [(PATTI_B, TANK), (FIRST, FIRST_TANK)])
 def test_zero_dynamics_swing_with_the_frequency_of_4_10_and_do_not_decay(ship, tank):
     law = law_of(ship, tank)

@@ -50,6 +50,7 @@ def test_gains_are_those_of_the_closed_form():
     assert level == pytest.approx(expected.level_m[0])
 
 
+@pytest.mark.slow
 def test_ship_rolls_with_the_wanted_amplitude_and_period():
     time, roll, *_, pressure = record(PLAN.controller(), RollModel(SHIP, TANK), 400.0)
     assert amplitude(time, roll, 350) == pytest.approx(math.radians(3.0), rel=0.03)

@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from pages import HOW_TO, ROOT, blocks
 
+pytestmark = pytest.mark.slow
+
 COPIED = ("configs", "docs", "firmware_sim", "tests", "tools", "utank_hil", "pyproject.toml")
 ROW = re.compile(r"^\| \d+ \| `(\S+)` \|", re.M)
 CHANGING = [page for page in HOW_TO if "```diff" in page.read_text(encoding="utf-8")]
@@ -90,7 +92,6 @@ def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
     assert len(changed) <= 6
 
 
-@pytest.mark.slow
 def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
     run(walked, "tools.documents.write", "--check")
     tests = {name for name in rows(walked) if name.startswith("tests/")}

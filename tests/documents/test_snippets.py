@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from pages import DOCUMENTS, HOW_TO, ROOT, Block, blocks, run_python
 
+pytestmark = pytest.mark.slow
+
 SNIPPETS = [
     (page, block)
     for page in DOCUMENTS

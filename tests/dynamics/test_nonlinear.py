@@ -55,6 +55,7 @@ def test_energy_is_constant_to_1e_9_over_1000_s(name):
         assert worst_drift(ship, tank, start, 1000.0) < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_friction_and_strikes_never_raise_the_energy(restitution):
     ship = replace(PATTI, damping_nms_rad=3e3, quadratic_damping_nms2_rad2=1e5)

@@ -34,6 +34,7 @@ def reference():
     ).state
 
 
+@pytest.mark.slow
 def test_runge_kutta_converges_with_order_four(reference):
     steps = np.array([0.1, 0.05, 0.04, 0.025, 0.02])
     errors = [

@@ -3,6 +3,7 @@
 import tracemalloc
 
 import numpy as np
+import pytest
 
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.transfer import state_space_response
@@ -25,6 +26,7 @@ def test_a_delay_is_a_power_of_z() -> None:
     np.testing.assert_allclose(found[:, 1, 0], 2.0)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_points_times_the_square_of_the_order() -> None:
     z = np.exp(1j * RANDOM.uniform(0, np.pi, 1000))
     model = chain(120)

@@ -46,6 +46,7 @@ def earth_gravity_body(motion):
     return turn[:, 2, :] * GRAVITY
 
 
+@pytest.mark.slow
 def test_force_and_moment_are_weight_minus_rate_of_change_of_the_water_s_momentum(cases):
     for tank, motion in cases:
         momenta = [motion.momentum(tank, t) for t in TIMES]

@@ -177,6 +177,7 @@ def test_fault_of_one_node_ends_at_zero_in_time_and_stays_there(
     assert bench.heard.states[-1][1] is not DriveState.OPERATION_ENABLED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 2])
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
 def test_one_or_two_lost_ticks_do_not_disarm(victim: str, lost: int) -> None:
@@ -190,6 +191,7 @@ def test_one_or_two_lost_ticks_do_not_disarm(victim: str, lost: int) -> None:
     assert rate_limit_holds(bench)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
 def test_frames_sent_twice_are_taken_once(victim: str) -> None:
     """The second of each is refused as a repetition; what the first said stands."""

@@ -21,6 +21,7 @@ SCRIPT = (TimedAction(1.0, Action.ARM), TimedAction(2.0, Action.RETUNE))
 SETTINGS = RetuningSettings((6.0, 20.0), identification_s=10.0, trial_s=30.0, pulse_pa=10e3)
 
 
+@pytest.mark.slow
 def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
     config = storm().controllers["gpc"].model_copy(update={"retuning": SETTINGS})
     heard: list[tuple[int, RetuningEvent]] = []

@@ -31,6 +31,7 @@ def armed(pressure_pa: float = 20e3, start_ns: int = START_NS) -> DriveBench:
     return bench
 
 
+@pytest.mark.slow
 def test_enabled_drive_brings_the_pump_to_the_commanded_pressure() -> None:
     bench = armed(20e3)
     for _ in range(50):

@@ -74,6 +74,7 @@ def replaced_drive() -> Bench:
     return bench
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("without", SOME, ids="-".join)
 def test_controller_is_active_with_the_nodes_of_another_maker(without: tuple[str, ...]) -> None:
     bench = Bench(without)
@@ -105,6 +106,7 @@ def test_emulated_pump_gives_the_pressure_that_the_real_drive_reports(
     assert largest > 10e3
 
 
+@pytest.mark.slow
 def test_emulated_ship_rolls_less_with_the_real_drive_than_without_pressure(
     replaced_drive: Bench,
 ) -> None:

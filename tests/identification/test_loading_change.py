@@ -15,6 +15,8 @@ from roll_plant import (
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import find_disturbance_frequencies, modal_confidence, okid
 
+pytestmark = pytest.mark.slow
+
 
 def _sea(kind: str, samples: int) -> FloatArray:
     time_s = 200.0 + np.arange(samples) * SAMPLE_TIME_S

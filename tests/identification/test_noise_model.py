@@ -62,6 +62,7 @@ def test_autoregression_is_recovered() -> None:
     np.testing.assert_allclose(found.covariance, MIXING @ MIXING.T, atol=0.03)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), gaps=st.sets(st.integers(0, 599), max_size=5))
 def test_is_least_squares_over_the_rows_whose_past_has_no_gap(seed: int, gaps: set[int]) -> None:
     v = coloured(600, seed)

@@ -64,6 +64,7 @@ def test_without_waves_every_number_of_ship_and_tank_comes_back(outputs: int, or
     assert fit.tank.damping_ratio == pytest.approx(0.12, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("true_s", "inertia"), [(14.7, 1.1), (12.6, 1.0), (10.1, 0.9)])
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
 def test_in_a_storm_the_roll_period_is_found_within_a_tenth(

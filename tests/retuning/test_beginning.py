@@ -142,6 +142,7 @@ def changing(rig_flags: list[int]) -> Callable[[int, float], float]:
     return roll
 
 
+@pytest.mark.slow
 def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_times() -> None:
     retuner = ToyRetuner(Refusal(("no",)))
     rig = Rig(retuner, replace(SETTINGS, change_factor=1.5), changing([]))
@@ -154,6 +155,7 @@ def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_t
     assert f"refused {MOST_TRIES} times" in rig.reasons
 
 
+@pytest.mark.slow
 def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
     flags: list[int] = []
     rig = Rig(ToyRetuner(candidate_of(9e4)), replace(SETTINGS, change_factor=1.5), changing(flags))

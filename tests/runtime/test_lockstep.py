@@ -57,6 +57,7 @@ def test_different_seeds_give_different_traces():
     assert random_run(1, [50 * MS])[0] != random_run(2, [50 * MS])[0]
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.lists(st.integers(0, 50 * MS // BIT_NS)))
 def test_run_in_slices_equals_run_in_one_go(seed, cuts):
     whole, run = random_run(seed, [50 * MS])

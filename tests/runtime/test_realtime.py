@@ -300,6 +300,7 @@ print(watcher.threads, sorted(heavy))
 """
 
 
+@pytest.mark.slow
 def test_loop_process_has_one_python_thread_and_no_compiler_or_plotting():
     run = subprocess.run(
         [sys.executable, "-c", LOOP_PROCESS], capture_output=True, text=True, check=True

@@ -86,6 +86,7 @@ def test_events_of_a_run_are_in_its_own_log(tmp_path: Path) -> None:
     assert list(read_recording(tmp_path / "a.rrd")) == ["passive", "dpc"]
 
 
+@pytest.mark.slow
 def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: Path) -> None:
     rows = random_run(40_000, 4)
     whole, cut = tmp_path / "whole.rrd", tmp_path / "cut.rrd"
@@ -100,6 +101,7 @@ def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: P
     assert 15_000 < counts[0] < counts[1] < counts[2] <= len(rows)
 
 
+@pytest.mark.slow
 def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path: Path) -> None:
     runs = {name: random_run(72_000, i) for i, name in enumerate(("passive", "dpc", "gpc"))}
     file = tmp_path / "hour.rrd"

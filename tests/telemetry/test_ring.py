@@ -285,6 +285,7 @@ def test_the_segment_of_a_dead_writer_is_replaced() -> None:
         assert reader.columns == ("new",)
 
 
+@pytest.mark.slow
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """
 import sys

@@ -23,6 +23,7 @@ def fetch(url: str, seconds: float = 20.0) -> bytes:
             time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_without_a_display_the_viewer_is_a_page_on_loopback(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

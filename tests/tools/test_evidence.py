@@ -45,6 +45,7 @@ def test_every_study_benchmark_and_comparison_is_a_part() -> None:
                 assert f"tools.{file.parent.name}.{file.stem} " in commands
 
 
+@pytest.mark.slow
 def test_result_is_current_until_its_command_or_its_code_changes(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -81,6 +82,7 @@ def test_code_of_a_part_is_what_its_tool_imports_and_no_more() -> None:
     assert not {name for name in found if name.startswith(("firmware_sim", "utank_hil/canbus"))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "reason"),
     [
@@ -119,6 +121,7 @@ def test_tests_as_a_part_say_how_each_ended_and_what_it_printed(
         record.run(part)
 
 
+@pytest.mark.slow
 def test_only_what_is_missing_or_out_of_date_is_run(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -35,6 +35,7 @@ def solution(family, programme):
     return np.array(found.x)
 
 
+@pytest.mark.slow
 def test_programmes_by_hand_have_the_commands_of_the_controller(sailed):
     law, family, steps = sailed
     limited = [step for step in steps if step.limited]

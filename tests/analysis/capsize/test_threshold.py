@@ -125,6 +125,7 @@ def test_threshold_at_another_phase_is_the_reference_integrator_s():
         assert math.isfinite(run.capsized_s) == capsizes
 
 
+@pytest.mark.slow
 def test_the_tank_raises_the_threshold_by_half():
     """Lz -1 m, damping ratio 0.3: one of the tanks that the source may have meant."""
     bare = capsize_threshold(without_tank(MODEL), 0.6, 2e5).capsizing_nm
@@ -166,6 +167,7 @@ def test_nobody_capsizes_in_a_calm_and_the_interval_says_how_sure_that_is():
     assert found.high == pytest.approx(1 - 0.025 ** (1 / 60))
 
 
+@pytest.mark.slow
 def test_more_ships_capsize_in_a_higher_sea_and_fewer_with_the_tank():
     def share(model, hs_m):
         return capsize_probability(

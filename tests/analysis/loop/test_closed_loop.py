@@ -47,6 +47,7 @@ def simulate(wave_rad_s, duration_s, step_s=0.01):
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples_a_period", [40, 90])
 def test_response_equals_time_simulation(samples_a_period):
     period_s = samples_a_period * TS

@@ -33,6 +33,8 @@ from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
 
+pytestmark = pytest.mark.slow
+
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 SEA = jonswap(4.7, 10.0)

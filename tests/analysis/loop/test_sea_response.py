@@ -49,6 +49,7 @@ def simulated_rms(law):
     return np.sqrt(np.mean(np.square(rows), axis=0))
 
 
+@pytest.mark.slow
 def test_closed_form_is_the_simulated_loop():
     law = GPC_ROLL.law(DesignPlant(SHIP, TANK, DELAY_S, LAG_S))
     motion = motion_in_sea(law, coupled_model(SHIP, TANK), ("roll_rad",), WAVES, DELAY_S, LAG_S)

@@ -39,6 +39,7 @@ def integrated(
     return np.asarray(solution.y)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "moment",
     [

@@ -10,6 +10,7 @@ def test_half_the_amplitudes_of_two_alternating_waves_are_above_the_smaller():
     np.testing.assert_allclose(exceedance(wave, np.array([0.5, 1.5, 2.5])), [1, 0.5, 0], atol=0.01)
 
 
+@pytest.mark.slow
 def test_a_narrow_banded_gaussian_motion_is_rayleigh():
     rng = np.random.default_rng(3)
     time = np.arange(0, 40_000, 0.5)

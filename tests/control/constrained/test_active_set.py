@@ -2,6 +2,7 @@
 
 import clarabel
 import numpy as np
+import pytest
 from scipy import sparse
 
 from utank_hil.control.constrained.active_set import ActiveSetSolver
@@ -33,6 +34,7 @@ def family(rng, n, m):
     return hessian, rng.normal(size=(m, n))
 
 
+@pytest.mark.slow
 def test_thousand_random_programmes_equal_an_interior_point_solver():
     rng = np.random.default_rng(1)
     worst = 0.0

@@ -124,6 +124,7 @@ def test_bad_designs_are_refused():
         PredictiveDesign("gpc", PREDICTOR, 20, 30).law(DesignPlant(SHIP, TANK))
 
 
+@pytest.mark.slow
 def test_designing_brings_no_plotting_and_no_compiler_into_the_process():
     code = (
         "import sys\n"
