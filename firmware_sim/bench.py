@@ -120,7 +120,7 @@ class BenchOptions:
 
 
 class _Board:
-    """What the bench and the processes of its runs tell each other, in shared memory."""
+    """What the bench and the processes of its runs exchange, in shared memory."""
 
     def __init__(self, context: SpawnContext, runs: int) -> None:
         self.done_s = [context.Value("d", 0.0, lock=False) for _ in range(runs)]

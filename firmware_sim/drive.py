@@ -54,7 +54,7 @@ class DriveLimits:
         Longest command timeout the drive agrees to, 100 at most: so long after the last command
         the safety manual has a dead controller's pressure on its way to zero.
     bus_voltage_v : float
-        Direct-current bus the drive feeds from; 4 to 1000, what DRIVE_STATUS_2 can tell.
+        Direct-current bus the drive feeds from; 4 to 1000, the range of DRIVE_STATUS_2.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
-"""Single amplitudes of roll whose exceedance is told."""
+"""Single amplitudes of roll whose exceedance is printed."""
 _SHOWN_RAD: Final = (LEVELS_RAD[1], LEVELS_RAD[3])
 _NO_TANK: Final = "no tank"
 
@@ -60,7 +60,7 @@ def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
 
 
 def judged_runs(result: BenchResult) -> dict[str, OnBoard]:
-    """The bare ship and the runs that can be compared with her, over the bench's window."""
+    """The bare ship and the runs that can be compared with it, over the bench's window."""
     from firmware_sim.run import RECORD_S
 
     place = result.scenario.place_on_board

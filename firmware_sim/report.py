@@ -159,10 +159,10 @@ def pump_table(result: BenchResult) -> RichTable:
 
 def retuning_table(result: BenchResult) -> RichTable | None:
     """Table of what retuning found and gained; None where nothing retuned."""
-    told = {
+    found = {
         run.name: retuning_figures(run, result.scenario, result.settle_s) for run in result.runs
     }
-    if not any(told.values()):
+    if not any(found.values()):
         return None
     table = _table(
         "Retuning",
@@ -180,30 +180,32 @@ def retuning_table(result: BenchResult) -> RichTable | None:
         f"± one standard deviation; before the first identification, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
-    for name, figures in told.items():
+    for name, figures in found.items():
         if figures is not None:
             table.add_row(name, *_retuning_cells(figures))
     return table
 
 
-def _retuning_cells(told: RetuningFigures) -> tuple[str, ...]:
-    found, true = told.found, told.truth
+def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
+    found, true = retuning.found, retuning.truth
     period = ship = tank = ""
     if found is not None:
         deviation_s = found.roll_period_s * found.period_deviation
         period = f"{found.roll_period_s:.3f} ± {deviation_s:.3f} / {true.roll_period_s:.3f}"
         ship = f"{found.damping_nms_rad / 1e6:#.4g} / {true.damping_nms_rad / 1e6:#.4g}"
         tank = f"{found.tank_damping_ratio:.4f} / {true.tank_damping_ratio:.4f}"
-    rolls = (told.roll_before_rad, told.roll_after_rad)
+    rolls = (retuning.roll_before_rad, retuning.roll_after_rad)
     return (
-        "" if told.retuned_at_s is None else f"{told.retuned_at_s:.0f}",
+        "" if retuning.retuned_at_s is None else f"{retuning.retuned_at_s:.0f}",
         *("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls),
-        _percent(told.roll_after_below_before),
+        _percent(retuning.roll_after_below_before),
         period,
         ship,
         tank,
-        told.state if told.attempts <= 1 else f"{told.state}, attempt {told.attempts}",
-        escape("; ".join(told.reasons)),
+        retuning.state
+        if retuning.attempts <= 1
+        else f"{retuning.state}, attempt {retuning.attempts}",
+        escape("; ".join(retuning.reasons)),
     )
 
 
@@ -298,8 +300,8 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
 
 
 def _retuning_json(result: BenchResult, run: Run) -> dict[str, Any] | None:
-    told = retuning_figures(run, result.scenario, result.settle_s)
-    return None if told is None else told.as_json()
+    found = retuning_figures(run, result.scenario, result.settle_s)
+    return None if found is None else found.as_json()
 
 
 def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], list[str]]:
@@ -316,8 +318,8 @@ def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], li
     failures = []
 
     def write_figures(result: BenchResult, path: Path) -> None:
-        told = as_json(result, files | {"figures": path})
-        path.write_text(json.dumps(told, indent=2) + "\n")
+        found = as_json(result, files | {"figures": path})
+        path.write_text(json.dumps(found, indent=2) + "\n")
 
     for name, file, write in (
         ("picture", PICTURE, _draw),
@@ -334,11 +336,11 @@ def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], li
 
 
 def _draw(result: BenchResult, path: Path) -> None:
-    told = {run.name: run for run in figures(result)[1]}
+    found = {run.name: run for run in figures(result)[1]}
     draw_bench(
         [
             BenchCurve(
-                _legend(run.name, told.get(run.name)),
+                _legend(run.name, found.get(run.name)),
                 run.column("time_s"),
                 run.column("true_roll_rad"),
                 run.column("true_level_m"),
@@ -352,13 +354,13 @@ def _draw(result: BenchResult, path: Path) -> None:
     )
 
 
-def _legend(name: str, told: RunFigures | None) -> str:
+def _legend(name: str, found: RunFigures | None) -> str:
     """Name of a run with the roll that the table shows, and what that is against the passive."""
-    if told is None:
+    if found is None:
         return f"{name}: not compared"
-    below = None if name == PASSIVE else told.roll_below_passive
+    below = None if name == PASSIVE else found.roll_below_passive
     change = "" if below is None else f" ({-below:+.0%})".replace("-", "−")
-    return f"{name}: roll {math.degrees(told.roll.rms_rad):.2f}° RMS{change}"
+    return f"{name}: roll {math.degrees(found.roll.rms_rad):.2f}° RMS{change}"
 
 
 def _record(result: BenchResult, path: Path) -> None:

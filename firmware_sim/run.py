@@ -109,7 +109,7 @@ class Run:
     name : str
     rows : ndarray, shape (n, len(COLUMNS))
         Controller's telemetry and the truth, every `RECORD_S`, on the ship's time: `time_s` counts
-        from the moment at which she began to move in the waves. In real time rows are left out
+        from the start of its motion in the waves. In real time rows are left out
         that a late ship did not write, or for which the controller said nothing.
     bus_load : float
         Mean share of the bus in use.
@@ -320,7 +320,7 @@ def _run_loop(
     return LoopResult(statistics, scheduling)
 
 
-def _side_by_side(told: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:
+def _side_by_side(shown_rows: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> FloatArray:
     """Join rows of controller and ship, both of which begin with their time, on the ship's time.
 
     Beside each row of the truth stands the controller's row that is nearest in time: not the one of
@@ -328,9 +328,9 @@ def _side_by_side(told: FloatArray, truth: FloatArray, shift_s: float = 0.0) -> 
     row is left out that the controller has none for within `RECORD_S`. `shift_s` is the time from
     the ship's start to the controller's.
     """
-    if len(truth) == 0 or len(told) == 0:
+    if len(truth) == 0 or len(shown_rows) == 0:
         return np.empty((0, len(COLUMNS)))
-    told_s = told[:, 0] + shift_s
-    nearest = np.searchsorted((told_s[1:] + told_s[:-1]) / 2, truth[:, 0])
-    shown = np.abs(told_s[nearest] - truth[:, 0]) <= RECORD_S
-    return np.hstack([truth[shown, :1], told[nearest[shown], 1:], truth[shown, 1:]])
+    shown_s = shown_rows[:, 0] + shift_s
+    nearest = np.searchsorted((shown_s[1:] + shown_s[:-1]) / 2, truth[:, 0])
+    shown = np.abs(shown_s[nearest] - truth[:, 0]) <= RECORD_S
+    return np.hstack([truth[shown, :1], shown_rows[nearest[shown], 1:], truth[shown, 1:]])

@@ -20,7 +20,7 @@ from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
 
 MOST_CONTROLLERS = 7
-"""More runs than these and the passive one can't be told apart in a picture."""
+"""More runs than these and the passive one can't be distinguished in a picture."""
 
 PASSIVE = "passive"
 """Name of the run with the tank alone."""
@@ -32,12 +32,12 @@ SAILED: Final = (
     "offset_moment_nm",
     "wind_moment_nm",
 )
-"""What the bench's ship has, being linear: the last two heel her."""
+"""Parameters of the bench's ship, which is linear; the last two are heeling moments."""
 
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
 
-# where the user sets none, drive and high-level switch are as the first ship's to her pump and tank
+# where the user sets none, drive and high-level switch are as the first ship's to its pump and tank
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
 _HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
 
@@ -113,7 +113,7 @@ class Scenario(Section):
 
     @property
     def sailing_ship(self) -> RollShip:
-        """The ship as she is from `actual_from_s` on."""
+        """The ship from `actual_from_s` on."""
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
 
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
@@ -173,7 +173,7 @@ class Scenario(Section):
         return [(key, why) for key, ship in ships.items() for why in self._heel_problems(ship)]
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
-        """Why a ship can't be heeled as she is: the water would be at the tank's roof."""
+        """Why a ship's steady heel is refused: the water would be at the tank's roof."""
         tank = self.vessel.tank
         _, _, stiffness = coupled_matrices(ship, tank)
         roll_rad, level_m = np.linalg.solve(stiffness, [ship.heeling_moment_nm, 0.0]).tolist()

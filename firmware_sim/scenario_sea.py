@@ -25,7 +25,7 @@ from utank_hil.sea import EffectiveSlope, Sea, Spectrum
 
 
 class _AnySea(Section):
-    """How the ship meets the waves, and how much of their slope acts on her."""
+    """How the ship meets the waves, and how much of their slope acts on it."""
 
     heading_deg: float = 90.0
     """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""

@@ -30,7 +30,7 @@ _END_S: Final = 10.0
 
 
 class Announcer:
-    """Event ring of a run, and the process that tells what comes through it, ready at once.
+    """Event ring of a run, and the process that prints what comes through it, ready at once.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Announcer:
     ring : str or None
         Name of the ring, for a recorder; None if there was no room for it.
     error : str or None
-        Why events are not told; the controller runs all the same.
+        Why events are not printed; the controller runs all the same.
     """
 
     def __init__(self, ships: IdentifiedShips | None = None) -> None:
@@ -80,7 +80,7 @@ class Announcer:
             self._writer.write(event, start_ns)
 
     def stop(self) -> None:
-        """Have the last events told, and find out whether all went well; idempotent."""
+        """Have the last events printed, and find out whether all went well; idempotent."""
         writer, self._writer = self._writer, None
         if writer is None:
             return

@@ -21,7 +21,7 @@ from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
 
 LEAST_LOOP_GAIN = 0.05
-"""Below it a law that has all margins is told to do nothing; the shipped ones have 1.3 and more."""
+"""Below it a law with all margins hardly acts; the shipped ones have 1.3 and more."""
 
 Judged = dict[str, JudgedLaw]
 

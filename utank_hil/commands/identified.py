@@ -1,4 +1,4 @@
-"""The configuration for a ship that was identified: her vessel, and a controller that names it."""
+"""The configuration for a ship that was identified: vessel, and a controller that names it."""
 
 import dataclasses
 from pathlib import Path

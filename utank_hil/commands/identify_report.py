@@ -1,4 +1,4 @@
-"""What ``utank-hil identify`` tells: tables for people, figures for scripts."""
+"""What ``utank-hil identify`` prints: tables for people, figures for scripts."""
 
 import dataclasses
 import math

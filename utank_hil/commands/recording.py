@@ -1,4 +1,4 @@
-"""The recording of a run: if it fails, the controller runs all the same, and the user is told."""
+"""The recording of a run: if it fails, the controller runs on, and the failure is printed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +41,7 @@ class RunRecording:
     ----------
     folder : Path
         Made if it is not there. The file is named by the time, so that none is overwritten: the
-        recording of a run that crashed is what tells why.
+        recording of a run that crashed shows why.
     live : bool
         Serve viewers too.
     events : str, optional

@@ -49,8 +49,8 @@ def run(
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
     It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
-    (UTC) of their start; a recording that fails is told, and the controller runs without. A
-    controller that retunes itself tells each step with its reasons when it happens.
+    (UTC) of their start; a recording that fails is reported, and the controller runs without. A
+    controller that retunes itself prints each step with its reasons when it happens.
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -137,7 +137,7 @@ def run(
 
 
 def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
-    """Who tells what retuning does, and keeps in `folder` what it found."""
+    """What prints the events of retuning, and keeps in `folder` the ships it found."""
     ships = None
     if folder is not None:
         ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))

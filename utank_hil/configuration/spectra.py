@@ -104,10 +104,10 @@ def _bands_of(content: Any) -> Any:
     """The section ``sea`` of a law with its spectrum as bands, if it names one by its kind."""
     if not (isinstance(content, dict) and "kind" in content):
         return content
-    told = [name for name in _BANDS if name in content]
-    if told:
+    given = [name for name in _BANDS if name in content]
+    if given:
         reason = "and kind exclude each other: remove one"
-        raise ParameterError("sea", [(name, reason) for name in told])
+        raise ParameterError("sea", [(name, reason) for name in given])
     model_keys = {each.name for each in fields(SeaModel)}
     named = {name: value for name, value in content.items() if name not in model_keys}
     spectrum = _SPECTRUM.validate_python(named).spectrum()

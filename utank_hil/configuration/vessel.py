@@ -1,4 +1,4 @@
-"""A ship with its tank and pump, and what of her must fit together."""
+"""A ship with its tank and pump, and the checks that they fit together."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ from utank_hil.parameters import Problem, refuse
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
 
-# where the user set no limits, they are as the first ship's are to her pump and tank: the laws were
+# default limits keep the first ship's ratios to its pump and tank: the laws were
 # tuned within these
 _RATE_PER_PRESSURE: Final = 2.0
 _LEVEL_SHARE: Final = 3.85 / 4.88
@@ -58,7 +58,7 @@ class Vessel(Section):
 
 
 def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
-    """Why a ship can't carry a tank: the water must leave her inertia and stability."""
+    """Why a ship can't carry a tank: inertia and stability must stay positive with its water."""
     try:
         mass, _, stiffness = coupled_matrices(ship, tank)
     except OverflowError:

@@ -14,7 +14,7 @@ class Controller(Protocol):
 
     Timing: `step` is called with the measurement at t_k and its answer is commanded at once; it
     acts on the plant from t_k + delay on, until the answer of the next step takes over. A
-    controller that is not in charge is stepped all the same and told through `applied` what was
+    controller that is not in charge is stepped all the same and gets through `applied` what was
     commanded instead; it can then take over without a bump.
 
     Attributes
@@ -56,7 +56,7 @@ class StartsAnew(Protocol):
     """A controller that is reset when an operator arms it, or resets a fault.
 
     Its memory is of its own doing: how far its ramp got, that it has ended, what it learnt while in
-    charge. Other controllers remember the ship. They are stepped all the while, know her at once
+    charge. Other controllers remember the ship. They are stepped all the while, know it at once
     and would lose that by a reset.
 
     Attributes

@@ -3,7 +3,7 @@
 For x(k+1) = A x(k) + B u(k) + w(k), y(k) = C x(k) + D u(k) + v(k):
 
 * `design_lqr`: u = -K x that makes the sum of x'Q x + u'R u + 2 x'N u least;
-* `design_lqg`: the same gain on the state that a Kalman predictor tells from y(k-1), y(k-2), ... ::
+* `design_lqg`: the same gain on the estimate of a Kalman predictor from y(k-1), y(k-2), ... ::
 
       xhat(k+1) = A xhat(k) + B u(k) + L (y(k) - C xhat(k) - D u(k)),    u(k) = -K xhat(k)
 
@@ -120,7 +120,7 @@ def design_lqg(
     process_covariance: npt.ArrayLike,
     measurement_covariance: npt.ArrayLike,
 ) -> "LQGLaw":
-    """A regulator on the state that a Kalman predictor tells from the outputs.
+    """A regulator on the state that a Kalman predictor estimates from the outputs.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ class LQGDesign:
     Parameters
     ----------
     predictor : Predictor
-        What the Kalman filter is told. Its `order` counts for nothing here.
+        Parameters of the Kalman filter. Its `order` is not used.
     state_weight : tuple of float
         On the squares of `STATES`, per rad^2, (rad/s)^2, m^2, (m/s)^2.
     input_weight : float

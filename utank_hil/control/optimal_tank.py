@@ -36,7 +36,7 @@ class ShipTankRatios:
     coupling_ratio : float
         G1.
     roll_damping_ratio : float
-        xi_phi of the ship without her tank.
+        xi_phi of the ship without its tank.
     static_coupling : float, optional
         c, for a tank that exists; f^2 when left out.
 
@@ -75,7 +75,7 @@ class PassiveOptimum:
 
 
 def ship_ratios(ship: RollShip, tank: Tank) -> tuple[ShipTankRatios, float]:
-    """Ratios of a ship with her tank, and her roll frequency w_s (rad/s) with the water at rest."""
+    """Ratios of a ship with its tank, and its roll frequency w_s (rad/s) with the water at rest."""
     mass, damping, stiffness = coupled_matrices(ship, tank)
     frequency = math.sqrt(stiffness[0, 0] / mass[0, 0])
     ratios = ShipTankRatios(

@@ -99,8 +99,8 @@ class ClippedValve:
     ----------
     valve : ValveRange
     pump : Controller
-        One input; on measurements whose last is the level rate. It is told what pressure the valve
-        really made.
+        One input; on measurements whose last is the level rate. Its `applied` gets the pressure
+        that the valve really made.
     """
 
     def __init__(self, valve: ValveRange, pump: Controller) -> None:

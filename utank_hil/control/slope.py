@@ -13,7 +13,7 @@ from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import Controller
 
 STEP: Final = 1e-6
-"""To either side, in the unit of each input: far below what a sensor tells from noise."""
+"""To either side, in the unit of each input: far below the noise of a sensor."""
 
 
 def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:

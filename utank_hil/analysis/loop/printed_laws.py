@@ -5,7 +5,7 @@ Two misprints are put right: u(k-2) of DPC (roll, level) reads -2.9047e-2, and t
 besides the sample: u(k) is made of y(k-1) and acts over [k, k+1).
 
 The sixteen roll gains come from one ARX(4) model, `PRINTED_ARX`, which is not that of the printed
-ship: her reservoirs' area, 17.11 m^2, looks like the width, 17.1 m (docs/control.md).
+ship: its reservoirs' area, 17.11 m^2, looks like the width, 17.1 m (docs/control.md).
 """
 
 from collections.abc import Mapping

@@ -31,8 +31,8 @@ class Robustness:
     late_radius, late_peak_sensitivity : float
         Closed-loop radius and peak sensitivity with `EXTRA_DELAY_S` more delay.
     worst_radius : float
-        Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by her
-        stiffness) and `INERTIA_SCALES` of her inertia, `GAINS` of the pump, and `EXTRA_DELAY_S`
+        Greatest closed-loop radius over `PERIOD_SCALES` of the ship's roll period (by its
+        stiffness) and `INERTIA_SCALES` of its inertia, `GAINS` of the pump, and `EXTRA_DELAY_S`
         more delay or none.
     worst_period_scale, worst_inertia_scale, worst_gain, worst_extra_delay_s : float
         Where that is; of the first two one is 1.

@@ -23,7 +23,7 @@ LEAST_ROLL_RAD: Final = 1e-6
 
 
 class CalmSeaError(ValueError):
-    """A sea that does not roll the ship: there is nothing to take away from her roll."""
+    """A sea that does not roll the ship: there is no roll to reduce."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def motion_in_sea(
     measured : tuple of str
         Names of the outputs that the law sees, in its order.
     wave_moment : Harmonics
-        In N m. Components that the samples can't tell from slower ones (above pi / Ts) meet the
+        In N m. Components above the Nyquist frequency pi / Ts meet the
         passive tank.
     delay_s, lag_s : float
         As in `sampled_model`.
@@ -79,7 +79,7 @@ def motion_in_sea(
 
 
 def require_roll(passive: MotionInSea) -> None:
-    """Raise a `CalmSeaError` where the ship with her passive tank does not roll."""
+    """Raise a `CalmSeaError` where the ship with its passive tank does not roll."""
     if not passive.roll_rms_rad >= LEAST_ROLL_RAD:
         raise CalmSeaError(
             "the sea does not roll the ship, so no law can be compared: it needs waves, and not "

@@ -1,6 +1,6 @@
 """Laws in the same realisations of irregular seas, on all cores.
 
-One trial is one realisation of a sea: the linear ship without her tank, with the tank passive, and
+One trial is one realisation of a sea: the linear ship without its tank, with the tank passive, and
 then under each entrant, all in the same waves and with the same sensor noise. Differences between
 two entrants of a trial scatter far less from realisation to realisation than their rolls do, so
 they are compared trial by trial (`utank_hil.analysis.motion.confidence`).

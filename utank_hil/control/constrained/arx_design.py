@@ -48,7 +48,7 @@ def design_constrained_gpc(
     ------
     ValueError
         If a horizon, weight or budget is out of its range or shape, the power is limited without
-        level and area to tell it from, or the ARX model has more inputs.
+        level and area to compute it from, or the ARX model has more inputs.
     """
     if not 1 <= control_horizon <= prediction_horizon:
         raise ValueError(

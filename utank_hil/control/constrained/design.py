@@ -1,6 +1,6 @@
 """From a ship, a tank and the sea that is expected to a constrained predictive law.
 
-A Kalman filter on the model of ship, tank, drive, waves and heel (`sea_plant`) tells the state;
+A Kalman filter on the model of ship, tank, drive, waves and heel (`sea_plant`) estimates the state;
 what it foresees of the waves is in every prediction. The cost is roll, level and pressure over the
 horizon, and roll and level for ever after it with the tank passive: a plan that leaves the ship
 swinging is not cheap. What a steady heel explains of the motion is taken off first.
@@ -74,7 +74,7 @@ class ConstrainedDesign:
     level_margin_m : float
         Kept from the limit on the level.
     heel_std_rad, heel_time_s : float
-        Standard deviation and time constant of a slowly varying heel that is told from the waves.
+        Standard deviation and time constant of a slowly varying heel.
     heel_share : float
         Part of that heel which the tank takes out, 0 to 1. With 0 the pump holds no steady pressure
         and the roll about the heel is controlled; the level that the heel brings is known to the

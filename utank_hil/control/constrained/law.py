@@ -62,7 +62,7 @@ class ConstrainedLaw:
     Raises
     ------
     ValueError
-        If a value is out of its range, or the power is limited without a level to tell it from.
+        If a value is out of its range, or the power is limited and no level is measured.
     """
 
     model: LinearModel

@@ -76,7 +76,7 @@ def washed(law: WashableLaw, washout_rad_s: float, ship: RollShip) -> LinearLaw:
     if washout_rad_s > most:
         reason = (
             f"must be {most:.3g} at most, a quarter of the ship's roll frequency, or the law does "
-            f"not see her roll; got {washout_rad_s:g}"
+            f"not see the roll; got {washout_rad_s:g}"
         )
         refuse("design", [("washout_rad_s", reason)])
     return WashoutLaw(law, washout_rad_s)
@@ -92,7 +92,7 @@ def per_output(name: str, values: tuple[float, ...], measured: tuple[str, ...]) 
 
 @dataclass(frozen=True, slots=True)
 class Predictor:
-    """What the predictor is told; with it the ARX model of a ship and tank is determined.
+    """Parameters of the predictor; with a ship and tank they determine its ARX model.
 
     Parameters
     ----------
