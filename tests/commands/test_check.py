@@ -16,9 +16,10 @@ from wrong_values import WRONG
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.assembly import build_controller_node, build_law, retuner_work
 from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
+from utank_hil.parameters import ParameterError
 from utank_hil.retuning import SimulatedRetuner
 
 CONFIGS = Path("configs").resolve()
@@ -330,10 +331,17 @@ def test_what_loads_can_be_built_and_what_does_not_is_told(tmp_path: Path, data:
     if isinstance(loaded, Scenario):
         build_ship_side(loaded, loaded.seed, loaded.operator)
         controllers = [*loaded.controllers.values()]
+    told: list[tuple[str, str]] = []
     for each in controllers:
         work = retuner_work(each)
         retuner = None if work is None else SimulatedRetuner(work[0], 5.0)
-        build_controller_node(each, retuner=retuner)
+        try:
+            law = build_law(each)
+        except ParameterError as error:
+            told += error.problems
+        else:
+            build_controller_node(each, law, retuner=retuner)
+    assert all(key.partition(".")[0] == "law" and reason for key, reason in told)
 
 
 @pytest.mark.parametrize(

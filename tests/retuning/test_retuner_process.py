@@ -97,7 +97,7 @@ def _answer(retuner: RetunerProcess, number: int) -> Answer | None:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A heart that has not beaten for 1.5 s, not 5 s, is no sign of life."""
-    monkeypatch.setattr("utank_hil.retuning.process._ALIVE_NS", 1_500_000_000)
+    monkeypatch.setattr("utank_hil.retuning.retuner_process._ALIVE_NS", 1_500_000_000)
 
 
 def test_each_record_gets_its_own_answer() -> None:
