@@ -222,7 +222,7 @@ def endings(result: BenchResult) -> list[str]:
         for run in result.runs
         if run.fallbacks
     ]
-    said += [f"{run.name}: the law raised {run.law_error}" for run in result.runs if run.law_error]
+    said += [f"{run.name}: the law failed: {run.law_error}" for run in result.runs if run.law_error]
     for run in figures(result)[1]:
         if run.fault != Fault.NONE.name or run.mode == Mode.FAULT.name:
             words = fault_text(Fault[run.fault])

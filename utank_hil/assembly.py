@@ -78,7 +78,7 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
             law = config.law.build(config.plant)
-            if law.unjudged:
+            if law.linear is None and law.closes_loop:
                 law = _by_impulse_response(law)
             finite = law.linear is None or all(
                 np.isfinite(matrix).all() for matrix in law.linear.matrices()[:4]
@@ -108,7 +108,10 @@ def _by_impulse_response(law: BuiltLaw) -> BuiltLaw:
         linear = impulse_response_law(law.controller, law.measured, budget_s=_STEPPING_S)
     except NoImpulseResponse as error:
         return replace(law, unjudged=f"its loop can't be judged: {error}")
-    return replace(law, linear=linear, at_rest=not linear.linear, unjudged="")
+    if not linear.impulse.any():
+        reason = "it answers a small impulse with nothing: a dead zone, or a late answer"
+        return replace(law, unjudged=f"its loop can't be judged: {reason}")
+    return replace(law, linear=linear, at_rest=not linear.linear)
 
 
 def build_controller_node(

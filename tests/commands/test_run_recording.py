@@ -1,5 +1,6 @@
 """A run's recording: named by its time, and never a reason not to control."""
 
+import os
 import re
 import shutil
 from pathlib import Path
@@ -16,7 +17,7 @@ SHM = Path("/dev/shm")
 
 
 def rings() -> set[str]:
-    return {path.name for path in SHM.glob("utank-*")}
+    return {path.name for path in SHM.glob(f"utank-{os.getpid()}-*")}
 
 
 def rows(count: int) -> np.ndarray:

@@ -59,6 +59,14 @@ def test_a_law_without_states_has_d_alone(tmp_path: Path) -> None:
     np.testing.assert_allclose(answers(config, 2), samples @ [1.0, -2.0])
 
 
+def test_a_static_law_may_be_json(tmp_path: Path) -> None:
+    static = {"A": [], "B": [], "C": [[]], "D": [[2.0]], "dt": 0.1}
+    config = configured(tmp_path, written(tmp_path, ".json", static))
+    np.testing.assert_allclose(
+        answers(config), 2 * np.random.default_rng(1).standard_normal((5, 1))[:, 0]
+    )
+
+
 @pytest.mark.parametrize(
     ("suffix", "content", "message"),
     [
@@ -68,6 +76,7 @@ def test_a_law_without_states_has_d_alone(tmp_path: Path) -> None:
         (".json", {**LAW, "dt": 0.1, "B": [[1.0]]}, "system.B: must have shape (2, 1)"),
         (".npz", {**LAW, "dt": 0.1, "D": [[1.0], [2.0]]}, "system.D: must be one row"),
         (".npz", {**LAW, "dt": 0.1, "C": [[np.inf, 0.0]]}, "system.C"),
+        (".json", {**LAW, "dt": True}, "dt must be a time in seconds, not true or false"),
         (".json", {**LAW, "dt": 0.013}, "law.system.sample_time_s: must be a whole number of"),
         (".mat", {**LAW, "dt": 0.1, "A": [[1j, 0], [0, 1]]}, "a complex one is not"),
     ],

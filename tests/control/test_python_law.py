@@ -46,6 +46,19 @@ def with_linear(dt=0.1):
     return law
 
 
+def with_another_linear():
+    law = with_linear()
+    law.gain = 2e5
+    return law
+
+
+ONE = Gain()
+
+
+def always_the_same():
+    return ONE
+
+
 def without_reset():
     law = Gain()
     law.reset = None
@@ -90,7 +103,7 @@ def test_each_controller_is_a_new_one_with_the_configured_parameters() -> None:
     assert first is not second
     assert first.step(np.array([0.5])) == [1e5]
     assert law.linear is None
-    assert law.unjudged
+    assert law.closes_loop
 
 
 def test_a_factory_that_asks_for_the_plant_gets_it() -> None:
@@ -100,7 +113,6 @@ def test_a_factory_that_asks_for_the_plant_gets_it() -> None:
 def test_a_law_s_own_state_space_is_judged_in_the_loops_count() -> None:
     law = built("with_linear")
     assert law.linear is not None
-    assert not law.unjudged
     z = np.exp(1j * np.array([0.1, 1.0]))
     np.testing.assert_allclose(law.linear.response(z)[:, 0, 0], 1e5 / z)
     assert control.ss([], [], [], [[1e5]], 0.1).D == 1e5
@@ -118,6 +130,8 @@ def test_a_law_s_own_state_space_is_judged_in_the_loops_count() -> None:
         ("of_scalar", {}, "factory", "gives 1.0, not a pressure of shape"),
         ("that_raises_at_rest", {}, "factory", "fails at rest: ZeroDivisionError"),
         ("Gain", {"sample_time_s": "fast"}, "factory", "sample_time_s is 'fast'"),
+        ("with_another_linear", {}, "factory", "answers an impulse of 0.001 with 200 Pa at step 1"),
+        ("always_the_same", {}, "factory", "returned the same controller twice"),
         ("with_linear", {"dt": 0.2}, "factory", "has sample_time_s 0.1, but its linear has 0.2"),
     ],
 )

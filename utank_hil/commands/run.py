@@ -129,7 +129,7 @@ def run(
         )
     console.print(f"ended in {node.mode.name}, fault {fault_text(node.fault)}", soft_wrap=True)
     if node.law_error:
-        console.print(f"[red]the law raised[/red] {escape(node.law_error)}", soft_wrap=True)
+        console.print(f"[red]the law failed:[/red] {escape(node.law_error)}", soft_wrap=True)
     if node.fallbacks:
         console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:

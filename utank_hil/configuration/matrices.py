@@ -45,6 +45,8 @@ def read_system(path: Path) -> dict[str, Any]:
             f"{path.name} must hold A, B, C, D and one of {', '.join(_SAMPLE_TIMES)}; it has "
             f"{', '.join(sorted(content)) or 'nothing'}"
         )
+    if isinstance(content[found[0]], bool) or np.asarray(content[found[0]]).dtype == bool:
+        raise ValueError(f"{path.name}: {found[0]} must be a time in seconds, not true or false")
     try:
         (sample_time_s,) = np.asarray(content[found[0]], dtype=np.float64).ravel().tolist()
         rows = {name: _rows(content[name]) for name in _NAMES}
@@ -56,6 +58,8 @@ def read_system(path: Path) -> dict[str, Any]:
 def _rows(matrix: Any) -> tuple[tuple[float, ...], ...]:
     if np.iscomplexobj(matrix):
         raise ValueError("a complex one is not")
+    if np.size(matrix) == 0:
+        return tuple(() for _ in range(len(np.atleast_2d(matrix)) if np.ndim(matrix) == 2 else 0))
     return tuple(map(tuple, np.atleast_2d(np.asarray(matrix, dtype=np.float64)).tolist()))
 
 

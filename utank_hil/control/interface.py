@@ -108,13 +108,16 @@ class BuiltLaw:
     measured : tuple of str
         What the controller measures, in order; names of `STATES`.
     linear : LinearLaw or None
-        The law for the analysis of its loop. None where there is no loop.
+        The law for the analysis of its loop.
     at_rest : bool
         The law is not linear, and `linear` is its slope at rest.
     adapts : bool
         The law changes while it runs, and `linear` is what it starts from.
+    closes_loop : bool
+        The law feeds measurements back. If it does and `linear` is None, its loop is judged by its
+        impulse response.
     unjudged : str
-        Why its loop can't be judged, of a law that closes one; empty where it can, or need not.
+        Why its loop can't be judged; empty where it can, or need not.
     """
 
     controller: Callable[[], Controller]
@@ -122,6 +125,7 @@ class BuiltLaw:
     linear: LinearLaw | None = None
     at_rest: bool = False
     adapts: bool = False
+    closes_loop: bool = True
     unjudged: str = ""
 
 

@@ -52,4 +52,4 @@ class PassiveDesign:
 
     def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, the same for all
         """Zero pressure; there is no loop."""
-        return BuiltLaw(PassiveController, ("roll_rad",))
+        return BuiltLaw(PassiveController, ("roll_rad",), closes_loop=False)

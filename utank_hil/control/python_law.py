@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,6 +27,7 @@ from utank_hil.control.predictive.design import measured_problems
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.parameters import ParameterError, refuse
 
+_PROBE, _COMPARED, _ALIKE = 1e-3, 50, 1e-3  # impulse, steps, share of the largest answer
 _METHODS = ("step", "applied", "reset")
 
 
@@ -73,9 +75,13 @@ class PythonDesign:
         make = partial(_call, self.factory, dict(self.parameters), plant)
         controller = make()
         _try_out(controller, len(self.measured))
+        if make() is controller:
+            reason = "returned the same controller twice: it must make a new one each time"
+            raise _refused("factory", reason)
         linear = _linear_of(controller, len(self.measured))
-        unjudged = "" if linear else "brings no linear law to judge its loop by"
-        return BuiltLaw(make, self.measured, linear, unjudged=unjudged)
+        if linear is not None:
+            _compare(make(), linear, len(self.measured))
+        return BuiltLaw(make, self.measured, linear)
 
 
 def _call(factory: str, parameters: dict[str, Any], plant: DesignPlant) -> Controller:
@@ -120,8 +126,9 @@ def _try_out(controller: Controller, outputs: int) -> None:
     if lacking:
         reason = f"returned an object without {', '.join(lacking)}"
         raise _refused("factory", reason)
-    sample_time_s = getattr(controller, "sample_time_s", None)
-    if not (isinstance(sample_time_s, int | float) and 0 < sample_time_s < math.inf):
+    sample_time_s: Any = getattr(controller, "sample_time_s", None)
+    known = isinstance(sample_time_s, Real) and not isinstance(sample_time_s, bool)
+    if not (known and 0 < sample_time_s < math.inf):
         reason = f"returned an object whose sample_time_s is {sample_time_s!r}, not a time"
         raise _refused("factory", reason)
     try:
@@ -144,16 +151,43 @@ def _linear_of(controller: Controller, outputs: int) -> LinearLaw | None:
     try:
         law: LinearLaw = StateSpaceLaw(own) if hasattr(own, "A") else own
         model, period_s = law.matrices(), law.sample_time_s
+        law.response(np.ones(1, dtype=np.complex128))
     except (AttributeError, TypeError, ValueError) as error:
         reason = f"returned a controller whose linear is no linear law: {error}"
         raise _refused("factory", reason) from error
     if abs(period_s - controller.sample_time_s) > 1e-9:
         reason = f"has sample_time_s {controller.sample_time_s:g}, but its linear has {period_s:g}"
         raise _refused("factory", reason)
+    if model.D.any():
+        reason = (
+            "returned a controller whose linear answers in the sample it measures: give the "
+            "state-space model itself, or a StateSpaceLaw of it"
+        )
+        raise _refused("factory", reason)
     if model.D.shape != (1, outputs):
         reason = f"returned a controller whose linear is {model.D.shape}, not (1, {outputs})"
         raise _refused("factory", reason)
     return law
+
+
+def _compare(controller: Controller, linear: LinearLaw, outputs: int) -> None:
+    """Refuse a linear law whose first answers to an impulse are not the controller's."""
+    a, b, c, _, _ = linear.matrices()
+    y, states = np.full(outputs, _PROBE), b @ np.full((outputs, 1), _PROBE)
+    answers, expected = [], []
+    for _ in range(_COMPARED):
+        answers.append(float(controller.step(y)[0]))
+        controller.applied(np.array(answers[-1:]))
+        expected.append((c @ states).item())
+        y, states = np.zeros(outputs), a @ states
+    largest = max(map(abs, expected + answers))
+    if not np.allclose(answers, expected, rtol=0, atol=_ALIKE * largest):
+        worst = int(np.argmax(np.abs(np.subtract(answers, expected))))
+        reason = (
+            f"returned a controller that answers an impulse of {_PROBE:g} with "
+            f"{answers[worst]:.4g} Pa at step {worst + 1}, its linear with {expected[worst]:.4g} Pa"
+        )
+        raise _refused("factory", reason)
 
 
 def _refused(key: str, reason: str) -> ParameterError:

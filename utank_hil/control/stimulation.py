@@ -85,7 +85,7 @@ class StimulationDesign:
             pressure_pa=plant.limits.pressure_pa,
             level_limit_m=plant.limits.level_m,
         )
-        return BuiltLaw(law.controller, STATES)
+        return BuiltLaw(law.controller, STATES, closes_loop=False)
 
     def _limit_problems(self) -> list[Problem]:
         problems = []

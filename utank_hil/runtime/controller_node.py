@@ -108,7 +108,8 @@ class ControllerNode:
     statistics : LoopStatistics
         Of the loop; without any, in lockstep, all zero.
     law_error : str
-        The first exception that the law raised; empty if there was none.
+        What first went wrong with the law, an exception or an answer that is not finite; empty if
+        nothing did.
 
     Raises
     ------
@@ -266,6 +267,7 @@ class ControllerNode:
             self._law_pa = self._answer(now_ns)
             if not math.isfinite(self._law_pa):
                 self._law_failed = True
+                self.law_error = self.law_error or f"its answer is {self._law_pa:g} Pa"
                 self._controller.reset()
             elif not self._law_raised:
                 self._law_failed = False
@@ -293,7 +295,7 @@ class ControllerNode:
         """The law's pressure for the newest measurement."""
         # the command that left since the last answer: anti-windup and bumpless take-over
         if self._answered:
-            self._controller.applied(self._applied)
+            self._controller.applied(self._applied.copy())  # a law may keep it
         if self._retuning is not None:
             seen = self.seen
             self._retuning.update(
