@@ -13,33 +13,50 @@ class PackageError(Exception):
     """A package could not be had; the message names the remedy."""
 
 
+def cache() -> Path:
+    """Directory of what is kept: ``.cache/vcan`` of the project, or ``VCAN_CACHE_DIR``.
+
+    Raises
+    ------
+    PackageError
+        If it can't be made.
+    """
+    project = Path(__file__).resolve().parents[2]
+    directory = Path(os.environ.get("VCAN_CACHE_DIR") or project / ".cache" / "vcan").absolute()
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PackageError(
+            f"cannot use {directory} ({error.strerror}); set VCAN_CACHE_DIR to a directory of yours"
+        ) from error
+    return directory
+
+
 def unpacked(package: str) -> Path:
     """Directory that holds the unpacked ``package``, downloaded at first use.
 
-    The directory is ``.cache/vcan`` of the project, or ``VCAN_CACHE_DIR``. Runs side by side wait
-    for one another, and a half-unpacked package is never seen.
+    It is in the cache. Runs side by side wait for one another, and a half-unpacked package is never
+    seen.
 
     Raises
     ------
     PackageError
         If the cache cannot be written, or the package can be neither found nor downloaded.
     """
-    project = Path(__file__).resolve().parents[2]
-    cache = Path(os.environ.get("VCAN_CACHE_DIR") or project / ".cache" / "vcan").absolute()
-    target = cache / package
+    kept = cache()
+    target = kept / package
     if target.is_dir():
         return target
     if not shutil.which("apt-get") or not shutil.which("dpkg-deb"):
         raise PackageError(f"{package} is missing and this is no Debian: install it by hand")
     try:
-        cache.mkdir(parents=True, exist_ok=True)
-        with open(cache / "lock", "w") as lock:
+        with open(kept / "lock", "w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not target.is_dir():
                 _fetch(package, target)
     except OSError as error:
         raise PackageError(
-            f"cannot use {cache} ({error.strerror}); set VCAN_CACHE_DIR to a directory of yours"
+            f"cannot use {kept} ({error.strerror}); set VCAN_CACHE_DIR to a directory of yours"
         ) from error
     return target
 

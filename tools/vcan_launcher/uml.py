@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from vcan_launcher import debian
+from vcan_launcher import debian, xstate
 
 BOOT_LIMIT_S = 60.0
 POWER_OFF_LIMIT_S = 10.0
@@ -122,7 +122,7 @@ class _Machine:
             pass_fds=inside,
             process_group=0,  # Ctrl-C at the terminal must not reach the kernel itself
             preexec_fn=_in_kernel_process,
-            env={"TMPDIR": _memory_directory(), "PATH": os.defpath},
+            env={"TMPDIR": _memory_directory(), "PATH": os.defpath, **xstate.environment()},
         )
         for fd in (*inside, console_out):
             os.close(fd)
