@@ -1,5 +1,6 @@
 """The bench: the same sea without a tank, with the passive tank, and with each controller."""
 
+import math
 import multiprocessing
 import signal
 import time
@@ -15,6 +16,7 @@ from firmware_sim.run import (
     Job,
     Run,
     join,
+    roll_without_tank,
     run_controller,
     run_in_one_process,
     run_lockstep,
@@ -22,7 +24,6 @@ from firmware_sim.run import (
 )
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
-from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
 from utank_hil.control import BuiltLaw, PassiveDesign
@@ -69,6 +70,8 @@ class BenchResult:
         Whether it was ended from outside.
     wall_s : float
         Time all of it took.
+    without_tank_capsized_s : float
+        When the bare ship capsized; infinite if it did not.
     """
 
     scenario: Scenario
@@ -82,6 +85,7 @@ class BenchResult:
     not_run: tuple[str, ...]
     interrupted: bool
     wall_s: float
+    without_tank_capsized_s: float = math.inf
 
     @property
     def expected_rows(self) -> int:
@@ -239,6 +243,7 @@ def run_bench(
         raise InterruptedError("ended before the first sample")
     done = tuple(run for run in runs if len(run.rows))
     settle_s, end_s = window_s(done, scenario.settle_s)
+    bare_rad, bare_capsized_s = roll_without_tank(scenario, seed, round(end_s / RECORD_S))
     return BenchResult(
         scenario,
         _mode(options),
@@ -246,18 +251,12 @@ def run_bench(
         duration_s,
         settle_s,
         end_s,
-        roll_without_tank(
-            scenario.vessel.ship,
-            scenario.wave_moment(seed),
-            RECORD_S,
-            round(end_s / RECORD_S),
-            later_ship=scenario.sailing_ship,
-            later_from_s=scenario.actual_from_s,
-        ),
+        bare_rad,
         done,
         tuple(job.name for job in jobs if job.name not in {run.name for run in done}),
         interrupted,
         time.monotonic() - started,
+        bare_capsized_s,
     )
 
 

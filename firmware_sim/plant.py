@@ -1,95 +1,122 @@
 """The emulated ship: ship, tank and pump in waves, integrated up to a given time."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from firmware_sim import plant_kernel as kernel
+from firmware_sim.waves import SteadyWaves, Waves
 from utank_hil.arrays import FloatArray
-from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.kernels import MAX_IMPULSE, STRIKES
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 from utank_hil.tick import TICK_NS, TICK_S
 
-
-def _model(ship: RollShip, tank: Tank) -> FloatArray:
-    """Matrices, reservoir area and heeling accelerations in the kernel's layout, shape (4, 7)."""
-    system = coupled_model(ship, tank)
-    model = np.zeros((4, 7))
-    model[:, :4] = system.A
-    model[:, 4:6] = system.B
-    model[:, 6] = system.B[:, 1] * ship.heeling_moment_nm
-    model[0, 6] = tank.reservoir_area_m2
-    return model
+SAILING_TICKS = 100
+"""The ship's parameters are asked for once in so many ticks: once a second."""
 
 
 class Plant:
-    """Ship, tank and pump in waves, integrated at 1 kHz.
+    """Ship, tank and pump in waves, integrated at 1 kHz by the nonlinear equations.
 
     The ship is upright and at rest at the first `advance`. Off-centre weight and steady wind heel
-    it from then on. The pump follows its set-point through its own pressure loop. Switched off, its
-    rotor turns freely in the water.
+    it from then on. Water that reaches a limit of the level strikes it. A ship that passes 90
+    degrees has capsized and stays there. The pump follows its set-point through its own pressure
+    loop. Switched off, its rotor turns freely in the water.
 
     Parameters
     ----------
-    ship : RollShip
+    ship : RollShip or callable
+        The ship, or the ship at a time in s since the start; that is asked for once a second.
     tank : Tank
-    pump : Pump
-    wave_moment : Harmonics
+    pump : Pump or None
+        None for a tank without one.
+    waves : Waves or Harmonics
         Roll moment of the waves in N m, from the plant's start on.
+    linear : bool
+        Integrate the small-angle limit instead: no quadratic loss, no limit of the level, no
+        capsizing.
     """
 
-    def __init__(self, ship: RollShip, tank: Tank, pump: Pump, wave_moment: Harmonics) -> None:
+    def __init__(
+        self,
+        ship: RollShip | Callable[[float], RollShip],
+        tank: Tank,
+        pump: Pump | None,
+        waves: Waves | Harmonics,
+        *,
+        linear: bool = False,
+    ) -> None:
+        self._ship_at = ship if callable(ship) else None
+        self._ship = ship(0.0) if callable(ship) else ship
         self._tank = tank
-        self._model = self._later_model = _model(ship, tank)
-        self._change_ns: int | None = None
+        self._linear = linear
+        self._load(self._ship)
         self._area_m2 = tank.reservoir_area_m2
-        self._pump = pump
-        self._coefficients = tuple(pump.coefficients)
+        self._has_pump = pump is not None
+        self._pump = pump or Pump.for_duct(tank.duct_area_m2)  # of no effect if there is none
+        self._coefficients = tuple(self._pump.coefficients)
         self._weights = kernel.interpolation_weights()
-        frequency, phase = wave_moment.frequency_rad_s, wave_moment.phase_rad
-        self._rotations = np.exp(1j * frequency * TICK_S)
-        # three ticks before the last of the four moments, which is two ticks ahead of the start
-        self._phasors = wave_moment.amplitude * np.exp(1j * (phase - 2.0 * frequency * TICK_S))
+        self._waves = SteadyWaves(waves) if isinstance(waves, Harmonics) else waves
         self._state = np.zeros(kernel.STATES)
+        self._state[kernel.CAPSIZED] = math.inf
+        self._state[kernel.MODE] = kernel.ABSENT if pump is None else kernel.FREE
+        self._ticks = 0
+        phasors, rotations = self._waves.at(0)
         for index in range(4):
-            moment = kernel.turned_sum(self._phasors, self._rotations)
-            self._state[kernel.MOMENTS][index] = moment
+            self._state[kernel.MOMENTS][index] = kernel.turned_sum(phasors, rotations)
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
 
-    def change_ship(self, ship: RollShip, after_ns: int) -> None:
-        """Set the ship's parameters from some time after the start on; the wave moment stays.
-
-        To be called before the first `advance`.
-        """
-        self._later_model = _model(ship, self._tank)
-        self._change_ns = after_ns
+    def _load(self, ship: RollShip) -> None:
+        """Take the ship's parameters."""
+        tank = self._tank
+        self._linear_model = np.zeros((0, 7))
+        if self._linear:
+            a, b = state_matrices(ship, tank)
+            heel = b[:, 1:] * ship.heeling_moment_nm
+            self._linear_model = np.hstack([a, b, heel])
+            ship = replace(ship, quadratic_damping_nms2_rad2=0.0)
+            tank = replace(tank, quadratic_loss=0.0)
+        model = RollModel(ship, tank)
+        self._row: FloatArray = np.array([*model.coefficients, 1 / model.restoring.piece_rad])
+        self._restoring = model.restoring.coefficients_nm
 
     def advance(self, now_ns: int) -> None:
         """Integrate up to `now_ns`, in whole ticks after the first call."""
         if self._now_ns is None:
             self._now_ns = now_ns
-            if self._change_ns is not None:
-                self._change_ns += now_ns
         if now_ns - self._now_ns < TICK_NS:
             return
         while now_ns - self._now_ns >= TICK_NS:
-            if self._change_ns is not None and self._now_ns >= self._change_ns:
-                self._model, self._change_ns = self._later_model, None
+            if self._ship_at is not None and self._ticks % SAILING_TICKS == 0:
+                self._sail(self._ship_at(self._ticks * TICK_S))
+            phasors, rotations = self._waves.at(self._ticks)
             kernel.advance_tick(
                 self._state,
-                self._model,
+                self._row,
+                self._restoring,
+                self._linear_model,
                 self._coefficients,
-                self._phasors,
-                self._rotations,
+                phasors,
+                rotations,
                 self._weights,
             )
             self._now_ns += TICK_NS
+            self._ticks += 1
         # as plain numbers: reading an array's elements one by one costs more than all of them
         self._values = self._state.tolist()
+
+    def _sail(self, ship: RollShip) -> None:
+        if ship != self._ship:
+            self._ship = ship
+            self._load(ship)
 
     def drive_pump(self, setpoint_pa: float, *, enabled: bool) -> None:
         """Set the pump's command from now on.
@@ -101,8 +128,9 @@ class Plant:
         enabled : bool
             Whether the motor is on; if not, the rotor turns freely.
         """
-        self._state[kernel.SETPOINT] = setpoint_pa
-        self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
+        if self._has_pump:
+            self._state[kernel.SETPOINT] = setpoint_pa
+            self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
 
     def brake_pump(self) -> None:
         """Brake as fast as the motor can, without the pressure loop's lag and rate limit."""
@@ -116,6 +144,16 @@ class Plant:
         """
         self._state[kernel.SETPOINT] = pressure_pa
         self._state[kernel.MODE] = kernel.IMPOSED
+
+    def set_valve_loss(self, loss_pa_per_m2_s2: float) -> None:
+        """Throttle the water from now on.
+
+        Parameters
+        ----------
+        loss_pa_per_m2_s2 : float
+            Pressure loss per ``|dh/dt| dh/dt``, see `utank_hil.dynamics.valves`.
+        """
+        self._state[kernel.VALVE_LOSS] = loss_pa_per_m2_s2
 
     @property
     def roll_rad(self) -> float:
@@ -155,7 +193,38 @@ class Plant:
     @property
     def pump_energy_j(self) -> float:
         """Work of the shaft since the start."""
-        return self._values[kernel.ENERGY]
+        return self._values[kernel.SHAFT_WORK]
+
+    @property
+    def wave_work_j(self) -> float:
+        """Work of the waves on the ship since the start."""
+        return self._values[kernel.WAVE_WORK]
+
+    @property
+    def pump_work_j(self) -> float:
+        """Work of the pump's pressure on the water since the start."""
+        return self._values[kernel.PUMP_WORK]
+
+    @property
+    def losses_j(self) -> float:
+        """What damping of ship and water, valve and strikes took since the start."""
+        parts = (kernel.DAMPED, kernel.DAMPED_STRIKING, kernel.STRUCK)
+        return sum(self._values[part] for part in parts)
+
+    @property
+    def strikes(self) -> int:
+        """How often the water struck a limit of its level since the start."""
+        return int(self._values[kernel.SUMMED][STRIKES])
+
+    @property
+    def max_strike_impulse_nms(self) -> float:
+        """Greatest angular impulse of a strike on the ship."""
+        return self._values[kernel.SUMMED][MAX_IMPULSE]
+
+    @property
+    def capsized_s(self) -> float:
+        """Time since the start at which the ship capsized, infinite for one that did not."""
+        return self._values[kernel.CAPSIZED]
 
     @property
     def wave_moment_nm(self) -> float:

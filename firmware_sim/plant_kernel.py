@@ -1,7 +1,7 @@
 """Compiled integration of ship, tank and pump. Imports numba: import it late.
 
-One call advances the plant by one tick in steps of 1 ms: the pump and its inner pressure
-loop once a step, the coupled linear model by classical Runge-Kutta with the pump's pressure held
+One call advances the plant by one tick in steps of 1 ms: the pump and its inner pressure loop once
+a step, ship and water by the step of `utank_hil.dynamics.kernels`, with the pump's pressure held
 over the step. The wave moment is a sum of rotating phasors, summed once a tick and interpolated in
 between through four ticks' values; for a wave at 3 rad/s that is exact to 2e-8 of its amplitude.
 """
@@ -10,6 +10,17 @@ import numpy as np
 from numba import njit
 
 from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.kernels import (
+    CAPSIZED_S,
+    DAMPED_AROUND,
+    STRIKE_LOSS,
+    SUMMARY,
+    State,
+    damping_w,
+    rk4,
+    step_with_impacts,
+    unpacked,
+)
 from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
 from utank_hil.tick import TICK_S
 
@@ -22,13 +33,20 @@ SPEED, REFERENCE, INTEGRAL, PRESSURE, TORQUE, POWER, LIMITED = range(4, 11)  # P
 SETPOINT, MODE = 11, 12
 MOMENTS = slice(13, 17)  # wave moment at t - 1, t, t + 1 and t + 2 ticks
 MOMENT_NOW = 14
-ENERGY = 17  # taken by the shaft since the start, J
-STATES = 18
+VALVE_LOSS = 17  # Pa per (m/s)^2 of dh/dt
+TIME = 18  # since the start, s
+# work since the start, J: of the shaft, of the waves, of the pump on the water; what damping and
+# valve took
+SHAFT_WORK, WAVE_WORK, PUMP_WORK, DAMPED = range(19, 23)
+SUMMED = slice(23, 23 + SUMMARY)  # summary of `utank_hil.dynamics.kernels`
+STATES = 23 + SUMMARY
+CAPSIZED, STRUCK, DAMPED_STRIKING = 23 + CAPSIZED_S, 23 + STRIKE_LOSS, 23 + DAMPED_AROUND
 
-# values of MODE: the rotor turns freely, follows the set-point, or the set-point is the pressure
-FREE, DRIVEN, IMPOSED = 0, 1, 2
+# values of MODE: the rotor turns freely, follows the set-point, the set-point is the pressure, or
+# there is no pump
+FREE, DRIVEN, IMPOSED, ABSENT = 0, 1, 2, 3
 
-State = tuple[float, float, float, float]
+CAPSIZE_RAD = np.pi / 2
 
 pump_step, pump_coast = compile_pump(njit(cache=True))
 
@@ -47,21 +65,26 @@ def interpolation_weights() -> FloatArray:
 @njit(cache=True, error_model="numpy")
 def advance_tick(
     state: FloatArray,
-    model: FloatArray,
+    row: FloatArray,
+    restoring: FloatArray,
+    linear: FloatArray,
     coefficients: tuple[float, ...],
     phasors: ComplexArray,
     rotations: ComplexArray,
     weights: FloatArray,
 ) -> None:
-    """Advance `state` by one tick, in place.
+    """Advance `state` by one tick, in place; a capsized ship stays as it is.
 
     Parameters
     ----------
     state : ndarray, shape (STATES,)
-    model : ndarray, shape (4, 7)
-        Columns: state matrix, effect of pressure, effect of wave moment; the last holds in its
-        first row the tank area that turns the level's rate into flow, and in the second and fourth
-        the accelerations by what heels the ship steadily.
+    row : ndarray, shape (18,)
+        `RollCoefficients`, and the pieces of the restoring moment per radian.
+    restoring : ndarray, shape (pieces, powers)
+        As in `utank_hil.dynamics.restoring.Restoring`.
+    linear : ndarray, shape (4, 7) or (0, 7)
+        The linear model instead of the equations of `row` and `restoring`. Columns: state matrix,
+        effect of pressure, effect of wave moment, accelerations by what heels the ship steadily.
     coefficients : tuple of float
         `PumpCoefficients` as a plain tuple: a named one takes numba 2 us to take in.
     phasors, rotations : ndarray, shape (n,)
@@ -69,6 +92,7 @@ def advance_tick(
     weights : ndarray
         From `interpolation_weights`.
     """
+    c = unpacked(row)
     pump_coefficients = PumpCoefficients(*coefficients)
     pump = PumpState(
         state[SPEED],
@@ -80,33 +104,47 @@ def advance_tick(
         state[LIMITED] > 0.5,
     )
     x = (state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE])
-    moments = state[MOMENTS]
-    energy_j = 0.0
+    valve = c.area * state[VALVE_LOSS]
+    moments, summary = state[MOMENTS], state[SUMMED]
+    shaft_j, wave_j, pump_j, damped_j = 0.0, 0.0, 0.0, 0.0
     first = moments[1]
     # not STEPS: numba's cache would keep the number of an earlier tick
     for step in range(len(weights) // 2):
-        flow_m3_s = model[0, 6] * x[3]
-        if state[MODE] == DRIVEN:
+        if summary[CAPSIZED_S] < np.inf:
+            x = (x[0], 0.0, x[2], 0.0)
+            break
+        flow_m3_s = c.area * x[3]
+        if state[MODE] == ABSENT:
+            pass
+        elif state[MODE] == DRIVEN:
             pump = pump_step(pump, state[SETPOINT], flow_m3_s, STEP_S, pump_coefficients)
         else:
             pump = pump_coast(pump, flow_m3_s, STEP_S, pump_coefficients)
         if state[MODE] == IMPOSED:
             pressure_pa, power_w = state[SETPOINT], state[SETPOINT] * flow_m3_s
             pump = PumpState(pump.speed_rad_s, 0.0, 0.0, pressure_pa, 0.0, power_w, False)
-        energy_j += pump.power_w * STEP_S
         middle = _interpolated(weights, 2 * step + 1, moments)
         last = _interpolated(weights, 2 * step + 2, moments)
-        k1 = _rates(model, x, x, 0.0, pump.pressure_pa, first)
-        k2 = _rates(model, x, k1, STEP_S / 2, pump.pressure_pa, middle)
-        k3 = _rates(model, x, k2, STEP_S / 2, pump.pressure_pa, middle)
-        k4 = _rates(model, x, k3, STEP_S, pump.pressure_pa, last)
-        x = (
-            x[0] + STEP_S / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
-            x[1] + STEP_S / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
-            x[2] + STEP_S / 6 * (k1[2] + 2 * k2[2] + 2 * k3[2] + k4[2]),
-            x[3] + STEP_S / 6 * (k1[3] + 2 * k2[3] + 2 * k3[3] + k4[3]),
-        )
-        first = last
+        waves = (first, middle, last)
+        force = c.area * pump.pressure_pa
+        if len(linear) > 0:
+            after = _linear_step(linear, x, waves, pump.pressure_pa)
+        else:
+            after = rk4(c, row[17], restoring, x, waves, force, valve, STEP_S)
+        if abs(after[2]) > c.level_limit and len(linear) == 0:
+            after = step_with_impacts(
+                c, row[17], restoring, x, waves, force, valve, STEP_S,
+                state[TIME] + step * STEP_S, np.empty((0, 5)), summary,
+            )  # fmt: skip
+        else:
+            damped_j += (damping_w(c, x, valve) + damping_w(c, after, valve)) / 2 * STEP_S
+        shaft_j += pump.power_w * STEP_S
+        # as force times way, which holds in a step with an impact too
+        wave_j += (first + last) / 2 * (after[0] - x[0])
+        pump_j += force * (after[2] - x[2])
+        x, first = after, last
+        if abs(x[0]) >= CAPSIZE_RAD and len(linear) == 0:
+            summary[CAPSIZED_S] = state[TIME] + (step + 1) * STEP_S
     state[ROLL], state[ROLL_RATE], state[LEVEL], state[LEVEL_RATE] = x
     state[SPEED] = pump.speed_rad_s
     state[REFERENCE] = pump.reference_pa
@@ -115,7 +153,11 @@ def advance_tick(
     state[TORQUE] = pump.torque_nm
     state[POWER] = pump.power_w
     state[LIMITED] = 1.0 if pump.limited else 0.0
-    state[ENERGY] += energy_j
+    state[SHAFT_WORK] += shaft_j
+    state[WAVE_WORK] += wave_j
+    state[PUMP_WORK] += pump_j
+    state[DAMPED] += damped_j
+    state[TIME] += (len(weights) // 2) * STEP_S
     moments[0], moments[1], moments[2] = moments[1], moments[2], moments[3]
     moments[3] = turned_sum(phasors, rotations)
 
@@ -135,6 +177,23 @@ def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
     # written out: a product of four numbers is not worth a call of the linear algebra library
     w, m = weights[row], moments
     return float(w[0] * m[0] + w[1] * m[1] + w[2] * m[2] + w[3] * m[3])
+
+
+@njit(cache=True, error_model="numpy")
+def _linear_step(
+    model: FloatArray, x: State, moments: tuple[float, float, float], pressure_pa: float
+) -> State:
+    """One Runge-Kutta step of the linear model."""
+    k1 = _rates(model, x, x, 0.0, pressure_pa, moments[0])
+    k2 = _rates(model, x, k1, STEP_S / 2, pressure_pa, moments[1])
+    k3 = _rates(model, x, k2, STEP_S / 2, pressure_pa, moments[1])
+    k4 = _rates(model, x, k3, STEP_S, pressure_pa, moments[2])
+    return (
+        x[0] + STEP_S / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]),
+        x[1] + STEP_S / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]),
+        x[2] + STEP_S / 6 * (k1[2] + 2 * k2[2] + 2 * k3[2] + k4[2]),
+        x[3] + STEP_S / 6 * (k1[3] + 2 * k2[3] + 2 * k3[3] + k4[3]),
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,5 +1,6 @@
 """One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import ShipSide, build_ship_side
+from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
@@ -117,6 +118,10 @@ class Run:
         Commands that the drive found outside its own limits.
     energy_j : float
         Work of the pump's shaft.
+    strikes : int
+        How often the water struck a limit of its level.
+    capsized_s : float
+        The ship's time at which it capsized; infinite if it did not.
     loop : LoopResult or None
         Of the loop with the controller; None in simulated time.
     retuning : tuple of RetuningEvent
@@ -131,6 +136,8 @@ class Run:
     bus_load: float
     refused_commands: int
     energy_j: float
+    strikes: int = 0
+    capsized_s: float = math.inf
     loop: LoopResult | None = None
     retuning: tuple[RetuningEvent, ...] = ()
     fallbacks: int | None = None
@@ -159,6 +166,8 @@ class ShipRun:
     start_ns: int
     refused_commands: int
     energy_j: float
+    strikes: int = 0
+    capsized_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,6 +200,8 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         lockstep.bus.statistics(lockstep.now_ns).load,
         ship.drive.refused,
         ship.plant.pump_energy_j,
+        ship.plant.strikes,
+        ship.plant.capsized_s,
         retuning=controller.retuning_events,
         fallbacks=controller.fallbacks,
         law_error=controller.law_error,
@@ -212,6 +223,8 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
         float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
         ship.drive.refused,
         ship.plant.pump_energy_j,
+        ship.plant.strikes,
+        ship.plant.capsized_s,
         loop,
         controller.retuning_events,
         controller.fallbacks,
@@ -225,7 +238,15 @@ def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     ship, truth, truth_log = _ship(job)
     nodes: list[Node] = [*ship.nodes, truth]
     _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
-    return ShipRun(truth_log.rows, truth.start_ns, ship.drive.refused, ship.plant.pump_energy_j)
+    plant = ship.plant
+    return ShipRun(
+        truth_log.rows,
+        truth.start_ns,
+        ship.drive.refused,
+        plant.pump_energy_j,
+        plant.strikes,
+        plant.capsized_s,
+    )
 
 
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
@@ -254,11 +275,23 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
         ship.refused_commands,
         ship.energy_j,
+        ship.strikes,
+        ship.capsized_s,
         controller.loop,
         controller.retuning,
         controller.fallbacks,
         controller.law_error,
     )
+
+
+def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatArray, float]:
+    """Roll of the ship without its tank every `RECORD_S`, shape (count,), and `capsized_s`."""
+    plant = bare_plant(scenario, seed)
+    roll_rad = np.empty(count)
+    for row in range(count):
+        plant.advance(row * RECORD_NS)
+        roll_rad[row] = plant.roll_rad
+    return roll_rad, plant.capsized_s
 
 
 def _load_kernel(job: Job) -> None:

@@ -1,8 +1,8 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
 import math
-from dataclasses import fields, replace
-from typing import Annotated, Any, Final
+from dataclasses import replace
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -29,10 +29,12 @@ SAILED: Final = (
     "inertia_kg_m2",
     "stiffness_nm_rad",
     "damping_nms_rad",
+    "quadratic_damping_nms2_rad2",
+    "displacement_n",
     "offset_moment_nm",
     "wind_moment_nm",
 )
-"""Parameters of the bench's ship, which is linear; the last two are heeling moments."""
+"""Parameters of the ship that may differ from the vessel's; the last two heel it."""
 
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
@@ -62,6 +64,8 @@ class Scenario(Section):
     seed: Annotated[int, Field(ge=0)] = 1
     place: Place | None = None
     """Where people are judged; over the starboard reservoir if not given."""
+    plant: Literal["nonlinear", "linear"] = "nonlinear"
+    """Equations of the emulated ship; the linear ones are their limit for small motions."""
     actual_ship: dict[str, float] = Field(default_factory=dict)
     """Keys of the ship that differ from the vessel's, which is what the controller believes.
 
@@ -116,6 +120,10 @@ class Scenario(Section):
         """The ship from `actual_from_s` on."""
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
 
+    def ship_at(self, time_s: float) -> RollShip:
+        """The ship at a time since the start."""
+        return self.sailing_ship if time_s >= self.actual_from_s else self.vessel.ship
+
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
         """Why a controller would never arm, or the drive would refuse what it may send."""
         problems = []
@@ -149,18 +157,10 @@ class Scenario(Section):
         return problems
 
     def _ship_problems(self) -> list[Problem]:
-        known = [field.name for field in fields(RollShip)]
-        wrong = [
-            (
-                f"actual_ship.{key}",
-                "would change nothing, the bench's ship is linear" if key in known
-                else "is not a known key",
-            )
-            for key in self.actual_ship
-            if key not in SAILED
-        ]  # fmt: skip
+        wrong = [key for key in self.actual_ship if key not in SAILED]
         if wrong:
-            return [(key, f"{reason}; it takes {', '.join(SAILED)}") for key, reason in wrong]
+            reason = f"can't differ from the vessel's; it takes {', '.join(SAILED)}"
+            return [(f"actual_ship.{key}", reason) for key in wrong]
         try:
             unstable = tank_problems(self.sailing_ship, self.vessel.tank)
         except ParameterError as error:

@@ -10,10 +10,9 @@ from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
 from utank_hil.canbus import load_catalogue
+from utank_hil.dynamics.tank import negligible
 from utank_hil.runtime import Node
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
-
-SECOND_NS = 1_000_000_000
 
 NODE_NAMES: Final = ("sensors", "drive", "panel")
 """The emulated nodes, in the order in which they tick; hardware may take the place of each."""
@@ -71,6 +70,25 @@ class ShipSide:
         return nodes
 
 
+def bare_plant(scenario: Scenario, seed: int) -> Plant:
+    """The scenario's ship without its tank, in the same waves.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+        Of the sea.
+    """
+    tank = negligible(scenario.vessel.tank)
+    return Plant(
+        scenario.ship_at,
+        tank,
+        None,
+        scenario.wave_moment(seed),
+        linear=scenario.plant == "linear",
+    )
+
+
 def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ...]) -> ShipSide:
     """Build the emulated ship and its nodes.
 
@@ -83,8 +101,13 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         The operator's actions.
     """
     vessel, catalogue = scenario.vessel, load_catalogue()
-    plant = Plant(vessel.ship, vessel.tank, vessel.pump, scenario.wave_moment(seed))
-    plant.change_ship(scenario.sailing_ship, round(scenario.actual_from_s * SECOND_NS))
+    plant = Plant(
+        scenario.ship_at,
+        vessel.tank,
+        vessel.pump,
+        scenario.wave_moment(seed),
+        linear=scenario.plant == "linear",
+    )
     version = vessel.version
     return ShipSide(
         plant,

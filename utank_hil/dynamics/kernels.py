@@ -20,8 +20,10 @@ from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
 
 REFRESH = 256  # a power of two
 STRIKES_PER_STEP = 8  # beyond these the water comes to rest at the stop
-CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE = range(5)  # entries of a ship's summary
-SUMMARY = 5
+# entries of a ship's summary; the last two are the energy that impacts took, and damping in the
+# steps with impacts
+CAPSIZED_S, MAX_ROLL, MAX_LEVEL, STRIKES, MAX_IMPULSE, STRIKE_LOSS, DAMPED_AROUND = range(7)
+SUMMARY = 7
 # allows reordered and fused sums for vector instructions; NaN and infinity stay exact
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 
@@ -50,6 +52,15 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     if turn & 1:
         sin, cos = cos, -sin
     return (-sin, -cos) if turn & 2 else (sin, cos)
+
+
+@njit(cache=True, error_model="numpy")
+def unpacked(row: FloatArray) -> RollCoefficients:
+    """The coefficients from an array."""
+    return RollCoefficients(
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
+        row[10], row[11], row[12], row[13], row[14], row[15], row[16],
+    )  # fmt: skip
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -135,6 +146,15 @@ def rk4(
 
 
 @njit(cache=True, error_model="numpy")
+def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
+    """Power that damping of the ship, losses of the tank and the valve take."""
+    _, v, _, w = state
+    ship = c.damping + c.quadratic_damping * abs(v)
+    water = c.loss + (c.quadratic_loss + valve) * abs(w)
+    return float(ship * v * v + water * w * w)
+
+
+@njit(cache=True, error_model="numpy")
 def _moments_within(
     moments: tuple[float, float, float], begin: float, end: float
 ) -> tuple[float, float, float]:
@@ -147,6 +167,11 @@ def _moments_within(
         a + mid * (slope + mid * curvature),
         a + end * (slope + end * curvature),
     )
+
+
+@njit(cache=True, error_model="numpy")
+def _damped_j(c: RollCoefficients, before: State, after: State, valve: float, time: float) -> float:
+    return (damping_w(c, before, valve) + damping_w(c, after, valve)) / 2 * time
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,6 +196,7 @@ def step_with_impacts(
         moments_left = _moments_within(moments, done, 1.0)
         after = rk4(c, per_piece, restoring, state, moments_left, pump, valve, left * dt)
         if abs(after[2]) <= limit:
+            summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, left * dt)
             return after
         side = math.copysign(1.0, after[2])
         low, high = 0.0, left
@@ -189,6 +215,7 @@ def step_with_impacts(
                 low, g_low = s, g
                 g_high *= 0.5
         done += high
+        summary[DAMPED_AROUND] += _damped_j(c, state, after, valve, high * dt)
         x, v, _h, w = after
         roll_inertia = c.inertia + c.inertia_h2 * limit * limit
         rebound = -c.restitution * w
@@ -196,14 +223,16 @@ def step_with_impacts(
             rebound = 0.0
         jump = rebound - w
         roll_jump = -c.coupling / roll_inertia * jump
+        stop_impulse = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
         number = int(summary[STRIKES])
         if number < impacts.shape[0]:
             impacts[number, 0] = time + done * dt
             impacts[number, 1] = side * limit
             impacts[number, 2] = w
             impacts[number, 3] = c.ship_inertia * roll_jump
-            impacts[number, 4] = (c.level_inertia - c.coupling**2 / roll_inertia) * jump
+            impacts[number, 4] = stop_impulse
         summary[STRIKES] += 1
+        summary[STRIKE_LOSS] -= stop_impulse * (w + rebound) / 2
         summary[MAX_IMPULSE] = max(summary[MAX_IMPULSE], abs(c.ship_inertia * roll_jump))
         # at rest exactly on the limit, where `accelerations` holds it; else just inside, so that
         # the next impact is a change of sign
@@ -241,10 +270,7 @@ def advance(
     the last one to the end. `out` (k, 4) receives the state before every `stride`-th step. A
     capsized ship keeps the state in which it passed the angle `capsize`.
     """
-    c = RollCoefficients(
-        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9],
-        row[10], row[11], row[12], row[13], row[14], row[15], row[16],
-    )  # fmt: skip
+    c = unpacked(row)
     waves = len(amplitude)
     re, im = np.empty(waves), np.empty(waves)
     half_cos, half_sin = np.empty(waves), np.empty(waves)

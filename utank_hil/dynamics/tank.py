@@ -9,7 +9,7 @@ raises the starboard level.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from utank_hil.parameters import (
@@ -100,3 +100,13 @@ class Tank:
     def level_limit_m(self) -> float:
         """Level at which one reservoir is full or the other one is empty, whichever is less."""
         return min(self.headroom_m, self.height_m)
+
+
+def negligible(tank: Tank) -> Tank:
+    """A tank of 1e-9 of the water, strongly damped: the ship goes as without a tank."""
+    return replace(
+        tank,
+        reservoir_area_m2=1e-9 * tank.reservoir_area_m2,
+        duct_area_m2=1e-9 * tank.duct_area_m2,
+        damping_ratio=1.0,
+    )

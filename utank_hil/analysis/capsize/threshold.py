@@ -6,7 +6,6 @@ passes a given angle beyond the saddle.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from utank_hil.analysis.capsize.sea_stack import stacked_seas
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
+from utank_hil.dynamics.tank import negligible
 
 SCAN = 64  # amplitudes tried at once in the search for a threshold
 
@@ -75,16 +75,7 @@ def without_tank(model: RollModel) -> RollModel:
     -------
     RollModel
     """
-    tank = model.tank
-    return RollModel(
-        model.ship,
-        replace(
-            tank,
-            reservoir_area_m2=1e-9 * tank.reservoir_area_m2,
-            duct_area_m2=1e-9 * tank.duct_area_m2,
-            damping_ratio=1.0,
-        ),
-    )
+    return RollModel(model.ship, negligible(model.tank))
 
 
 def equilibria(model: RollModel, limit_rad: float = math.radians(89)) -> tuple[Equilibrium, ...]:
