@@ -8,26 +8,23 @@ from cantools.database.can import Database, Message
 from hypothesis import strategies as st
 
 from utank_hil.canbus import Address
-from utank_hil.canbus.catalogue import DBC_PATH
+from utank_hil.canbus.catalogue import DBC_PATH, common_name
 from utank_hil.canbus.codec import field_kind
-from utank_hil.canbus.messages import DBC_NAMES, AddressClaim, Heartbeat
+from utank_hil.canbus.messages import DBC_NAMES, AddressClaim
 
 DATABASE = Database()
 DATABASE.add_dbc_file(DBC_PATH)
 
-Case = tuple[type[Any], Address | None, Message]
+Case = tuple[type[Any], Address, Message]
 
 
 def _cases() -> list[Case]:
-    cases: list[Case] = []
-    for kind, name in DBC_NAMES.items():
-        if kind in (Heartbeat, AddressClaim):
-            for address in Address:
-                dbc = DATABASE.get_message_by_name(f"{name}_{address.name}")
-                cases.append((kind, address, dbc))
-        else:
-            cases.append((kind, None, DATABASE.get_message_by_name(name)))
-    return cases
+    kinds = {name: kind for kind, name in DBC_NAMES.items()}
+    return [
+        (kinds.get(dbc.name) or kinds[common_name(dbc.name, sender)], Address[sender], dbc)
+        for dbc in DATABASE.messages
+        for sender in dbc.senders
+    ]
 
 
 CASES = _cases()

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from message_strategies import CASES, PROTECTED
@@ -13,12 +14,15 @@ from utank_hil.canbus import (
     AddressClaim,
     Frame,
     Heartbeat,
+    OperatorCommand,
     PumpCommand,
+    SensorMotion,
     SensorTank,
     load_catalogue,
 )
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import data_ids
+from utank_hil.runtime.wire_time import LONGEST_FRAME_BITS
 from utank_hil.tick import TICK_NS
 
 TABLE = {
@@ -38,6 +42,23 @@ TABLE = {
     "ADDRESS_CLAIM_DRIVE": (0x18EEFF81, None),
     "ADDRESS_CLAIM_SENSORS": (0x18EEFF82, None),
     "ADDRESS_CLAIM_OPERATOR": (0x18EEFF83, None),
+    "VALVE_CMD": (0x08FF1280, 20),
+    "VALVE_STATUS": (0x08FF2284, 20),
+    "SENSOR_MOTION_2": (0x08FF3085, 10),
+    "HARDWIRED_INPUTS": (0x08FF5086, 50),
+    "SEA_ESTIMATE": (0x18FF1380, 1000),
+    "SHIP_ESTIMATE": (0x18FF1480, 1000),
+    "PASSIVE_TWIN": (0x18FF1580, 100),
+    "ALARM": (0x18FF1680, 100),
+    "OPERATOR_CMD_2": (0x0CFF4088, 200),
+    "HEARTBEAT_VALVE": (0x18FF0084, 100),
+    "HEARTBEAT_SENSORS_2": (0x18FF0085, 100),
+    "HEARTBEAT_HARDWIRED": (0x18FF0086, 100),
+    "HEARTBEAT_OPERATOR_2": (0x18FF0088, 100),
+    "ADDRESS_CLAIM_VALVE": (0x18EEFF84, None),
+    "ADDRESS_CLAIM_SENSORS_2": (0x18EEFF85, None),
+    "ADDRESS_CLAIM_HARDWIRED": (0x18EEFF86, None),
+    "ADDRESS_CLAIM_OPERATOR_2": (0x18EEFF88, None),
 }
 
 #: How the end of a signal's name says the unit of the DBC.
@@ -49,6 +70,7 @@ UNIT_SUFFIXES = {
     "m": "_m",
     "m3/s": "_m3_s",
     "V": "_v",
+    "W": "_w",
     "A": "_a",
     "degC": "_c",
     "1": "",
@@ -127,6 +149,36 @@ def test_messages_of_every_node_need_the_node():
 
 
 @pytest.mark.parametrize(
+    ("message", "first", "second"),
+    [
+        (SensorMotion(0.1, 0.0, None), Address.SENSORS, Address.SENSORS_2),
+        (
+            OperatorCommand(None, False, True, False, False),
+            Address.OPERATOR,
+            Address.OPERATOR_2,
+        ),
+    ],
+)
+def test_messages_of_a_second_node_have_an_identifier_and_data_ids_of_their_own(
+    message, first, second
+):
+    catalogue, kind = load_catalogue(), type(message)
+    assert catalogue.codec(kind) is catalogue.codec(kind, first)
+    assert catalogue.codec(kind, second).can_id != catalogue.codec(kind).can_id
+    data = catalogue.codec(kind, second).encode(message, 1)
+    assert catalogue.codec(kind, second).decode(data) is not None
+    assert catalogue.codec(kind).decode(data) is None
+
+
+def test_the_bus_carries_all_nodes_at_once():
+    """Every message in its cycle, each frame as long as stuffing makes it at most; 0.6 warns."""
+    frames_a_second = sum(1000 / dbc.cycle_time for _, _, dbc in CASES if dbc.cycle_time)
+    assert frames_a_second * LONGEST_FRAME_BITS / 250_000 < 0.6
+    row = f"| all: every message in its cycle | {frames_a_second:.0f} |"
+    assert row in Path("docs/can-catalogue.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
         (" roll_rad ", " role_rad ", "SENSOR_MOTION: signal role_rad has no field"),
@@ -140,7 +192,7 @@ def test_messages_of_every_node_need_the_node():
         ("56|8@1+ (1,0) [0|15]", "56|8@1+ (2,0) [0|15]", "command_echo must have scale 1"),
         ('6 "SHUTDOWN"', '5 "SHUTDOWN"', "control_word must have the value table of ControlWord"),
         (' 255 "NOT_AVAILABLE" ;', " ;", "state must have the value table of DriveState"),
-        ("arm : 16|1@1+", "arm : 24|2@1+", "arm must have one bit"),
+        ("arm : 16|1@1+", "arm : 48|2@1+", "arm must have one bit"),
         ('"03 05 00 06', '"05 00 06', "PUMP_CMD: DataIDs must be 16 bytes"),
         ('"03 05 00 06', '"XX 05 00 06', "PUMP_CMD: DataIDs must be 16 bytes"),
         ("counter : 8|4@1+", "counter : 8|3@1+", "needs counter at bit 8, 4 bits"),

@@ -134,5 +134,6 @@ class ForeignPanel(ForeignNode):
             arm = now_ns >= 2000 * MS
             frames.append(self.frame("OPERATOR_CMD", mode_request=3 if arm else 1, arm=arm, stop=0,
                                      reset=0, acknowledge=0, retune=0, undo=0,
-                                     forbid_retuning=0))  # fmt: skip
+                                     forbid_retuning=0, take_command=0, acknowledge_code=255,
+                                     power_budget_w=65535 * 100))  # fmt: skip
         return frames + self.life(now_ns)

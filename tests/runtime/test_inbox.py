@@ -12,8 +12,6 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import measure_of
 from utank_hil.canbus import (
     Address,
-    AddressClaim,
-    ControllerStatus,
     DriveFault,
     DriveState,
     DriveStatus1,
@@ -23,7 +21,6 @@ from utank_hil.canbus import (
     Mode,
     NodeState,
     OperatorCommand,
-    PumpCommand,
     Quality,
     ResetCause,
     SensorMotion,
@@ -163,12 +160,7 @@ def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
     assert line.content() != before or kind is DriveStatus2
 
 
-OWN = {
-    CATALOGUE.codec(PumpCommand).can_id,
-    CATALOGUE.codec(ControllerStatus).can_id,
-    CATALOGUE.codec(Heartbeat, Address.CONTROLLER).can_id,
-    CATALOGUE.codec(AddressClaim, Address.CONTROLLER).can_id,
-}
+OWN = {can_id for can_id in CATALOGUE.can_ids if can_id & 0xFF == Address.CONTROLLER}
 
 
 @given(

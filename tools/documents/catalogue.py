@@ -8,7 +8,9 @@ from cantools.database.can import Database, Message, Signal
 from utank_hil.canbus import load_catalogue
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.endpoints import BUCKET_LIMIT, MAX_LOST, RESYNC_FRAMES
+from utank_hil.runtime.wire_time import LONGEST_FRAME_BITS
 
+BIT_RATE = 250_000
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "can-catalogue.md"
 
 INTRODUCTION = """\
@@ -66,6 +68,15 @@ By exhaustion (`tests/canbus/test_e2e.py`): any three flipped bits of a frame ar
 distance 4), flips in the counter included. No message passes for another, not even with one flipped
 bit.
 
+Worst case of the bus load, at {bit_rate} bit/s, by the cycles above and the {bits} bits that a
+frame has at most with bit stuffing and pause:
+
+| nodes | frames a second | bus load |
+|---|---|---|
+{loads}
+
+Added to these: the address claims at boot, and the frames that are sent on a change.
+
 ## Messages
 
 | message | identifier | cycle | from | to | carries |
@@ -81,6 +92,25 @@ def signals_of(message: Message) -> list[Signal]:
 def cycle(message: Message) -> str:
     """Cycle time for the table."""
     return f"{message.cycle_time} ms" if message.cycle_time else "at boot"
+
+
+def load_rows(messages: list[Message]) -> str:
+    """Worst case of the bus load, for the nodes that most ships have and for all there may be."""
+    sent = [message for message in messages if "Reserved" not in str(message.comment)]
+    valve = [
+        m for m in sent if m.senders[0] in ("CONTROLLER", "DRIVE", "SENSORS", "OPERATOR", "VALVE")
+    ]
+    pump = [message for message in valve if "VALVE" not in message.name]
+    rows = []
+    for nodes, listed in (
+        ("controller, drive, sensors, panel", pump),
+        ("the same and a valve", valve),
+        ("all: every message in its cycle", messages),
+    ):
+        frames = sum(1000 / message.cycle_time for message in listed if message.cycle_time)
+        load = frames * LONGEST_FRAME_BITS / BIT_RATE
+        rows.append(f"| {nodes} | {frames:.0f} | {load:.1%} |")
+    return "\n".join(rows)
 
 
 def overview_row(message: Message) -> str:
@@ -135,6 +165,9 @@ def page() -> str:
         lost=MAX_LOST,
         resync=RESYNC_FRAMES,
         bucket=BUCKET_LIMIT,
+        bit_rate=BIT_RATE,
+        bits=LONGEST_FRAME_BITS,
+        loads=load_rows(database.messages),
     )
     rows = "\n".join(overview_row(message) for message in database.messages)
     sections = "\n\n".join(section(message) for message in database.messages)

@@ -50,7 +50,8 @@ class Catalogue:
         message_type : type
             One of the types of `utank_hil.canbus.messages`.
         source : Address, optional
-            Sender; needed for the messages that every node sends.
+            Sender; needed for the messages that every node sends, and for those of a second node of
+            a kind. Without it, the first node's message is meant.
 
         Raises
         ------
@@ -60,7 +61,8 @@ class Catalogue:
         found = {
             address: codec
             for (kind, address), codec in self._codecs.items()
-            if kind is message_type and source in (None, address)
+            if kind is message_type
+            and (source is address or (source is None and not _is_second(address)))
         }
         if len(found) == 1:
             return next(iter(found.values()))
@@ -115,7 +117,7 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
     codecs: dict[tuple[type, Address], Codec[Any]] = {}
     for message in database.messages:
         sender = message.senders[0] if message.senders else ""
-        kind = types.get(message.name) or types.get(message.name.removesuffix(f"_{sender}"))
+        kind = types.get(message.name) or types.get(common_name(message.name, sender))
         if kind is None or sender not in Address.__members__:
             errors.append(f"{message.name}: no message type, or its sender is unknown")
             continue
@@ -132,6 +134,16 @@ def load_catalogue(path: Path = DBC_PATH) -> Catalogue:
         raise ValueError(msg)
     digest = hashlib.sha256(content.replace(b"\r\n", b"\n")).digest()
     return Catalogue(codecs, int.from_bytes(digest, "big") % _VERSIONS)
+
+
+def common_name(message: str, sender: str) -> str:
+    """Return the name of a message without its sender's name, or number, at the end."""
+    stem, _, number = sender.rpartition("_")
+    return message.removesuffix(f"_{sender}").removesuffix(f"_{number}" if stem else "")
+
+
+def _is_second(address: Address) -> bool:
+    return address.name.endswith("_2")
 
 
 def read_data_ids(message: "DbcMessage") -> bytes | None:

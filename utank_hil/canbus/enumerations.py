@@ -7,12 +7,19 @@ from enum import IntEnum
 
 
 class Address(IntEnum):
-    """Source address of a node: the low byte of every identifier it sends."""
+    """Source address of a node: the low byte of every identifier it sends.
+
+    A second node of a kind has the name of the first with _2.
+    """
 
     CONTROLLER = 0x80
     DRIVE = 0x81
     SENSORS = 0x82
     OPERATOR = 0x83
+    VALVE = 0x84
+    SENSORS_2 = 0x85
+    HARDWIRED = 0x86
+    OPERATOR_2 = 0x88
 
 
 class Mode(IntEnum):
@@ -28,8 +35,9 @@ class Mode(IntEnum):
 class Fault(IntEnum):
     """What stopped the controller, or degrades it.
 
-    Each code has one row in the fault table, `utank_hil.runtime.faults`. A number that was once
-    sent keeps its meaning.
+    A code that is found has one row in the fault table, `utank_hil.runtime.faults`; the others are
+    reserved, so that finding them needs no other catalogue. A number that was once sent keeps its
+    meaning.
     """
 
     NONE = 0
@@ -37,17 +45,40 @@ class Fault(IntEnum):
     TANK_SILENT = 2
     PUMP_SENSOR_SILENT = 3
     PROTECTION = 4
+    COUNTER_FROZEN = 5
+    UNKNOWN_IDENTIFIERS = 6
     BUS_OVERLOAD = 7
     ADDRESS_CONFLICT = 8
     BUS_LOST = 9
+    STUCK_SIGNAL = 10
+    DRIFT = 11
+    SPIKES = 12
+    NOISE = 13
     LEVEL_LIMIT = 14
+    DRIVE_NOT_FOLLOWING = 15
+    SATURATION = 16
+    SIGN_FLIP = 17
     DRIVE_FAULT = 18
     DRIVE_SILENT = 19
     OVERRUN = 20
     HEEL_LIMIT = 21
+    ROLL_AMPLIFIED = 22
     OPERATOR_SILENT = 23
     VERSION_MISMATCH = 24
     INTERNAL = 26
+    MOTION_SIGN_FLIP = 27
+    VOLUME = 28
+    SIGNAL_DELAYED = 29
+    FOREIGN_SENDER = 30
+    SENSORS_DISAGREE = 31
+    HARDWIRED_STOP = 32
+    HARDWIRED_SILENT = 33
+    VALVE_SILENT = 34
+    VALVE_FAULT = 35
+    VALVE_NOT_FOLLOWING = 36
+    NOT_COMMISSIONED = 37
+    BUS_DEGRADED = 38
+    STABILITY_LOW = 39
 
 
 class RetuningState(IntEnum):
@@ -102,6 +133,68 @@ class DriveFault(IntEnum):
     OVERPRESSURE = 10
     STALL = 11
     INTERNAL = 12
+
+
+class ValveControl(IntEnum):
+    """What the controller tells the valve to do."""
+
+    FAIL_POSITION = 0
+    FOLLOW = 1
+    RESET = 2
+
+
+class ValveState(IntEnum):
+    """What the valve does."""
+
+    FAIL_POSITION = 0
+    FOLLOWING = 1
+    FAULT = 2
+
+
+class ValveFault(IntEnum):
+    """Why the valve is in its fault state."""
+
+    NONE = 0
+    COMMAND_TIMEOUT = 1
+    COMMAND_REFUSED = 2
+    STUCK = 3
+    POSITION_SENSOR = 4
+    SUPPLY = 5
+    INTERNAL = 6
+
+
+class FailPosition(IntEnum):
+    """Where a valve goes without a command, and stays when power returns."""
+
+    OPEN = 0
+    SHUT = 1
+
+
+class Station(IntEnum):
+    """Operator station in command."""
+
+    NONE = 0
+    OPERATOR = 1
+    OPERATOR_2 = 2
+
+
+class AlarmState(IntEnum):
+    """State of an alarm, in the terms of IEC 62923-1."""
+
+    ACTIVE_UNACKNOWLEDGED = 0
+    ACTIVE_ACKNOWLEDGED = 1
+    RECTIFIED_UNACKNOWLEDGED = 2
+    NORMAL = 3
+
+
+class Verdict(IntEnum):
+    """Whether an estimate can be relied on, and if not, why."""
+
+    GOOD = 0
+    UNCERTAIN = 1
+    RECORD_SHORT = 2
+    MOTION_SMALL = 3
+    OUTDATED = 4
 
 
 class Quality(IntEnum):

@@ -10,26 +10,36 @@ Types of fields:
 * `bool`: one bit, without "not available".
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple, TypeVar
 
 from utank_hil.canbus.enumerations import (
+    AlarmState,
     ControlWord,
     DriveFault,
     DriveState,
+    FailPosition,
     Fault,
     Mode,
     NodeState,
     Quality,
     ResetCause,
     RetuningState,
+    Station,
     Switch,
+    ValveControl,
+    ValveFault,
+    ValveState,
+    Verdict,
 )
 
 _T = TypeVar("_T", bound=type[tuple[Any, ...]])
 
 DBC_NAMES: Final[dict[type[tuple[Any, ...]], str]] = {}
-"""Message name in the DBC by type; for messages that every node sends, without the node's name."""
+"""Message name in the DBC by type; for messages that several nodes send, without the node's name
+or number.
+"""
 
 
 def _dbc_message(name: str) -> Callable[[_T], _T]:
@@ -120,9 +130,63 @@ class DriveStatus2(NamedTuple):
     sensor_warning: bool
 
 
+@_dbc_message("VALVE_CMD")
+class ValveCommand(NamedTuple):
+    """VALVE_CMD, controller to valve, 20 ms.
+
+    Attributes
+    ----------
+    opening
+        Open share asked for: 0 as shut as the valve gets, 1 open.
+    control
+        Whether to follow it. None must not move anything away from the fail position.
+    timeout_s
+        The valve goes to its fail position by itself after this time without a valid command.
+    """
+
+    opening: float
+    control: ValveControl | None
+    timeout_s: float
+
+
+@_dbc_message("VALVE_STATUS")
+class ValveStatus(NamedTuple):
+    """VALVE_STATUS, valve to controller, 20 ms.
+
+    Attributes
+    ----------
+    opening
+        Open share as the position sensor measures it.
+    state
+        What the valve does.
+    fault
+        Why it is in its fault state.
+    command_echo
+        Counter of the last VALVE_CMD accepted; None before the first.
+    fail_position
+        Where it goes without a command.
+    moving
+        It is on its way.
+    open_limit, shut_limit
+        The limit switch of that end is closed.
+    """
+
+    opening: float
+    state: ValveState | None
+    fault: ValveFault | None
+    command_echo: int | None
+    fail_position: FailPosition | None
+    moving: bool
+    open_limit: bool
+    shut_limit: bool
+
+
 @_dbc_message("SENSOR_MOTION")
 class SensorMotion(NamedTuple):
-    """SENSOR_MOTION, sensors to controller, 10 ms; roll positive starboard down."""
+    """SENSOR_MOTION, sensors to controller, 10 ms; roll positive starboard down.
+
+    SENSOR_MOTION_2 is that of a second motion sensor.
+    """
 
     roll_rad: float
     roll_rate_rad_s: float
@@ -169,6 +233,26 @@ class SensorPump(NamedTuple):
     quality: Quality | None
 
 
+@_dbc_message("HARDWIRED_INPUTS")
+class HardwiredInputs(NamedTuple):
+    """HARDWIRED_INPUTS, a node apart from sensors and drive to controller, 50 ms.
+
+    Attributes
+    ----------
+    port_high, starboard_high
+        Hard-wired high-level switches.
+    stop_loop
+        ON where the hard-wired stop loop is open: a stop is asked for.
+    quality
+        Quality of all inputs.
+    """
+
+    port_high: Switch | None
+    starboard_high: Switch | None
+    stop_loop: Switch | None
+    quality: Quality | None
+
+
 @_dbc_message("CTRL_STATUS")
 class ControllerStatus(NamedTuple):
     """CTRL_STATUS, controller to all, 100 ms.
@@ -180,7 +264,7 @@ class ControllerStatus(NamedTuple):
     fault
         The fault that is active or latched.
     armed
-        The pump may be commanded.
+        Pump and valve may be commanded.
     alarm
         An alarm is waiting to be acknowledged.
     degraded
@@ -195,6 +279,8 @@ class ControllerStatus(NamedTuple):
         Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
     retuning
         State of its retuning; None if it has none.
+    station
+        Operator station in command.
     """
 
     mode: Mode | None
@@ -208,11 +294,112 @@ class ControllerStatus(NamedTuple):
     catalogue_version: int | None
     configuration_version: int | None
     retuning: RetuningState | None = None
+    station: Station | None = None
+
+
+@_dbc_message("SEA_ESTIMATE")
+class SeaEstimate(NamedTuple):
+    """SEA_ESTIMATE, controller to panels, 1 s.
+
+    Attributes
+    ----------
+    verdict
+        Whether the sea can be told.
+    significant_height_m, peak_period_s
+        Significant wave height, and encounter period of the spectrum's peak.
+    moment_rms_rad
+        RMS of the wave's roll moment over the roll stiffness: the static heel of that moment.
+    relative_deviation
+        Standard deviation of `moment_rms_rad`, as a share of it.
+    age_s
+        Time since the estimate was made.
+    """
+
+    verdict: Verdict | None
+    significant_height_m: float
+    peak_period_s: float
+    moment_rms_rad: float
+    relative_deviation: float
+    age_s: float
+
+
+@_dbc_message("SHIP_ESTIMATE")
+class ShipEstimate(NamedTuple):
+    """SHIP_ESTIMATE, controller to panels, 1 s.
+
+    Attributes
+    ----------
+    verdict
+        Whether the ship can be told.
+    roll_period_s, roll_period_deviation_s
+        Natural roll period with the tank's water at rest, and its standard deviation.
+    gm_m, gm_deviation_m
+        Metacentric height and its standard deviation; NaN where the displacement is not known.
+    age_s
+        Time since the estimate was made.
+    """
+
+    verdict: Verdict | None
+    roll_period_s: float
+    roll_period_deviation_s: float
+    gm_m: float
+    gm_deviation_m: float
+    age_s: float
+
+
+@_dbc_message("PASSIVE_TWIN")
+class PassiveTwin(NamedTuple):
+    """PASSIVE_TWIN, controller to panels, 100 ms: the ship with a passive tank in the same waves.
+
+    Attributes
+    ----------
+    quality
+        Quality of the twin's roll.
+    twin_roll_rad
+        Its roll angle, positive starboard down.
+    twin_rms_rad, roll_rms_rad
+        RMS of the twin's and of the ship's own roll over some roll periods.
+    """
+
+    quality: Quality | None
+    twin_roll_rad: float
+    twin_rms_rad: float
+    roll_rms_rad: float
+
+
+@_dbc_message("ALARM")
+class Alarm(NamedTuple):
+    """ALARM, controller to panels, 100 ms: one alarm of the list a frame, one after the other.
+
+    An empty list is one frame of 0 `alarms`, code NONE and state NORMAL.
+
+    Attributes
+    ----------
+    state
+        State of the alarm.
+    code
+        What it is about.
+    place, alarms
+        Place in the list, 0 the most urgent, and number of alarms in it.
+    times_raised
+        How often it was raised since it was last accepted.
+    age_s
+        Time since it was last raised.
+    """
+
+    state: AlarmState | None
+    code: Fault | None
+    place: int | None
+    alarms: int | None
+    times_raised: int | None
+    age_s: float
 
 
 @_dbc_message("OPERATOR_CMD")
 class OperatorCommand(NamedTuple):
     """OPERATOR_CMD, operator panel to controller, 200 ms and on change.
+
+    OPERATOR_CMD_2 is that of a second station.
 
     Attributes
     ----------
@@ -232,6 +419,12 @@ class OperatorCommand(NamedTuple):
         Rising edge: back to the law before the last retuning.
     forbid_retuning
         No retuning, requested or automatic; one under way is cancelled.
+    take_command
+        Rising edge: ask for the command, which one station has at a time.
+    acknowledge_code
+        Code of the alarm that `acknowledge` accepts; None accepts all.
+    power_budget_w
+        Mean electric power that the pump may take; NaN asks for the greatest comfort.
     """
 
     mode_request: Mode | None
@@ -242,6 +435,9 @@ class OperatorCommand(NamedTuple):
     retune: bool = False
     undo: bool = False
     forbid_retuning: bool = False
+    take_command: bool = False
+    acknowledge_code: int | None = None
+    power_budget_w: float = math.nan
 
 
 @_dbc_message("HEARTBEAT")

@@ -20,6 +20,9 @@ from typing import Final
 
 from utank_hil.canbus.frame import Frame
 
+LONGEST_FRAME_BITS: Final = 160
+"""Of a frame with eight data bytes."""
+
 INTERMISSION_BITS: Final = 3
 _AFTER_CRC_BITS: Final = 10 + INTERMISSION_BITS
 _CRC_BITS: Final = 15
