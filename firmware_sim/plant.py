@@ -68,7 +68,7 @@ class Plant:
         self._state[kernel.CAPSIZED] = math.inf
         self._state[kernel.MODE] = kernel.ABSENT if pump is None else kernel.FREE
         self._ticks = 0
-        phasors, rotations = self._waves.at(0)
+        phasors, rotations = self._waves.begin()
         for index in range(4):
             self._state[kernel.MOMENTS][index] = kernel.turned_sum(phasors, rotations)
         self._values: list[float] = self._state.tolist()

@@ -1,6 +1,7 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
@@ -11,6 +12,14 @@ from firmware_sim.drive import DriveLimits
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
+from firmware_sim.voyage import (
+    Waypoint,
+    ship_on_the_way,
+    spectra_on_the_way,
+    track,
+    waypoint_problems,
+)
+from firmware_sim.waves import PassingWaves, SteadyWaves, Waves
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.vessel import tank_problems
 from utank_hil.dynamics.linear import coupled_matrices
@@ -73,6 +82,8 @@ class Scenario(Section):
     """
     actual_from_s: Annotated[float, Field(ge=0)] = 0.0
     """When the difference comes about: cargo moved, fuel burnt."""
+    voyage: tuple[Waypoint, ...] = ()
+    """How course, speed, loading and sea change under way."""
     retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
     """Time that identification and design take in simulated time."""
 
@@ -107,7 +118,15 @@ class Scenario(Section):
             problems.append(("controllers", reason))
         for name, controller in self.controllers.items():
             problems += self._controller_problems(name, controller)
-        refuse("", [*problems, *self._ship_problems(), *self._sea_problems()])
+        refuse(
+            "",
+            [
+                *problems,
+                *self._ship_problems(),
+                *self._sea_problems(),
+                *self._voyage_problems(),
+            ],
+        )
         return self
 
     @property
@@ -121,8 +140,34 @@ class Scenario(Section):
         return replace(self.vessel.ship, **self.actual_ship)  # type: ignore[arg-type]  # floats only
 
     def ship_at(self, time_s: float) -> RollShip:
-        """The ship at a time since the start."""
-        return self.sailing_ship if time_s >= self.actual_from_s else self.vessel.ship
+        """The ship at a time since the start, under way."""
+        ship = self.sailing_ship if time_s >= self.actual_from_s else self.vessel.ship
+        ship = ship_on_the_way(self.voyage, ship, time_s)
+        return ship.at_speed(self._speed_m_s(time_s))
+
+    @property
+    def _speed_m_s(self) -> Callable[[float], float]:
+        return track(self.voyage, self.sea.speed_m_s, lambda point: point.speed_m_s)
+
+    def turn_rad(self, time_s: float) -> float:
+        """Turn of the ship, clockwise, since the start."""
+        start_deg, is_course = self.sea.turn_deg
+        name = "course_deg" if is_course else "heading_deg"
+        angle = track(self.voyage, start_deg, lambda point: getattr(point, name), angle=True)
+        turn_deg = angle(time_s) - start_deg
+        return math.radians(turn_deg if is_course else -turn_deg)
+
+    def waves(self, seed: int) -> Waves:
+        """The waves that the ship meets."""
+        spectra = spectra_on_the_way(self.voyage, self.sea.spectra)
+        if not self.voyage and len(spectra) <= 1:
+            return SteadyWaves(self.wave_moment(seed))
+        return PassingWaves(
+            self.sea.passing_sea(spectra, seed),
+            self.turn_rad,
+            self._speed_m_s,
+            self.sea.moment(self.vessel.ship.stiffness_nm_rad),
+        )
 
     def _controller_problems(self, name: str, controller: ControllerConfig) -> list[Problem]:
         """Why a controller would never arm, or the drive would refuse what it may send."""
@@ -194,8 +239,37 @@ class Scenario(Section):
             return [("sea", "has waves beyond all scale: check height, period and slope")]
         return []
 
+    def _voyage_problems(self) -> list[Problem]:
+        problems = waypoint_problems(self.voyage, self.duration_s)
+        wrong = "heading_deg" if self.sea.turn_deg[1] else "course_deg"
+        right = "course_deg" if self.sea.turn_deg[1] else "heading_deg"
+        for index, point in enumerate(self.voyage):
+            at = f"voyage.{index}"
+            if getattr(point, wrong) is not None:
+                reason = f"does not go with this scenario's sea: give {right}"
+                problems.append((f"{at}.{wrong}", reason))
+            if point.sea is not None and len(self.sea.spectra) != 1:
+                why = "regular" if not self.sea.spectra else "given by its own records (until)"
+                problems.append((f"{at}.sea", f"can't follow: the scenario's sea is {why}"))
+            elif point.sea is not None and self.sea.turn_deg[1]:
+                why = "the scenario's sea has measured directions, a spectrum alone has none"
+                problems.append((f"{at}.sea", f"can't follow: {why}"))
+            problems += [
+                (f"{at}.ship.{key}", f"can't change; it takes {', '.join(SAILED)}")
+                for key in point.ship
+                if key not in SAILED
+            ]
+        if problems:
+            return problems
+        for index, point in enumerate(self.voyage):
+            try:
+                unstable = tank_problems(self.ship_at(point.time_s), self.vessel.tank)
+            except ParameterError as error:
+                return [(f"voyage.{index}.ship.{name}", why) for name, why in error.problems]
+            if unstable:
+                return [(f"voyage.{index}.ship", f"with it, the tank {unstable[0][1]}")]
+        return []
+
     def wave_moment(self, seed: int) -> Harmonics:
-        """Roll moment of the sea on the ship."""
-        return self.sea.sea(seed).roll_moment(
-            self.vessel.ship.stiffness_nm_rad, self.sea.effective_slope
-        )
+        """Roll moment of the sea as it is at the start, on a ship that keeps its course."""
+        return self.sea.roll_moment(self.sea.sea(seed), self.vessel.ship.stiffness_nm_rad)

@@ -6,12 +6,15 @@ same keys for all of them.
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Protocol, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from utank_hil.arrays import FloatArray
+from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (
     IttcSpectrum,
@@ -19,9 +22,12 @@ from utank_hil.configuration.spectra import (
     MeasuredSpectrum,
     PiersonMoskowitzSpectrum,
     read_spectra,
+    utc,
 )
 from utank_hil.parameters import Positive, Problem, refuse
-from utank_hil.sea import EffectiveSlope, Sea, Spectrum
+from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
+from utank_hil.sea.moment_table import MomentTable
+from utank_hil.sea.passing import PassingSea
 
 
 class _AnySea(Section):
@@ -32,6 +38,45 @@ class _AnySea(Section):
     speed_m_s: Annotated[float, Field(ge=0)] = 0.0
     """The ship's speed."""
     effective_slope: EffectiveSlope = EffectiveSlope()
+    roll_moment_table: Path | None = None
+    """Roll moment against frequency and heading (`MomentTable`), instead of the effective slope."""
+
+    @field_validator("roll_moment_table")
+    @classmethod
+    def _readable_table(cls, file: Path | None) -> Path | None:
+        if file is not None:
+            MomentTable.read(file)
+        return file
+
+    @model_validator(mode="after")
+    def _slope_or_table(self) -> Self:
+        if self.roll_moment_table is not None and "effective_slope" in self.model_fields_set:
+            reason = "and effective_slope exclude each other: remove one"
+            refuse("sea", [("roll_moment_table", reason)])
+        return self
+
+    def moment(self, stiffness_nm_rad: float) -> Callable[[FloatArray, FloatArray], ComplexArray]:
+        """Complex roll moment per m of amplitude at frequencies and headings in rad."""
+        if self.roll_moment_table is not None:
+            return MomentTable.read(self.roll_moment_table).moment
+        return partial(self.effective_slope.moment, stiffness_nm_rad=stiffness_nm_rad)
+
+    def roll_moment(self, sea: Sea, stiffness_nm_rad: float) -> Harmonics:
+        """Roll moment of a realisation on a ship that keeps course and speed."""
+        moment = self.moment(stiffness_nm_rad)(sea.omega_rad_s, sea.heading_rad)
+        return sea.harmonics(sea.amplitude_m * moment)
+
+    @property
+    def turn_deg(self) -> tuple[float, bool]:
+        """Where the ship points at the start, and whether that is a course."""
+        return self.heading_deg, False
+
+
+class SpectrumSection(Protocol):
+    """A section that names a spectrum."""
+
+    def spectrum(self) -> Spectrum:
+        """The spectrum."""
 
 
 class _IrregularSea(_AnySea, ABC):
@@ -59,6 +104,33 @@ class _IrregularSea(_AnySea, ABC):
             speed_m_s=self.speed_m_s,
         )
 
+    def passing_sea(
+        self, known: Sequence[tuple[float, "SpectrumSection"]], seed: int
+    ) -> PassingSea:
+        """A realisation that passes from one spectrum to the next.
+
+        Parameters
+        ----------
+        known : sequence of tuple
+            Time in s and spectrum; the first is that of this sea.
+        seed : int
+        """
+        if len(known) == 1:
+            return PassingSea.of(self.sea(seed))
+        spectra = [section.spectrum() for _, section in known]
+        return PassingSea.drawn(
+            [time_s for time_s, _ in known],
+            spectra,
+            seed,
+            heading_rad=[self.heading_rad(spectrum) for spectrum in spectra],
+            spreading=self.spreading,
+        )
+
+    @property
+    def spectra(self) -> list[tuple[float, SpectrumSection]]:
+        """Its spectra, and when it has them."""
+        return [(0.0, self)]
+
 
 class JonswapSea(JonswapSpectrum, _IrregularSea):
     """A growing sea."""
@@ -79,6 +151,19 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
     """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
     course_deg: float | None = None
     """The ship's course, degrees clockwise from true north."""
+    until: datetime | None = None
+    """Start of the last record: from one to the next of those between, the sea passes linearly."""
+
+    @field_validator("until")
+    @classmethod
+    def _later_record(cls, until: datetime | None, info: ValidationInfo) -> datetime | None:
+        if until is not None and "file" in info.data and "time" in info.data:
+            until = utc(until)
+            if until <= info.data["time"]:
+                raise ValueError(f"must be after time, {info.data['time'].isoformat()}")
+            for time in (until, *read_spectra(info.data["file"]).times(info.data["time"], until)):
+                cls._hour_is_there(time, info)
+        return until
 
     @field_validator("direction_file")
     @classmethod
@@ -111,6 +196,22 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
         """The hour's spectrum, with the directions where there are any."""
         return read_spectra(self.file, self.direction_file).at(self.time.isoformat())
 
+    @property
+    def spectra(self) -> list[tuple[float, SpectrumSection]]:
+        """Those of all records from `time` to `until`."""
+        if self.until is None:
+            return super().spectra
+        times = read_spectra(self.file).times(self.time, self.until)
+        return [
+            ((time - self.time).total_seconds(), self.model_copy(update={"time": time}))
+            for time in times
+        ]
+
+    @property
+    def turn_deg(self) -> tuple[float, bool]:
+        """The course, if there is one."""
+        return super().turn_deg if self.course_deg is None else (self.course_deg, True)
+
     def heading_rad(self, spectrum: Spectrum) -> FloatArray | float:
         """As measured, or `heading_deg` for all bands."""
         if self.course_deg is None:
@@ -133,6 +234,15 @@ class RegularSea(_AnySea):
             heading_rad=math.radians(self.heading_deg),
             speed_m_s=self.speed_m_s,
         )
+
+    def passing_sea(self, known: Sequence[tuple[float, SpectrumSection]], seed: int) -> PassingSea:  # noqa: ARG002
+        """The wave, which stays."""
+        return PassingSea.of(self.sea(seed))
+
+    @property
+    def spectra(self) -> list[tuple[float, SpectrumSection]]:
+        """None."""
+        return []
 
 
 ScenarioSea = Annotated[

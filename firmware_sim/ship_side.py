@@ -84,7 +84,7 @@ def bare_plant(scenario: Scenario, seed: int) -> Plant:
         scenario.ship_at,
         tank,
         None,
-        scenario.wave_moment(seed),
+        scenario.waves(seed),
         linear=scenario.plant == "linear",
     )
 
@@ -105,7 +105,7 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         scenario.ship_at,
         vessel.tank,
         vessel.pump,
-        scenario.wave_moment(seed),
+        scenario.waves(seed),
         linear=scenario.plant == "linear",
     )
     version = vessel.version

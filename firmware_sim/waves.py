@@ -1,25 +1,37 @@
 """The waves' roll moment as rotating phasors, one for each component."""
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Final, Protocol
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray
+from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.sea import Harmonics
+from utank_hil.sea.encounter import encounter_frequency
+from utank_hil.sea.passing import PassingSea
 from utank_hil.tick import TICK_S
 
-AHEAD_TICKS = 2
-"""The plant interpolates the moment between four ticks, of which the last is so far ahead."""
+AHEAD_TICKS: Final = 2
+"""The plant interpolates the moment between four ticks, the last of which is so far ahead."""
+RENEWED_TICKS: Final = 100
+"""Amplitude and frequency of encounter change once a second; in between the amplitude passes
+smoothly from one value to the next."""
+_LEAST: Final = 1e-12  # of the largest amplitude: from nothing no ratio leads to something
 
 
 class Waves(Protocol):
     """Wave components at the ship."""
 
-    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
-        """Phasors at `AHEAD_TICKS` after a tick, and their turn in a tick.
+    def begin(self) -> tuple[ComplexArray, ComplexArray]:
+        """Phasors `AHEAD_TICKS` before the start, and their turn in a tick.
 
-        The caller turns the phasors by one tick after each call, four times after the first of all:
-        those begin `AHEAD_TICKS` + 1 before.
+        The caller turns the phasors, in place, by one tick after another.
+        """
+
+    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
+        """Phasors `AHEAD_TICKS` after a tick, where the caller's turns have led, and their turn.
+
+        To be asked for each tick, from 0 on.
         """
 
 
@@ -37,6 +49,80 @@ class SteadyWaves:
         self._rotations = np.exp(1j * frequency * TICK_S)
         self._phasors = moment.amplitude * np.exp(1j * (phase - AHEAD_TICKS * frequency * TICK_S))
 
-    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:  # noqa: ARG002, always the same
-        """The same phasors at every tick, turned by the caller."""
+    def begin(self) -> tuple[ComplexArray, ComplexArray]:
+        """As in `Waves`."""
         return self._phasors, self._rotations
+
+    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:  # noqa: ARG002, always the same
+        """As in `Waves`."""
+        return self._phasors, self._rotations
+
+
+class PassingWaves:
+    """Components of a sea that changes, met by a ship that turns and changes its speed.
+
+    The angle of each component at the ship is the integral of its frequency of encounter, so
+    neither turning nor changing speed makes the moment jump.
+
+    Parameters
+    ----------
+    sea : PassingSea
+    turn_rad, speed_m_s : callable
+        Turn of the ship since the start, clockwise, and its speed, at a time in s.
+    moment : callable
+        Complex roll moment in N m per m of amplitude at frequencies and headings.
+    """
+
+    def __init__(
+        self,
+        sea: PassingSea,
+        turn_rad: Callable[[float], float],
+        speed_m_s: Callable[[float], float],
+        moment: Callable[[FloatArray, FloatArray], ComplexArray],
+    ) -> None:
+        self._sea, self._turn_rad, self._speed_m_s, self._moment = sea, turn_rad, speed_m_s, moment
+        lead_s = AHEAD_TICKS * TICK_S
+        self._angle_rad = sea.phase_rad - lead_s * self._encounter_rad_s(0.0)
+        self._amplitude = self._amplitude_nm(0.0)
+        self._phasors = self._amplitude * np.exp(1j * self._angle_rad)
+        self._rotations = np.exp(1j * TICK_S * self._encounter_rad_s(0.0))
+
+    def begin(self) -> tuple[ComplexArray, ComplexArray]:
+        """As in `Waves`."""
+        self._angle_rad += 2 * AHEAD_TICKS * TICK_S * self._encounter_rad_s(0.0)
+        return self._phasors, self._rotations
+
+    def at(self, tick: int) -> tuple[ComplexArray, ComplexArray]:
+        """As in `Waves`."""
+        if tick % RENEWED_TICKS == 0:
+            self._renew((tick + AHEAD_TICKS) * TICK_S)
+        return self._phasors, self._rotations
+
+    def _renew(self, now_s: float) -> None:
+        """Aim at amplitude and angle of each component a second later."""
+        step_s = RENEWED_TICKS * TICK_S
+        first, middle, last = (
+            self._encounter_rad_s(now_s + share * step_s) for share in (0.0, 0.5, 1.0)
+        )
+        turn_rad = step_s / 6 * (first + 4 * middle + last)
+        before, after = self._amplitude, self._amplitude_nm(now_s + step_s)
+        self._phasors[:] = before * np.exp(1j * self._angle_rad)  # no rounding is handed on
+        self._rotations = np.exp((np.log(after / before) + 1j * turn_rad) / RENEWED_TICKS)
+        self._angle_rad += turn_rad
+        self._amplitude = after
+
+    def _heading_rad(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+        """Amplitude in m and heading to the ship of each component."""
+        amplitude_m, heading_rad = self._sea.at(time_s)
+        return amplitude_m, heading_rad - self._turn_rad(time_s)
+
+    def _encounter_rad_s(self, time_s: float) -> FloatArray:
+        _, heading_rad = self._heading_rad(time_s)
+        return encounter_frequency(self._sea.omega_rad_s, heading_rad, self._speed_m_s(time_s))
+
+    def _amplitude_nm(self, time_s: float) -> ComplexArray:
+        amplitude_m, heading_rad = self._heading_rad(time_s)
+        amplitude = amplitude_m * self._moment(self._sea.omega_rad_s, heading_rad)
+        size = np.abs(amplitude)
+        least = _LEAST * max(float(size.max()), 1.0)
+        return np.where(size > least, amplitude, least)

@@ -148,7 +148,7 @@ class _VesselOfScenario(BaseModel):
 def _wave_moment(scenario: Scenario, ship: RollShip) -> Harmonics:
     """The sea's moment on the ship, as many realisations with a share of the energy each."""
     seas = [
-        scenario.sea.sea(seed).roll_moment(ship.stiffness_nm_rad, scenario.sea.effective_slope)
+        scenario.sea.roll_moment(scenario.sea.sea(seed), ship.stiffness_nm_rad)
         for seed in range(REALISATIONS)
     ]
     return Harmonics(

@@ -5,10 +5,18 @@ import pytest
 import yaml
 
 from firmware_sim.scenario import Scenario
+from firmware_sim.waves import PassingWaves
 from utank_hil.configuration import ConfigError, load_config
 
 CONFIGS = Path("configs").resolve()
 STORM = CONFIGS / "scenarios" / "storm.yaml"
+
+
+STORM_SEA = {
+    "kind": "measured",
+    "file": str(CONFIGS / "seas" / "ndbc_41010_2019-02_spectral_density.txt"),
+    "time": "2019-02-10T05:40",
+}
 
 
 def scenario_file(folder: Path, **changes: object) -> Path:
@@ -82,6 +90,27 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
         ({"settle_s": 60.0}, "settle_s", "must be less than duration_s"),
         ({"duration_s": float("nan")}, "duration_s", "finite"),
         ({"seed": -1}, "seed", "(got -1)"),
+        ({"voyage": [{"time_s": 30.0}, {"time_s": 20.0}]}, "voyage.1.time_s", "not after 30"),
+        ({"voyage": [{"time_s": 90.0}]}, "voyage.0.time_s", "after duration_s, 60"),
+        ({"voyage": [{"time_s": 9.0, "course_deg": 9.0}]}, "voyage.0.course_deg",
+         "give heading_deg"),
+        ({"voyage": [{"time_s": 9.0, "sea": {"kind": "ittc", "hs_m": 1.0, "tp_s": 6.0}}]},
+         "voyage.0.sea", "the scenario's sea is regular"),
+        ({"voyage": [{"time_s": 9.0, "ship": {"gm_m": 1.0}}]}, "voyage.0.ship.gm_m",
+         "can't change; it takes inertia_kg_m2"),
+        ({"voyage": [{"time_s": 9.0, "ship": {"inertia_kg_m2": -1.0}}]},
+         "voyage.0.ship.inertia_kg_m2", "got -1.0"),
+        ({"voyage": [{"time_s": 9.0, "ship": {"stiffness_nm_rad": 1e6}}]}, "voyage.0.ship",
+         "takes all of the ship's stability"),
+        ({"sea": {**STORM_SEA, "until": "2019-02-10T05:40"}}, "sea.until", "must be after time"),
+        ({"sea": {**STORM_SEA, "until": "2019-02-10T06:10"}}, "sea.until",
+         "no spectrum within 0 s of 2019-02-10T06:10"),
+        ({"sea": {**STORM_SEA, "until": "2019-02-10T06:40"},
+          "voyage": [{"time_s": 9.0, "sea": {"kind": "ittc", "hs_m": 1.0, "tp_s": 6.0}}]},
+         "voyage.0.sea", "given by its own records"),
+        ({"sea": {"kind": "regular", "amplitude_m": 1.0, "period_s": 9.0,
+                  "roll_moment_table": "nowhere.csv"}}, "sea.roll_moment_table",
+         "nowhere.csv can't be read"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_key(
@@ -116,3 +145,48 @@ def test_seed_alone_decides_the_waves_and_the_ship_their_moment() -> None:
     slope = storm.sea.sea(1).slope
     expected = 0.5**2 * storm.vessel.ship.stiffness_nm_rad**2 * slope.variance
     assert first.variance == pytest.approx(expected, rel=1e-12)
+
+
+def test_between_waypoints_ship_course_and_speed_pass_linearly(tmp_path: Path) -> None:
+    ship = {"stiffness_nm_rad": 6e8, "lift_damping_ns2_rad": 1e6}
+    vessel = yaml.safe_load((CONFIGS / "ships" / "thesis_first.yaml").read_text())
+    vessel["ship"]["lift_damping_ns2_rad"] = 1e6
+    (tmp_path / "ship.yaml").write_text(yaml.safe_dump(vessel))
+    controller = yaml.safe_load((CONFIGS / "controllers" / "gpc.yaml").read_text())
+    (tmp_path / "gpc.yaml").write_text(yaml.safe_dump({**controller, "vessel": "ship.yaml"}))
+    before = vessel["ship"]["stiffness_nm_rad"]
+    path = scenario_file(
+        tmp_path,
+        vessel="ship.yaml",
+        controllers={"gpc": "gpc.yaml"},
+        sea={"kind": "regular", "amplitude_m": 1.0, "period_s": 10.0, "heading_deg": -170.0},
+        voyage=[
+            {"time_s": 10.0},
+            {"time_s": 30.0, "heading_deg": 150.0, "ship": {"stiffness_nm_rad": 6e8}},
+            {"time_s": 50.0, "speed_m_s": 8.0},
+        ],
+    )
+    scenario = load_config(path, Scenario)
+    stiffness = [scenario.ship_at(time_s).stiffness_nm_rad for time_s in (0, 10, 20, 30, 59)]
+    between = (before + ship["stiffness_nm_rad"]) / 2
+    assert stiffness == pytest.approx([before, before, between, 6e8, 6e8])
+    damping = [scenario.ship_at(time_s).damping_nms_rad for time_s in (0, 30, 40, 55)]
+    still = vessel["ship"]["damping_nms_rad"]
+    assert damping == pytest.approx([still, still, still + 4e6, still + 8e6])
+    # from -170 to 150 the shorter way, by way of 180: the heading falls by 40 degrees
+    sailing = scenario.waves(1)
+    assert isinstance(sailing, PassingWaves)
+    turns = [scenario.turn_rad(time_s) for time_s in (0, 10, 20, 30, 60)]
+    assert turns == pytest.approx(np.radians([0, 0, 20, 40, 40]))
+
+
+def test_records_of_hours_pass_into_one_another(tmp_path: Path) -> None:
+    sea = {**STORM_SEA, "until": "2019-02-10T07:40"}
+    scenario = load_config(scenario_file(tmp_path, sea=sea), Scenario)
+    waves = scenario.waves(3)
+    assert isinstance(waves, PassingWaves)
+    assert [time_s for time_s, _ in scenario.sea.spectra] == [0, 3600, 7200]
+    passing = scenario.sea.passing_sea(scenario.sea.spectra, 3)
+    heights = [4 * np.sqrt((passing.at(t)[0] ** 2).sum() / 2) for t in (0, 3600, 5400, 7200)]
+    mean = np.sqrt((4.27**2 + 3.86**2) / 2)
+    assert heights == pytest.approx([4.71, 4.27, mean, 3.86], abs=0.006)

@@ -77,8 +77,7 @@ class MeasuredSpectrum(Section):
     @field_validator("time")
     @classmethod
     def _hour_is_there(cls, time: datetime, info: ValidationInfo) -> datetime:
-        if time.tzinfo is not None:
-            time = time.astimezone(UTC).replace(tzinfo=None)
+        time = utc(time)
         if "file" in info.data:
             spectrum = read_spectra(info.data["file"]).at(time.isoformat())
             if spectrum.moment(0) == 0:
@@ -88,6 +87,11 @@ class MeasuredSpectrum(Section):
     def spectrum(self) -> Spectrum:
         """The hour's spectrum."""
         return read_spectra(self.file).at(self.time.isoformat())
+
+
+def utc(time: datetime) -> datetime:
+    """A time as measured files have it: UTC, without a zone; a time without one is UTC."""
+    return time if time.tzinfo is None else time.astimezone(UTC).replace(tzinfo=None)
 
 
 AnySpectrum = Annotated[

@@ -1,7 +1,7 @@
 """The ship in roll: inertia, damping, restoring moment and heeling moments."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
@@ -31,6 +31,9 @@ class RollShip:
         Linear roll damping d1, thesis b44.
     quadratic_damping_nms2_rad2 : float
         Damping moment per ``|roll rate| roll rate``, thesis b44q.
+    lift_damping_ns2_rad : float
+        Increase of the linear damping per speed ahead, by the lift on hull and keels: N m s/rad per
+        m/s. The linear models and the laws leave it out.
     restoring_odd_nm : tuple of float
         Higher coefficients (k3, k5, ...) of the restoring polynomial, N m per rad^3, rad^5, ...
     displacement_n : float
@@ -55,6 +58,7 @@ class RollShip:
     stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)]
     damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
     quadratic_damping_nms2_rad2: Annotated[float, Range(least=0, most=_MOST)] = 0.0
+    lift_damping_ns2_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
     restoring_odd_nm: tuple[Finite, ...] = ()
     displacement_n: float = 0.0
     gz_step_rad: float = 0.0
@@ -78,6 +82,13 @@ class RollShip:
             if not (math.isfinite(value) and value > 0):
                 problems.append((name, f"must be positive to go with gz_m, got {value}"))
         return problems
+
+    def at_speed(self, speed_m_s: float) -> "RollShip":
+        """The ship with the damping that it has under way."""
+        if self.lift_damping_ns2_rad == 0:
+            return self
+        damping = self.damping_nms_rad + self.lift_damping_ns2_rad * speed_m_s
+        return replace(self, damping_nms_rad=damping, lift_damping_ns2_rad=0.0)
 
     @property
     def heeling_moment_nm(self) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +80,11 @@ class MeasuredSpectra:
                 f"{self.time[index]}, all are from {self.time[0]} to {self.time[-1]}"
             )
         return self[index]
+
+    def times(self, first: datetime, last: datetime) -> list[datetime]:
+        """Times of the measurements from `first` to `last`, both included, in UTC."""
+        inside = (self.time >= np.datetime64(first)) & (self.time <= np.datetime64(last))
+        return [each.item() for each in self.time[inside]]
 
     @property
     def hs_m(self) -> FloatArray:

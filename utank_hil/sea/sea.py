@@ -13,17 +13,19 @@ aligns with the surface, so the wave moment is the restoring stiffness times an 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum
 
 BEAM_RAD = math.pi / 2  # waves travelling from port to starboard
+COMPONENTS = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,14 @@ class EffectiveSlope:
         smith = np.exp(-wavenumber_rad_m * self.depth_m)
         ratio: FloatArray = self.coefficient * smith * np.sinc(across / np.pi)
         return ratio
+
+    def moment(
+        self, omega_rad_s: FloatArray, heading_rad: FloatArray, stiffness_nm_rad: float
+    ) -> ComplexArray:
+        """Roll moment in N m per m of wave amplitude; its argument is the lead on the crest."""
+        wavenumber = wavenumber_rad_m(omega_rad_s)
+        slope = wavenumber * np.sin(heading_rad) * self.factor(wavenumber, heading_rad)
+        return np.asarray(1j * stiffness_nm_rad * slope, dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +126,7 @@ class Sea:
         spectrum: Spectrum,
         seed: int,
         *,
-        components: int = 512,
+        components: int = COMPONENTS,
         heading_rad: FloatArray | float = BEAM_RAD,
         spreading: float | None = None,
         speed_m_s: float = 0.0,
@@ -151,35 +161,19 @@ class Sea:
         ValueError
             If the spectrum has no energy or an argument is out of range.
         """
-        if components < 1:
-            raise ValueError(f"a sea needs one component or more, got {components}")
-        if spectrum.moment(0) == 0:
-            raise ValueError("the spectrum holds no energy: choose another hour")
-        if spreading is not None and not (math.isfinite(spreading) and spreading >= 0):
-            raise ValueError(f"spreading exponent must be zero or more, got {spreading}")
-        within, phase, order, across = _uniform(seed, (4, components))
-        edges = spectrum.band_edges_hz.ravel()  # lower, upper, lower, upper ...
-        width = np.diff(edges)[::2]
-        energy = _cumulative(spectrum.density * width)
-        root_integral = _cumulative(np.sqrt(spectrum.density) * width)
-        cuts = np.interp(np.linspace(0, root_integral[-1], components + 1), root_integral, edges)
-        energy_at_cuts = np.interp(cuts, edges, energy)
-        energies = np.diff(energy_at_cuts)
-        frequency = np.interp(energy_at_cuts[:-1] + within * energies, energy, edges)
-        mean = np.broadcast_to(np.asarray(heading_rad, dtype=float), spectrum.density.shape)
-        band = np.clip(np.searchsorted(edges[1::2], frequency), 0, width.size - 1)
-        heading = mean[band]
-        if spreading is not None:
-            # stratified sampling: one draw per quantile interval, in random order
-            heading = heading + _spread((np.argsort(order) + across) / components, spreading)
-        return cls(
-            np.sqrt(2 * energies), 2 * np.pi * frequency, heading, 2 * np.pi * phase, speed_m_s
+        energy_m2, omega_rad_s, heading, phase_rad = drawn_components(
+            [spectrum], seed, components, [heading_rad], spreading
         )
+        return cls(np.sqrt(2 * energy_m2[0]), omega_rad_s, heading[0], phase_rad, speed_m_s)
 
     @property
     def encounter_rad_s(self) -> FloatArray:
         """Signed encounter frequencies; negative where the ship overtakes the wave."""
         return encounter_frequency(self.omega_rad_s, self.heading_rad, self.speed_m_s)
+
+    def harmonics(self, amplitude: ComplexArray) -> Harmonics:
+        """A quantity with these complex amplitudes, arguments as leads on the crest."""
+        return self._harmonics(np.abs(amplitude), np.angle(amplitude))
 
     @property
     def elevation(self) -> Harmonics:
@@ -204,31 +198,81 @@ class Sea:
         effective_slope : EffectiveSlope, optional
             By default the true slope.
         """
-        ratio = (effective_slope or EffectiveSlope()).factor(
-            wavenumber_rad_m(self.omega_rad_s), self.heading_rad
-        )
-        slope = self.slope
-        return Harmonics(
-            stiffness_nm_rad * ratio * slope.amplitude, slope.frequency_rad_s, slope.phase_rad
-        )
+        slope = effective_slope or EffectiveSlope()
+        moment = slope.moment(self.omega_rad_s, self.heading_rad, stiffness_nm_rad)
+        return self.harmonics(self.amplitude_m * moment)
 
-    def _harmonics(self, amplitude: FloatArray, lead_rad: float) -> Harmonics:
+    def _harmonics(self, amplitude: FloatArray, lead_rad: FloatArray | float) -> Harmonics:
         encounter = self.encounter_rad_s
         phase = self.phase_rad + lead_rad
         # cos is even: a negative frequency is a positive one with reversed phase
         return Harmonics(amplitude, np.abs(encounter), np.where(encounter < 0, -phase, phase))
 
 
+def drawn_components(
+    spectra: Sequence[Spectrum],
+    seed: int,
+    components: int,
+    heading_rad: Sequence[FloatArray | float],
+    spreading: float | None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Components that serve several spectra; for one alone see `Sea.irregular`.
+
+    The intervals are those of the mean of the spectra, each taken with its total as one.
+
+    Returns
+    -------
+    energy_m2, omega_rad_s, heading_rad, phase_rad : ndarray
+        Shapes (K, N), (N,), (K, N) and (N,) for K spectra.
+    """
+    if components < 1:
+        raise ValueError(f"a sea needs one component or more, got {components}")
+    if any(spectrum.moment(0) == 0 for spectrum in spectra):
+        raise ValueError("the spectrum holds no energy: choose another hour")
+    if spreading is not None and not (math.isfinite(spreading) and spreading >= 0):
+        raise ValueError(f"spreading exponent must be zero or more, got {spreading}")
+    within, phase, order, across = _uniform(seed, (4, components))
+    edges = np.unique([edge for each in spectra for edge in each.band_edges_hz.ravel()])
+    energy = np.stack([_energy_below(each, edges) for each in spectra])
+    share = (energy / energy[:, -1:]).mean(axis=0)
+    root_density = np.sqrt(np.diff(share) / np.diff(edges))
+    root_integral = np.concatenate([[0.0], np.cumsum(root_density * np.diff(edges))])
+    cuts = np.interp(np.linspace(0, root_integral[-1], components + 1), root_integral, edges)
+    share_at_cuts = np.interp(cuts, edges, share)
+    frequency = np.interp(share_at_cuts[:-1] + within * np.diff(share_at_cuts), share, edges)
+    energies = np.diff(np.stack([np.interp(cuts, edges, each) for each in energy]))
+    headings = np.stack(
+        [_heading_at(frequency, *pair) for pair in zip(spectra, heading_rad, strict=True)]
+    )
+    if spreading is not None:
+        # stratified sampling: one draw per quantile interval, in random order
+        headings = headings + _spread((np.argsort(order) + across) / components, spreading)
+    return energies, 2 * np.pi * frequency, headings, 2 * np.pi * phase
+
+
+def _energy_below(spectrum: Spectrum, edges_hz: FloatArray) -> FloatArray:
+    """Variance of the waves below each frequency."""
+    own = spectrum.band_edges_hz
+    per_band = spectrum.density * (own[:, 1] - own[:, 0])
+    total = np.concatenate([[0.0], np.cumsum(per_band)])
+    # constant between bands that leave a gap
+    below = np.column_stack([total[:-1], total[1:]])
+    return np.asarray(np.interp(edges_hz, own.ravel(), below.ravel()), dtype=float)
+
+
+def _heading_at(
+    frequency_hz: FloatArray, spectrum: Spectrum, heading_rad: FloatArray | float
+) -> FloatArray:
+    mean: FloatArray = np.broadcast_to(np.asarray(heading_rad, dtype=float), spectrum.density.shape)
+    upper = spectrum.band_edges_hz[:, 1]
+    band = np.clip(np.searchsorted(upper, frequency_hz), 0, len(upper) - 1)
+    return np.asarray(mean[band], dtype=float)
+
+
 def _uniform(seed: int, shape: tuple[int, int]) -> FloatArray:
     """Uniform random numbers in [0, 1) from the top 53 bits of PCG64's raw output."""
     raw = np.random.PCG64(seed).random_raw(shape)
     return (raw >> np.uint64(11)).astype(np.float64) * 2.0**-53
-
-
-def _cumulative(per_band: FloatArray) -> FloatArray:
-    """Cumulative integral at every lower and upper band edge; constant between bands."""
-    total = np.concatenate([[0.0], np.cumsum(per_band)])
-    return np.column_stack([total[:-1], total[1:]]).ravel()
 
 
 def _spread(probability: FloatArray, exponent: float) -> FloatArray:

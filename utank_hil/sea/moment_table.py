@@ -1,0 +1,96 @@
+"""Roll moment of a wave from a table, such as a strip or panel program writes.
+
+A CSV file with the columns ``omega_rad_s, heading_deg, moment_nm_per_m, phase_deg``: for each pair
+of wave frequency (earth frame) and heading (0 following, 90 from port to starboard, 180 head) the
+moment on roll, positive to starboard, per metre of wave amplitude, and by how much it leads the
+wave's crest at the centre of gravity. Headings of -180 to 0 may be left out: the ship is symmetric.
+"""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import ComplexArray, FloatArray
+
+COLUMNS: Final = ("omega_rad_s", "heading_deg", "moment_nm_per_m", "phase_deg")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MomentTable:
+    """Roll moment per wave amplitude, interpolated linearly in frequency and heading.
+
+    Parameters
+    ----------
+    omega_rad_s : ndarray, shape (F,)
+        Increasing.
+    heading_rad : ndarray, shape (H,)
+        Increasing, from 0 to pi.
+    moment_nm_per_m : complex ndarray, shape (F, H)
+        Real part in phase with the crest, argument positive where the moment leads it.
+    """
+
+    omega_rad_s: FloatArray
+    heading_rad: FloatArray
+    moment_nm_per_m: ComplexArray
+
+    @classmethod
+    def read(cls, file: Path) -> "MomentTable":
+        """Read a table.
+
+        Raises
+        ------
+        ValueError
+            If the file can't be read, a column is missing, a value is no number, or the pairs of
+            frequency and heading are no complete grid from 0 to 180 degrees.
+        """
+        try:
+            with file.open(newline="") as lines:
+                reader = csv.DictReader(lines, skipinitialspace=True)
+                given = tuple(reader.fieldnames or ())
+                if set(given) != set(COLUMNS):
+                    raise ValueError(f"{file} needs the columns {', '.join(COLUMNS)}, has {given}")
+                rows = [[float(row[name]) for name in COLUMNS] for row in reader]
+        except OSError as error:
+            raise ValueError(f"{file} can't be read: {error.strerror}") from error
+        except TypeError as error:  # a row with fewer fields
+            raise ValueError(f"{file}: a row has fewer than {len(COLUMNS)} values") from error
+        except ValueError as error:
+            if str(error).startswith(str(file)):
+                raise
+            raise ValueError(f"{file}: {error}") from error
+        values = np.array(rows).reshape(-1, len(COLUMNS))
+        omega, heading = np.unique(values[:, 0]), np.unique(values[:, 1])
+        if not np.isfinite(values).all() or len(omega) < 2 or omega[0] <= 0:
+            raise ValueError(f"{file}: needs finite values, two or more frequencies above zero")
+        if len(values) != len(omega) * len(heading) or heading[0] != 0 or heading[-1] != 180:
+            raise ValueError(
+                f"{file}: needs each frequency with each heading once, headings from 0 to 180, got "
+                f"{len(values)} rows for {len(omega)} frequencies and {len(heading)} headings from "
+                f"{heading[0]:g} to {heading[-1]:g}"
+            )
+        grid = values[np.lexsort((values[:, 1], values[:, 0]))].reshape(len(omega), -1, 4)
+        moment = grid[..., 2] * np.exp(1j * np.radians(grid[..., 3]))
+        return cls(omega, np.radians(heading), moment)
+
+    def moment(self, omega_rad_s: FloatArray, heading_rad: FloatArray) -> ComplexArray:
+        """Moment in N m per m of amplitude, shape (N,); zero outside of the table's frequencies."""
+        relative = np.pi - np.mod(np.pi - heading_rad, 2 * np.pi)  # to (-pi, pi]
+        row, across = _between(self.omega_rad_s, omega_rad_s)
+        column, along = _between(self.heading_rad, np.abs(relative))
+        m = self.moment_nm_per_m
+        low = (1 - along) * m[row, column] + along * m[row, column + 1]
+        high = (1 - along) * m[row + 1, column] + along * m[row + 1, column + 1]
+        inside = (omega_rad_s >= self.omega_rad_s[0]) & (omega_rad_s <= self.omega_rad_s[-1])
+        side = np.where(relative < 0, -1.0, 1.0)  # the same wave from the other side
+        result: ComplexArray = np.where(inside, side * ((1 - across) * low + across * high), 0)
+        return result
+
+
+def _between(grid: FloatArray, at: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Index of the grid point below each value, and how far each is on the way to the next."""
+    index = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
+    return index, (at - grid[index]) / (grid[index + 1] - grid[index])

@@ -1,0 +1,92 @@
+"""A sea that passes from one spectrum to the next while the ship sails through it.
+
+The components keep their frequency and phase; energy and direction change linearly in time from
+one spectrum to the next. So at each moment the sea is Gaussian with the spectrum in between.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.sea.sea import COMPONENTS, Sea, drawn_components
+from utank_hil.sea.spectrum import Spectrum
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PassingSea:
+    """Wave components whose energy and direction change with time.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (K,)
+        When the sea has each of the K spectra, increasing; before and after, it stays.
+    energy_m2 : ndarray, shape (K, N)
+        Variance of each component.
+    heading_rad : ndarray, shape (K, N)
+        Direction of travel relative to the course that the ship has at the start.
+    omega_rad_s, phase_rad : ndarray, shape (N,)
+        Earth-frame frequency, and phase at the ship at time 0.
+    """
+
+    time_s: FloatArray
+    energy_m2: FloatArray
+    heading_rad: FloatArray
+    omega_rad_s: FloatArray
+    phase_rad: FloatArray
+
+    @classmethod
+    def of(cls, sea: Sea) -> "PassingSea":
+        """A sea that stays as it is."""
+        energy_m2, heading_rad = sea.amplitude_m[None] ** 2 / 2, sea.heading_rad[None]
+        return cls(np.zeros(1), energy_m2, heading_rad, sea.omega_rad_s, sea.phase_rad)
+
+    @classmethod
+    def drawn(
+        cls,
+        time_s: Sequence[float],
+        spectra: Sequence[Spectrum],
+        seed: int,
+        *,
+        heading_rad: Sequence[FloatArray | float],
+        spreading: float | None = None,
+        components: int = COMPONENTS,
+    ) -> "PassingSea":
+        """Draw the components as `Sea.irregular` does, for all spectra alike.
+
+        Parameters
+        ----------
+        time_s : sequence of float
+            When the sea has each of the spectra.
+        spectra : sequence of Spectrum
+        seed : int
+        heading_rad : sequence of float or ndarray, shape (F,)
+            Mean direction of travel of each, for all bands or for each band.
+        spreading, components
+            As `Sea.irregular` takes them.
+
+        Raises
+        ------
+        ValueError
+            If a spectrum has no energy or an argument is out of range.
+        """
+        energy_m2, omega_rad_s, heading, phase_rad = drawn_components(
+            spectra, seed, components, heading_rad, spreading
+        )
+        return cls(np.asarray(time_s, dtype=float), energy_m2, heading, omega_rad_s, phase_rad)
+
+    def at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+        """Amplitude in m and direction in rad of each component at a time."""
+        after = int(np.searchsorted(self.time_s, time_s, side="right"))
+        if after in (0, len(self.time_s)):
+            index = min(after, len(self.time_s) - 1)
+            return np.sqrt(2 * self.energy_m2[index]), self.heading_rad[index]
+        start_s, end_s = self.time_s[after - 1 : after + 1]
+        share = (time_s - start_s) / (end_s - start_s)
+        before, later = (1 - share) * self.energy_m2[after - 1], share * self.energy_m2[after]
+        # a direction without energy has no weight
+        flow: ComplexArray = before * np.exp(1j * self.heading_rad[after - 1]) + later * np.exp(
+            1j * self.heading_rad[after]
+        )
+        return np.sqrt(2 * (before + later)), np.angle(flow)
