@@ -22,6 +22,7 @@ from utank_hil.commands.common import (
     prepare_out,
     shown,
 )
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
@@ -103,8 +104,10 @@ def bench(
             result = run_bench(
                 loaded, options, lambda name, done: bar.update(tasks[name], completed=done), laws
             )
+        except InterruptedError as error:
+            fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
-            fail(error)
+            fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
     files, failures = write_report(result, out)
     if json_:
         sys.stdout.write(json.dumps(as_json(result, files)) + "\n")
