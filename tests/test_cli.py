@@ -248,10 +248,11 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
         wait_for_workers(process, 4.0)
         os.killpg(process.pid, signal.SIGINT)
         output, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
+    assert process.returncode == ExitCode.INTERRUPTED, errors
     assert "Traceback" not in errors
     report = json.loads(output)
     assert report["interrupted"]
+    assert report["exit_code"] == ExitCode.INTERRUPTED
     assert report["duration_s"] == 36000
     assert 0 < report["end_s"] < 36000
     run = [each["name"] for each in report["runs"]]
