@@ -23,9 +23,9 @@ def motion_table(result: BenchResult) -> RichTable:
     bare, runs = figures(result)
     table = _table(
         f"{result.scenario.name} · {result.mode} · seed {result.seed}",
-        "roll RMS\n°",
-        "signi-\nficant °",
-        "maximum\n°",
+        "roll\nRMS °",
+        "signif.\n°",
+        "max.\n°",
         "below\nno tank",
         "below\npassive",
         "in\ncharge",
@@ -76,7 +76,7 @@ def pump_table(result: BenchResult) -> RichTable:
         "level\npeak m",
         "bus\nload",
     )
-    table.caption = "peaks of values every 50 ms; power that the shaft draws, not what flows back"
+    table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
     for index, run in enumerate(runs):
         table.add_row(
             run.name,

@@ -195,7 +195,8 @@ def test_what_passes_a_limit_of_the_model_is_said_with_its_figure() -> None:
     for words, expected in zip(
         said,
         ("wild rolled to 42°", "wild rolled to 42°",
-         "wild: water struck roof or bottom 12 times, at most with 3.4 MN m", "the sea's steepness is ", "wild: rotor at "),
+         "wild: water struck roof or bottom 12 times, at most with 3.4 MN m",
+         "the sea's steepness is ", "wild: rotor at "),
         strict=True,
     ):  # fmt: skip
         assert words.startswith("limit of the model passed, ")
