@@ -27,6 +27,7 @@ with quietly_interruptible():
     from utank_hil.arrays import FloatArray
     from utank_hil.canbus import SocketCanPort
     from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
+    from utank_hil.commands.exit_codes import ExitCode
     from utank_hil.commands.tables import print_table
     from utank_hil.commands.timing import timing_table
     from utank_hil.runtime import (
@@ -85,7 +86,7 @@ def firmware_sim(
         statistics,
     )
     if len(log.rows) == 0:
-        fail("ended before the first sample")
+        fail("ended before the first sample", ExitCode.INTERRUPTED)
     roll, pump = _figures(log.rows)
     external = next((node for node in nodes if isinstance(node, ExternalDrive)), None)
     if json_:
@@ -119,7 +120,7 @@ def _run(
     try:
         port = SocketCanPort(bus, heard_by(nodes))
     except OSError as error:
-        fail(error)
+        fail(error, ExitCode.NO_BUS)
     try:
         with stop_on_signals() as stop, real_time_scheduling() as scheduling:
             for line in scheduling.lines():

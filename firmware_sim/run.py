@@ -122,6 +122,10 @@ class Run:
         How often the water struck a limit of its level.
     capsized_s : float
         The ship's time at which it capsized; infinite if it did not.
+    max_strike_impulse_nms : float
+        Greatest angular impulse of a strike on the ship.
+    pump_speed_rad_s : float
+        Greatest speed of the pump's rotor.
     loop : LoopResult or None
         Of the loop with the controller; None in simulated time.
     retuning : tuple of RetuningEvent
@@ -138,6 +142,8 @@ class Run:
     energy_j: float
     strikes: int = 0
     capsized_s: float = math.inf
+    max_strike_impulse_nms: float = 0.0
+    pump_speed_rad_s: float = 0.0
     loop: LoopResult | None = None
     retuning: tuple[RetuningEvent, ...] = ()
     fallbacks: int | None = None
@@ -168,6 +174,8 @@ class ShipRun:
     energy_j: float
     strikes: int = 0
     capsized_s: float = math.inf
+    max_strike_impulse_nms: float = 0.0
+    pump_speed_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,10 +206,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         job.name,
         _side_by_side(log.rows, truth_log.rows),
         lockstep.bus.statistics(lockstep.now_ns).load,
-        ship.drive.refused,
-        ship.plant.pump_energy_j,
-        ship.plant.strikes,
-        ship.plant.capsized_s,
+        *_ship_figures(ship, truth),
         retuning=controller.retuning_events,
         fallbacks=controller.fallbacks,
         law_error=controller.law_error,
@@ -221,10 +226,7 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
         job.name,
         rows,
         float(np.mean(rows[:, COLUMNS.index("bus_load")])) if len(rows) else 0.0,
-        ship.drive.refused,
-        ship.plant.pump_energy_j,
-        ship.plant.strikes,
-        ship.plant.capsized_s,
+        *_ship_figures(ship, truth),
         loop,
         controller.retuning_events,
         controller.fallbacks,
@@ -238,15 +240,7 @@ def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
     ship, truth, truth_log = _ship(job)
     nodes: list[Node] = [*ship.nodes, truth]
     _run_loop(job, nodes, channel, LoopStatistics(), meeting, meeting.begin_ns)
-    plant = ship.plant
-    return ShipRun(
-        truth_log.rows,
-        truth.start_ns,
-        ship.drive.refused,
-        plant.pump_energy_j,
-        plant.strikes,
-        plant.capsized_s,
-    )
+    return ShipRun(truth_log.rows, truth.start_ns, *_ship_figures(ship, truth))
 
 
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
@@ -277,6 +271,8 @@ def join(name: str, ship: ShipRun, controller: ControllerRun) -> Run:
         ship.energy_j,
         ship.strikes,
         ship.capsized_s,
+        ship.max_strike_impulse_nms,
+        ship.pump_speed_rad_s,
         controller.loop,
         controller.retuning,
         controller.fallbacks,
@@ -292,6 +288,21 @@ def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatA
         plant.advance(row * RECORD_NS)
         roll_rad[row] = plant.roll_rad
     return roll_rad, plant.capsized_s
+
+
+def _ship_figures(
+    ship: ShipSide, truth: TruthRecorder
+) -> tuple[int, float, int, float, float, float]:
+    """Fields of `Run` and `ShipRun` from `refused_commands` to `pump_speed_rad_s`, in order."""
+    plant = ship.plant
+    return (
+        ship.drive.refused,
+        plant.pump_energy_j,
+        plant.strikes,
+        plant.capsized_s,
+        plant.max_strike_impulse_nms,
+        truth.pump_speed_rad_s,
+    )
 
 
 def _load_kernel(job: Job) -> None:

@@ -34,6 +34,8 @@ class TruthRecorder:
     ----------
     start_ns : int
         Time of the first row; -1 before it.
+    pump_speed_rad_s : float
+        Greatest speed of the pump's rotor in a row.
     """
 
     name = "truth"
@@ -45,6 +47,7 @@ class TruthRecorder:
         self._log = log
         self._row = np.zeros(len(TRUTH))
         self.start_ns = -1
+        self.pump_speed_rad_s = 0.0
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Hear nothing: the truth is not on the bus."""
@@ -64,4 +67,5 @@ class TruthRecorder:
             plant.wave_moment_nm,
         )
         self._log.write(self._row)
+        self.pump_speed_rad_s = max(self.pump_speed_rad_s, abs(plant.pump_speed_rad_s))
         return ()

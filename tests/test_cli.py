@@ -15,6 +15,7 @@ import firmware_sim.report
 from firmware_sim.cli import app as ship_app
 from utank_hil.cli import app
 from utank_hil.cli import commands as entry_points
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.telemetry import read_recording
 
 CONFIGS = Path("configs").resolve()
@@ -173,9 +174,9 @@ def test_controller_without_margins_does_not_run(tmp_path: Path) -> None:
         (ship_app, (CONFIGS / "scenarios" / "storm.yaml", "--bus", "nowhere0")),
     ],
 )
-def test_missing_interface_is_named_and_ends_with_code_2(application, arguments) -> None:
+def test_missing_interface_is_named_and_has_a_code_of_its_own(application, arguments) -> None:
     result = invoke(application, *arguments, *(() if "panel" in arguments else ("--json",)))
-    assert result.exit_code == 2
+    assert result.exit_code == ExitCode.NO_BUS
     assert "nowhere0" in result.stderr
     assert result.stdout == ""
     assert "Traceback" not in result.output
@@ -247,10 +248,11 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
         wait_for_workers(process, 4.0)
         os.killpg(process.pid, signal.SIGINT)
         output, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
+    assert process.returncode == ExitCode.INTERRUPTED, errors
     assert "Traceback" not in errors
     report = json.loads(output)
     assert report["interrupted"]
+    assert report["exit_code"] == ExitCode.INTERRUPTED
     assert report["duration_s"] == 36000
     assert 0 < report["end_s"] < 36000
     run = [each["name"] for each in report["runs"]]
@@ -267,7 +269,7 @@ def test_bench_interrupted_at_once_says_so(tmp_path: Path) -> None:
         wait_for_workers(process, 0.0)  # as soon as there is one
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=120)
-    assert process.returncode == 2
+    assert process.returncode == ExitCode.INTERRUPTED
     assert "Traceback" not in errors
     assert "ended before the first sample" in errors
     assert not list((tmp_path / "out").iterdir())

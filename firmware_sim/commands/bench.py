@@ -22,6 +22,7 @@ from utank_hil.commands.common import (
     prepare_out,
     shown,
 )
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
@@ -58,20 +59,16 @@ def bench(
 
     [bold]Example:[/bold] utank-hil bench --seed 7 --duration 600
 
-    In real time each run lasts its duration; without [bold]--duration[/bold] that is 120 s.
+    In real time each run lasts its duration; without [bold]--duration[/bold] that is 120 s. A run
+    that capsized, ended in a fault or was not in charge is marked, not ranked, and the exit code
+    says so (docs/exit-codes.md).
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, run_bench
+    from firmware_sim.model_limits import passed_limits
     from firmware_sim.on_board import on_board_table
-    from firmware_sim.report import (
-        REPORT_FILES,
-        as_json,
-        endings,
-        motion_table,
-        pump_table,
-        retuning_table,
-        write_report,
-    )
+    from firmware_sim.report import REPORT_FILES, as_json, endings, exit_code, write_report
+    from firmware_sim.report_tables import motion_table, pump_table, retuning_table
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
@@ -103,8 +100,10 @@ def bench(
             result = run_bench(
                 loaded, options, lambda name, done: bar.update(tasks[name], completed=done), laws
             )
+        except InterruptedError as error:
+            fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
-            fail(error)
+            fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
     files, failures = write_report(result, out)
     if json_:
         sys.stdout.write(json.dumps(as_json(result, files)) + "\n")
@@ -118,6 +117,8 @@ def bench(
             print_table(console, retuning)
         for ending in endings(result):
             console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
+        for limit in passed_limits(result):
+            console.print(f"[yellow]{escape(limit)}[/yellow]", soft_wrap=True)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:
             print_table(console, timing_table(loops))
@@ -134,6 +135,7 @@ def bench(
         fail("; ".join(failures))
     if view:
         show(files["recording"])
+    raise typer.Exit(exit_code(result))
 
 
 def show(source: Path | str) -> None:

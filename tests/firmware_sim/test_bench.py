@@ -9,13 +9,16 @@ import pytest
 
 from firmware_sim import report
 from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
+from firmware_sim.figures import figures
 from firmware_sim.on_board import on_board, on_board_table
 from firmware_sim.place import Place
-from firmware_sim.report import as_json, endings, figures, motion_table, write_report
+from firmware_sim.report import as_json, endings, exit_code, write_report
+from firmware_sim.report_tables import motion_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
@@ -51,6 +54,7 @@ def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(stor
     assert (result.settle_s, result.end_s) == pytest.approx((SETTLE_S, DURATION_S))
     assert len(result.without_tank_rad) == len(result.runs[0].rows)
     assert endings(result) == []
+    assert exit_code(result) is ExitCode.OK
     assert {name for name, _ in progress} == {run.name for run in result.runs}
     assert max(done_s for _, done_s in progress) <= DURATION_S
 
@@ -170,7 +174,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
     cells = [list(column.cells) for column in motion_table(result).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
     for run, curve in zip(result.runs, drawn, strict=True):
-        name, rms, *_, below = table[run.name]
+        name, rms, _, _, _, below, _, _ = table[run.name]
         assert f"{name}: roll {rms}° RMS" in curve.label
         if below:
             share = re.search(r"\((−|\+)(\d+)%\)", curve.label)
@@ -235,6 +239,7 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
         assert run.roll_below_no_tank == pytest.approx(1 - own / rms[0], rel=1e-9)
         assert run.roll_below_passive == pytest.approx(1 - own / rms[1], abs=1e-9)
     assert endings(shortened) == ["ended at 90 of 120 s", "not run: lqg"]
+    assert exit_code(shortened) is ExitCode.INTERRUPTED
     assert "40 s to 90 s" in str(motion_table(shortened).caption)
     as_told = as_json(shortened, {})
     assert (as_told["interrupted"], as_told["not_run"]) == (True, ["lqg"])
@@ -258,8 +263,9 @@ def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why:
     assert [run.name for run in figures(some)[1]] == [run.name for run in whole]
     said = endings(some)
     assert len(said) == 1
-    assert said[0].startswith(f"{last.name}: not compared, ")
+    assert said[0].startswith(f"{last.name}: not ranked, not compared, ")
     assert why in said[0]
+    assert exit_code(some) is ExitCode.NOT_RANKED
     told = as_json(some, {})["runs"][-1]
     assert (told["name"], told["compared"]) == (last.name, False)
     assert "roll" not in told

@@ -9,7 +9,8 @@ import pytest
 from rich.console import Console
 
 from firmware_sim.bench import BenchResult
-from firmware_sim.report import as_json, retuning_table
+from firmware_sim.report import as_json
+from firmware_sim.report_tables import retuning_table
 from firmware_sim.retuning_figures import RetuningFigures, events_on_ships_time, retuning_figures
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario

@@ -8,6 +8,7 @@ from busy_machine import first_that_can_be_judged, judged_by
 from two_processes import CHANNEL, Program, Watcher, patient_controller, running
 
 from utank_hil.canbus import DriveState, Fault, Mode
+from utank_hil.commands.exit_codes import ExitCode
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -76,7 +77,7 @@ def until_it_ends(
             watcher.wait(lambda w: w.mode is Mode.ACTIVE)
             watcher.wait(lambda w: w.mode is Mode.FAULT)
             watcher.watch(2.0)
-            report, _ = controller.end()
+            report, _ = controller.end(ExitCode.FAULT)
     finally:
         watcher.close()
     return watcher, report

@@ -21,6 +21,8 @@ from two_processes import (
 )
 
 from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.runtime.faults import fault_text
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.telemetry import read_recording
 
@@ -234,8 +236,9 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
             assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
             assert watcher.drive is not None
             assert watcher.drive.state is DriveState.FAULT
-            report, _ = controller.end()
+            report, notes = controller.end(ExitCode.BUS_LOST)
             ship.end()
+            assert f"FAULT, fault {Fault.BUS_LOST.value}, {fault_text(Fault.BUS_LOST)}" in notes
     finally:
         set_link(up=True)
         watcher.close()

@@ -26,6 +26,7 @@ from utank_hil.canbus import (
     SocketCanPort,
     load_catalogue,
 )
+from utank_hil.commands.exit_codes import ExitCode
 
 CHANNEL = "vcan0"
 BIN = Path(sys.executable).parent
@@ -207,16 +208,22 @@ class Program:
         self._process.send_signal(number)
 
     def end(
-        self, *, interrupt: bool = True, timeout_s: float = 60.0
+        self,
+        *codes: ExitCode,
+        interrupt: bool = True,
+        timeout_s: float = 60.0,
     ) -> tuple[dict[str, object], str]:
-        """Interrupt it as Ctrl-C does, or wait for it; what it printed as JSON, and its notes."""
+        """Interrupt it as Ctrl-C does, or wait for it; what it printed as JSON, and its notes.
+
+        It must end with one of `codes`, without any with OK.
+        """
         if interrupt and self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
         self._process.wait(timeout_s)
         self._output.seek(0)
         self._errors.seek(0)
         output, errors = self._output.read(), self._errors.read()
-        assert self._process.returncode == 0, errors
+        assert self._process.returncode in (codes or (ExitCode.OK,)), errors
         assert "Traceback" not in errors
         return json.loads(output), errors
 

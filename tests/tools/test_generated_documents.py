@@ -1,10 +1,11 @@
 """The generated documents are fresh, and the check of that can fail."""
 
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
-from tools.documents import faults, write
+from tools.documents import exit_codes, faults, write
 
 
 def test_the_documents_are_those_of_the_code() -> None:
@@ -23,11 +24,14 @@ def test_a_stale_table_is_found_and_written_anew(
     assert page.read_text(encoding="utf-8") == text
 
 
+@pytest.mark.parametrize(
+    ("made", "kind"), [(faults, "the tables must"), (exit_codes, "the table must")]
+)
 def test_a_page_without_its_marks_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: ModuleType, kind: str
 ) -> None:
-    page = tmp_path / "safety.md"
+    page = tmp_path / "page.md"
     page.write_text("# Safety\n", encoding="utf-8")
-    monkeypatch.setattr(faults, "PAGE", page)
-    with pytest.raises(ValueError, match=r"safety\.md: the tables must stand between"):
-        faults.page()
+    monkeypatch.setattr(made, "PAGE", page)
+    with pytest.raises(ValueError, match=rf"page\.md: {kind} stand between"):
+        made.page()

@@ -8,13 +8,14 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools.documents import catalogue, faults, tables
+from tools.documents import catalogue, exit_codes, faults, tables
 
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Each generated document and what it should hold."""
     yield catalogue.PAGE, catalogue.page()
     yield faults.PAGE, faults.page()
+    yield exit_codes.PAGE, exit_codes.page()
     yield from tables.pages()
 
 

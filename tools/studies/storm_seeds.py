@@ -19,7 +19,8 @@ from rich.progress import track
 from rich.table import Table
 
 from firmware_sim.bench import BenchOptions, run_bench
-from firmware_sim.report import NO_TANK, figures
+from firmware_sim.figures import figures
+from firmware_sim.report_tables import NO_TANK
 from firmware_sim.scenario import Scenario
 from tools.studies.trial_setup import designed
 from utank_hil.analysis.motion.confidence import mean_interval

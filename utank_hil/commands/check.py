@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from utank_hil.commands.common import Json, fail, load
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
@@ -58,4 +59,4 @@ def check(
     if json_:
         sys.stdout.write(json.dumps({"kind": kind, **content}) + "\n")
     if not content.get("accepted", True):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.REFUSED)

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from typer.core import TyperGroup
 
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration.files import ConfigError, load_config
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -49,10 +50,10 @@ def new_app(help_text: str | None = None, cls: type[TyperGroup] = TyperGroup) ->
     )
 
 
-def fail(message: object) -> NoReturn:
-    """Print an error and end with exit code 2."""
+def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
+    """Print an error and end."""
     notes.print("[red]error:[/red]", escape(str(message)), soft_wrap=True)
-    raise typer.Exit(2)
+    raise typer.Exit(code)
 
 
 def load(path: Path, model: type[ModelT]) -> ModelT:
@@ -67,7 +68,7 @@ def fail_with(error: ConfigError) -> NoReturn:
     """List everything that is wrong with a configuration and end with exit code 2."""
     for problem in error.problems:
         notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
-    raise typer.Exit(2) from None
+    raise typer.Exit(ExitCode.USAGE) from None
 
 
 def why_not_writable(folder: Path, files: Iterable[str] = ()) -> str | None:

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from utank_hil.assembly import retuning_task
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.identified import (
     CONTROLLER,
     VESSEL,
@@ -81,7 +82,7 @@ def identify_log(
         notes.print(f"[red]refused:[/red] {error}", soft_wrap=True)
         if json_:
             sys.stdout.write(json.dumps({"accepted": False, "reasons": [str(error)]}) + "\n")
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitCode.REFUSED) from None
     answer = judge(record, found, task)
     files = {
         "picture": draw_identification(record, found, task, out / PICTURE, f"{log.name}, {name}")
@@ -94,7 +95,7 @@ def identify_log(
     else:
         print_report(Console(highlight=False), found, task, answer, files)
     if not isinstance(answer, Candidate):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.REFUSED)
 
 
 def _keep_apart(results: list[Path], config: Path, content: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ import typer
 
 from utank_hil.canbus import SocketCanPort, load_catalogue
 from utank_hil.commands.common import Duration, fail, load, notes
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.runtime import RealTimeLoop, stop_on_signals
 from utank_hil.runtime.panel import Action, OperatorPanel
@@ -33,7 +34,7 @@ def panel(
     try:
         port = SocketCanPort(bus)
     except OSError as error:
-        fail(error)
+        fail(error, ExitCode.NO_BUS)
     notes.print("actions: " + ", ".join(action.value for action in Action) + ", quit")
     try:
         with stop_on_signals() as signalled:

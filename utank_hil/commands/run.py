@@ -12,9 +12,11 @@ from rich.console import Console
 from rich.markup import escape
 
 from utank_hil.assembly import build_controller_node, retuner_work
-from utank_hil.canbus import PortError, SocketCanPort
+from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.fault_lines import FaultLines
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
@@ -28,6 +30,7 @@ from utank_hil.runtime import (
     real_time_scheduling,
     stop_on_signals,
 )
+from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
 
@@ -50,7 +53,9 @@ def run(
 
     It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
     (UTC) of their start; a recording that fails is reported, and the controller runs without. A
-    controller that retunes itself prints each step with its reasons when it happens.
+    controller that retunes itself prints each step with its reasons when it happens; so does one
+    that meets a fault. A fault that is latched at the end, or a lost bus, has an exit code of its
+    own (docs/exit-codes.md).
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -63,7 +68,7 @@ def run(
         try:
             port = SocketCanPort(bus)
         except OSError as error:
-            fail(error)
+            fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
         folder = OUT if out is None and view else out
@@ -97,6 +102,16 @@ def run(
             sink=None if recording is None else recording.write,
             event_sink=None if announcer is None else announcer.write,
         )
+        try:
+            faults = FaultLines()
+        except OSError as error:
+            fail(f"no process to print faults: {error}")
+        stack.callback(faults.close)
+
+        def ended() -> bool:
+            faults.look(node)
+            return stop()
+
         with suppress(PortError):  # the loop meets it too, and its node reacts
             port.receive()  # what came while the node was built is old, and must not look fresh
         with real_time_scheduling() as scheduling:
@@ -104,12 +119,15 @@ def run(
                 notes.print(line, soft_wrap=True)
             notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
             RealTimeLoop([node], port, statistics=statistics).run(
-                stop, None if duration is None else round(duration * 1e9)
+                ended, None if duration is None else round(duration * 1e9)
             )
+        faults.look(node)
     if announcer is not None and announcer.error is not None:
         notes.print(f"[red]retuning was not told:[/red] {escape(announcer.error)}", soft_wrap=True)
+    code = _code(node)
     if json_:
         summary = {
+            "exit_code": code,
             "mode": node.mode.name,
             "fault": node.fault.name,
             "law_error": node.law_error,
@@ -119,9 +137,27 @@ def run(
             "recording": None if recording is None else asdict(recording.summary),
         }
         sys.stdout.write(json.dumps(summary) + "\n")
-        return
+    else:
+        _print_summary(loaded.name, node, statistics, recording)
+    raise typer.Exit(code)
+
+
+def _code(node: ControllerNode) -> ExitCode:
+    """The code with which ``run`` ends, by the controller's state after its last tick."""
+    if node.seen.link_lost or node.fault is Fault.BUS_LOST:
+        return ExitCode.BUS_LOST
+    return ExitCode.FAULT if node.mode is Mode.FAULT else ExitCode.OK
+
+
+def _print_summary(
+    name: str,
+    node: ControllerNode,
+    statistics: LoopStatistics,
+    recording: RunRecording | None,
+) -> None:
+    """What became of a run, for people."""
     console = Console(highlight=False)
-    print_table(console, timing_table({loaded.name: statistics}))
+    print_table(console, timing_table({name: statistics}))
     for event in node.retuning_events:
         console.print(
             f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {escape(event_text(event))}",

@@ -1,0 +1,133 @@
+"""Where the bench's ship, tank, sea and pump are no longer a model of real ones, in one place.
+
+A bench that passes a limit still runs; what passed it is said under the tables.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from firmware_sim.bench import BenchResult
+from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+MOST_ROLL_RAD: Final = math.radians(40.0)
+MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
+MOST_REGULAR_STEEPNESS: Final = 0.142
+"""Height over length at which a regular wave in deep water breaks (Michell)."""
+OVERSPEED: Final = 1.02
+"""Share of the pump's speed limit up to which the speed loop lets the rotor pass it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelLimit:
+    """A limit of the model.
+
+    Attributes
+    ----------
+    limit : str
+        The limit, and what is not modelled beyond it.
+    passed : callable
+        What passed it in a bench, in words with the figure; nothing if nothing did.
+    """
+
+    limit: str
+    passed: Callable[[BenchResult], Iterator[str]]
+
+
+def steepness(amplitude_m: FloatArray, omega_rad_s: FloatArray) -> tuple[float, float]:
+    """Steepness of a sea of these components, and the most that seas have.
+
+    For one component height over length. For several, significant height over the length of a wave
+    of mean zero-up-crossing period; its limit falls from 1/10 at 6 s to 1/15 at 12 s (DNV-RP-C205,
+    section 3.5.4).
+    """
+    variance = amplitude_m**2 / 2
+    if not variance.any():
+        return 0.0, MOST_REGULAR_STEEPNESS
+    omega = math.sqrt(float(variance @ omega_rad_s**2) / float(variance.sum()))
+    per_length = omega**2 / (2 * math.pi * GRAVITY_M_S2)
+    if len(amplitude_m) == 1:
+        return 2 * float(amplitude_m[0]) * per_length, MOST_REGULAR_STEEPNESS
+    most = float(np.interp(2 * math.pi / omega, [6.0, 12.0], [1 / 10, 1 / 15]))
+    return 4 * math.sqrt(float(variance.sum())) * per_length, most
+
+
+def _roll(result: BenchResult) -> Iterator[str]:
+    return _rolled_beyond(result, MOST_ROLL_RAD)
+
+
+def _linear_roll(result: BenchResult) -> Iterator[str]:
+    if result.scenario.plant == "linear":
+        yield from _rolled_beyond(result, MOST_LINEAR_ROLL_RAD)
+
+
+def _rolled_beyond(result: BenchResult, limit_rad: float) -> Iterator[str]:
+    rolls = {"no tank": result.without_tank_rad}
+    rolls |= {run.name: run.column("true_roll_rad") for run in result.runs}
+    for name, roll_rad in rolls.items():
+        most_rad = float(np.abs(roll_rad).max())
+        if most_rad > limit_rad:
+            yield f"{name} rolled to {math.degrees(most_rad):.0f}°"
+
+
+def _level(result: BenchResult) -> Iterator[str]:
+    limit_m = result.scenario.vessel.tank.level_limit_m
+    for run in result.runs:
+        most_m = float(np.abs(run.column("true_level_m")).max())
+        if run.strikes:
+            yield (
+                f"{run.name}: water struck roof or bottom {run.strikes} times, at most with "
+                f"{run.max_strike_impulse_nms / 1e6:.3g} MN m s"
+            )
+        elif most_m > limit_m:
+            yield f"{run.name}: level of {most_m:.2f} m with room for {limit_m:g} m"
+
+
+def _sea(result: BenchResult) -> Iterator[str]:
+    sea = result.scenario.sea.sea(result.seed)
+    found, most = steepness(sea.amplitude_m, sea.omega_rad_s)
+    if found > most:
+        yield f"the sea's steepness is {found:.3f}, and seas reach {most:.3f}"
+
+
+def _pump(result: BenchResult) -> Iterator[str]:
+    most = result.scenario.vessel.pump.max_speed_rad_s
+    for run in result.runs:
+        if run.pump_speed_rad_s > OVERSPEED * most:
+            yield (
+                f"{run.name}: rotor at {run.pump_speed_rad_s:.0f} rad/s, made for {most:.0f} rad/s"
+            )
+
+
+MODEL_LIMITS: Final = (
+    ModelLimit(
+        f"roll beyond {math.degrees(MOST_ROLL_RAD):.0f}°: neither deck in the water nor shifting "
+        "cargo, and waves and damping as for an upright ship",
+        _roll,
+    ),
+    ModelLimit(
+        f"roll beyond {math.degrees(MOST_LINEAR_ROLL_RAD):.0f}° by linear equations: neither the "
+        "restoring curve nor quadratic damping (plant: nonlinear has both)",
+        _linear_roll,
+    ),
+    ModelLimit(
+        "level at the tank's end: a strike is one impulse, without sloshing or trapped air",
+        _level,
+    ),
+    ModelLimit("steeper sea than there is: waves are linear and do not break", _sea),
+    ModelLimit("pump beyond its speed: blades neither cavitate nor burst", _pump),
+)
+"""Each limit once, in the order in which they are said."""
+
+
+def passed_limits(result: BenchResult) -> list[str]:
+    """Every limit that was passed, with who passed it by how much."""
+    return [
+        f"limit of the model passed, {each.limit}: {'; '.join(found)}"
+        for each in MODEL_LIMITS
+        if (found := list(each.passed(result)))
+    ]

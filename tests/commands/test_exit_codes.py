@@ -1,0 +1,67 @@
+"""What a command tells by its exit code."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.canbus import Fault, Frame, Mode, PortError
+from utank_hil.cli import app
+from utank_hil.commands import run as module
+from utank_hil.commands.exit_codes import ExitCode
+
+GPC = Path("configs/controllers/gpc.yaml")
+
+
+@pytest.mark.parametrize(
+    ("mode", "fault", "link_lost", "code"),
+    [
+        (Mode.STANDBY, Fault.NONE, False, ExitCode.OK),
+        (Mode.ACTIVE, Fault.LEVEL_LIMIT, False, ExitCode.OK),  # the law gave zero, not latched
+        (Mode.INIT, Fault.MOTION_SILENT, False, ExitCode.OK),  # still waits
+        (Mode.FAULT, Fault.MOTION_SILENT, False, ExitCode.FAULT),
+        (Mode.FAULT, Fault.BUS_LOST, False, ExitCode.BUS_LOST),
+        (Mode.FAULT, Fault.MOTION_SILENT, True, ExitCode.BUS_LOST),
+        (Mode.INIT, Fault.BUS_LOST, True, ExitCode.BUS_LOST),
+    ],
+)
+def test_run_ends_with_a_code_of_its_own_for_a_fault_and_for_a_lost_bus(
+    mode: Mode, fault: Fault, link_lost: bool, code: ExitCode
+) -> None:
+    node = SimpleNamespace(mode=mode, fault=fault, seen=SimpleNamespace(link_lost=link_lost))
+    assert module._code(node) is code
+
+
+class DeadBus:
+    """An interface that opens, and then takes and gives nothing."""
+
+    def __init__(self, channel: str) -> None:
+        pass
+
+    def send(self, frame: Frame) -> None:
+        raise PortError("down")
+
+    def receive(self) -> tuple[Frame, ...]:
+        raise PortError("down")
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.slow
+def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "SocketCanPort", DeadBus)
+    words = ["run", str(GPC), "--bus", "any0", "--duration", "0.3", "--json"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == ExitCode.BUS_LOST
+    report = json.loads(result.stdout)
+    assert (report["exit_code"], report["fault"]) == (ExitCode.BUS_LOST, "BUS_LOST")
+
+
+def test_codes_differ_and_the_shells_own_are_left_alone() -> None:
+    assert len(set(ExitCode)) == len(list(ExitCode)) == len(ExitCode.__members__)
+    assert all(code < 126 or code is ExitCode.INTERRUPTED for code in ExitCode)

@@ -1,0 +1,61 @@
+"""The exit codes of the commands: here, and as a table in ``docs/exit-codes.md``."""
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """How a command ended, for scripts and service managers.
+
+    Attributes
+    ----------
+    commands : str
+        Those that may end so.
+    meaning : str
+    """
+
+    commands: str
+    meaning: str
+
+    def __new__(cls, value: int, commands: str, meaning: str) -> "ExitCode":
+        """Make a member of its number, its commands and its meaning."""
+        member = int.__new__(cls, value)
+        member._value_ = value
+        member.commands, member.meaning = commands, meaning
+        return member
+
+    OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
+    REFUSED = (
+        1,
+        "`check`, `identify`",
+        "A law misses its margins, or a model or its law is refused. Of any command, with a "
+        "traceback: an error in the program.",
+    )
+    USAGE = (
+        2,
+        "all",
+        "An option, a file or a configuration is wrong, or results can't be written. Starting "
+        "again does not help.",
+    )
+    NO_BUS = (
+        3,
+        "`run`, `panel`, `bench`, `firmware-sim`",
+        "The CAN interface can't be opened.",
+    )
+    BUS_LOST = (
+        4,
+        "`run`",
+        "Ended while the CAN bus could not be used, or with its loss latched.",
+    )
+    FAULT = 5, "`run`", "Ended with another fault latched."
+    NOT_RANKED = (
+        6,
+        "`bench`",
+        "The results are written, but a run is marked and not ranked: the ship capsized, the "
+        "controller ended in a fault or was too seldom in charge, or rows are missing.",
+    )
+    INTERRUPTED = (
+        130,
+        "`bench`, `firmware-sim`",
+        "`bench`: Ctrl-C before the end; results hold what there is. `firmware-sim`: Ctrl-C before "
+        "the first sample.",
+    )
