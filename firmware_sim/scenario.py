@@ -15,7 +15,7 @@ from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.vessel import tank_problems
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import ParameterError, Problem, refuse
+from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
 
@@ -58,22 +58,22 @@ class Scenario(Section):
     ]
     operator: tuple[TimedAction, ...]
     """What the operator does in the runs with a controller; in the passive run nobody arms."""
-    duration_s: Annotated[float, Field(gt=0, le=LONGEST_S)]
-    settle_s: Annotated[float, Field(ge=0)]
+    duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
+    settle_s: NotNegative
     """Left out of the statistics at the start."""
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
     """Where people are judged; over the starboard reservoir if not given."""
     plant: Literal["nonlinear", "linear"] = "nonlinear"
     """Equations of the emulated ship; the linear ones are their limit for small motions."""
-    actual_ship: dict[str, float] = Field(default_factory=dict)
+    actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Keys of the ship that differ from the vessel's, which is what the controller believes.
 
     Those of `SAILED` only.
     """
-    actual_from_s: Annotated[float, Field(ge=0)] = 0.0
+    actual_from_s: NotNegative = 0.0
     """When the difference comes about: cargo moved, fuel burnt."""
-    retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
+    retuner_latency_s: NotNegative = 5.0
     """Time that identification and design take in simulated time."""
 
     @field_validator("sensors", mode="before")

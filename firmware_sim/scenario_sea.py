@@ -20,16 +20,16 @@ from utank_hil.configuration.spectra import (
     PiersonMoskowitzSpectrum,
     read_spectra,
 )
-from utank_hil.parameters import Positive, Problem, refuse
+from utank_hil.parameters import Finite, NotNegative, Positive, Problem, refuse
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
 
 
 class _AnySea(Section):
     """How the ship meets the waves, and how much of their slope acts on it."""
 
-    heading_deg: float = 90.0
+    heading_deg: Finite = 90.0
     """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
-    speed_m_s: Annotated[float, Field(ge=0)] = 0.0
+    speed_m_s: NotNegative = 0.0
     """The ship's speed."""
     effective_slope: EffectiveSlope = EffectiveSlope()
 
@@ -37,7 +37,7 @@ class _AnySea(Section):
 class _IrregularSea(_AnySea, ABC):
     """A sea drawn from a spectrum."""
 
-    spreading: Annotated[float, Field(ge=0)] | None = None
+    spreading: NotNegative | None = None
     """Exponent s of the spreading cos^2s(theta / 2); long-crested without it."""
 
     @abstractmethod
@@ -77,7 +77,7 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
 
     direction_file: Path | None = None
     """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
-    course_deg: float | None = None
+    course_deg: Finite | None = None
     """The ship's course, degrees clockwise from true north."""
 
     @field_validator("direction_file")
@@ -122,7 +122,7 @@ class RegularSea(_AnySea):
     """One wave."""
 
     kind: Literal["regular"]
-    amplitude_m: Annotated[float, Field(ge=0)]
+    amplitude_m: NotNegative
     period_s: Positive
 
     def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw

@@ -115,7 +115,7 @@ def test_every_wrong_value_of_a_scenario_s_sections_has_its_own_key(tmp_path: Pa
     expected = {
         "sea.effective_slope.coefficient": "must be zero or more",
         "sea.effective_slope.depth_m": "must be zero or more",
-        "sea.effective_slope.beam_m": "valid number",
+        "sea.effective_slope.beam_m": "must be a number, got 'wide'",
         "sensors.roll_noise_rad": "must be zero or more",
         "sensors.motion_delay_ms": "must be 0 to 1000",
         "sensors.high_level_m": "must be positive",

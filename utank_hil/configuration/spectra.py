@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_
 
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.parameters import ParameterError, Positive
+from utank_hil.parameters import ParameterError, Positive, Range
 from utank_hil.sea import (
     MeasuredSpectra,
     Spectrum,
@@ -29,7 +29,7 @@ class JonswapSpectrum(Section):
     kind: Literal["jonswap"]
     hs_m: Positive
     tp_s: Positive
-    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
+    gamma: Annotated[float, Range(least=1, most=7)] = 3.3
 
     def spectrum(self) -> Spectrum:
         """JONSWAP spectrum."""
