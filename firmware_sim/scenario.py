@@ -12,12 +12,13 @@ from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensors import SensorErrors
 from utank_hil.configuration import ControllerConfig, Section, Vessel
-from utank_hil.configuration.vessel import tank_problems
+from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
+from utank_hil.sea.encounter import wavenumber_rad_m
 
 MOST_CONTROLLERS = 7
 """More runs than these and the passive one can't be distinguished in a picture."""
@@ -38,6 +39,9 @@ SAILED: Final = (
 
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
+
+_NO_MOMENT: Final = 1e-9
+"""Share of the waves' slope below which the ship feels nothing of it."""
 
 # where the user sets none, drive and high-level switch are as the first ship's to its pump and tank
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
@@ -192,7 +196,20 @@ class Scenario(Section):
             return [("sea", f"can't be made: {error}")]
         if not np.isfinite(amplitudes).all():
             return [("sea", "has waves beyond all scale: check height, period and slope")]
-        return []
+        waves = self.sea.sea(self.seed)
+        steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
+        if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
+            return []
+        return self.sea.without_moment() if steep > 0 else []  # still water is a sea, too
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in vessel and sea."""
+        parts = {"vessel": self.vessel, "sea": self.sea}
+        return [
+            (f"{name}.{key}", reason)
+            for name, part in parts.items()
+            for key, reason in part.warnings()
+        ]
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the sea on the ship."""

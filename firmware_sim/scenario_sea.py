@@ -7,7 +7,7 @@ same keys for all of them.
 import math
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -20,18 +20,41 @@ from utank_hil.configuration.spectra import (
     PiersonMoskowitzSpectrum,
     read_spectra,
 )
-from utank_hil.parameters import Finite, NotNegative, Positive, Problem, refuse
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import NotNegative, Problem, Range, refuse
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
+
+Bearing = Annotated[float, Range(least=-360, most=360)]
+_FAST_M_S: Final = 20.0
+_STEEPEST: Final = 1 / 7
+"""Height per length at which a regular wave breaks in deep water (Michell 1893)."""
 
 
 class _AnySea(Section):
     """How the ship meets the waves, and how much of their slope acts on it."""
 
-    heading_deg: Finite = 90.0
+    heading_deg: Bearing = 90.0
     """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
-    speed_m_s: NotNegative = 0.0
-    """The ship's speed."""
+    speed_m_s: Annotated[float, Range(least=0, most=40)] = 0.0
+    """The ship's speed; the fastest ferries make 30."""
     effective_slope: EffectiveSlope = EffectiveSlope()
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the sea and the way the ship meets it."""
+        if self.speed_m_s <= _FAST_M_S:
+            return super().warnings()
+        knots = self.speed_m_s * 3600 / 1852
+        return [*super().warnings(), ("speed_m_s", f"is {knots:.0f} knots: it is in m/s")]
+
+    def without_moment(self) -> list[Problem]:
+        """Why these waves do not roll the ship at all."""
+        if self.effective_slope.coefficient == 0:
+            return [("sea.effective_slope.coefficient", "of 0 takes all of the waves' moment")]
+        reason = (
+            f"of {self.heading_deg:g} gives no roll moment: waves from straight ahead or astern do "
+            "not roll a ship in this model; choose another heading, or give a spreading"
+        )
+        return [("sea.heading_deg", reason)]
 
 
 class _IrregularSea(_AnySea, ABC):
@@ -77,7 +100,7 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
 
     direction_file: Path | None = None
     """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
-    course_deg: Finite | None = None
+    course_deg: Bearing | None = None
     """The ship's course, degrees clockwise from true north."""
 
     @field_validator("direction_file")
@@ -123,7 +146,18 @@ class RegularSea(_AnySea):
 
     kind: Literal["regular"]
     amplitude_m: NotNegative
-    period_s: Positive
+    period_s: Annotated[float, Range(above=0, most=60)]
+
+    @model_validator(mode="after")
+    def _not_broken(self) -> Self:
+        length_m = GRAVITY_M_S2 * self.period_s**2 / (2 * math.pi)
+        if 2 * self.amplitude_m > _STEEPEST * length_m:
+            reason = (
+                f"of {self.amplitude_m:g} m in a wave {length_m:.3g} m long: it breaks above "
+                f"{_STEEPEST * length_m / 2:.2g} m; lower it, or raise period_s"
+            )
+            refuse("sea", [("amplitude_m", reason)])
+        return self
 
     def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw
         """The wave."""

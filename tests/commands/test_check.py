@@ -164,8 +164,7 @@ def test_every_wrong_number_of_a_ship_has_its_own_key(tmp_path: Path) -> None:
     ("section", "key", "value", "reason"),
     [
         ("ship", "stiffness_nm_rad", 1e7, "takes all of the ship's stability"),
-        ("tank", "density_kg_m3", 1e5, "more roll inertia in its water than"),
-        ("tank", "width_m", 1e200, "beyond all scale"),
+        ("tank", "reservoir_area_m2", 170.0, "more roll inertia in its water than"),
     ],
 )
 def test_ship_that_can_not_carry_her_tank_is_refused(

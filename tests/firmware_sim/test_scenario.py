@@ -72,7 +72,7 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
          "must be zero or more"),
         ({"actual_ship": {"stiffness": 1e9}}, "actual_ship.stiffness",
          "can't differ from the vessel's; it takes inertia_kg_m2, stiffness_nm_rad"),
-        ({"plant": "exact"}, "plant", "'nonlinear' or 'linear'"),
+        ({"plant": "exact"}, "plant", "must be one of nonlinear, linear"),
         ({"actual_ship": {"inertia_kg_m2": -1.0}}, "actual_ship.inertia_kg_m2", "got -1.0"),
         ({"actual_ship": {"wind_moment_nm": 4e8}}, "actual_ship",
          "full or empty at one side: lower offset_moment_nm or wind_moment_nm"),

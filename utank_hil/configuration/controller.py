@@ -66,6 +66,10 @@ class ControllerConfig(Section):
         refuse("", problems)
         return self
 
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the vessel."""
+        return [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
+
     def _limit_problems(self) -> list[Problem]:
         pressure_pa = self.vessel.pump.max_pressure_pa
         level_m = self.vessel.tank.level_limit_m

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from utank_hil.configuration.error_words import words_for
 from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
-from utank_hil.parameters import ParameterError
+from utank_hil.parameters import ParameterError, Problem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -23,6 +23,10 @@ class Section(BaseModel):
     """One mapping of a configuration file: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the section, by keys within it; it can be used all the same."""
+        return []
 
 
 @dataclass(frozen=True, slots=True)
