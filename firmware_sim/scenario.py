@@ -21,12 +21,13 @@ from firmware_sim.voyage import (
 )
 from firmware_sim.waves import PassingWaves, SteadyWaves, Waves
 from utank_hil.configuration import ControllerConfig, Section, Vessel
-from utank_hil.configuration.vessel import tank_problems
+from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import ParameterError, Problem, refuse
+from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
+from utank_hil.sea.encounter import wavenumber_rad_m
 
 MOST_CONTROLLERS = 7
 """More runs than these and the passive one can't be distinguished in a picture."""
@@ -48,6 +49,9 @@ SAILED: Final = (
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
 
+_NO_MOMENT: Final = 1e-9
+"""Share of the waves' slope below which the ship feels nothing of it."""
+
 # where the user sets none, drive and high-level switch are as the first ship's to its pump and tank
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
 _HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
@@ -67,24 +71,24 @@ class Scenario(Section):
     ]
     operator: tuple[TimedAction, ...]
     """What the operator does in the runs with a controller; in the passive run nobody arms."""
-    duration_s: Annotated[float, Field(gt=0, le=LONGEST_S)]
-    settle_s: Annotated[float, Field(ge=0)]
+    duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
+    settle_s: NotNegative
     """Left out of the statistics at the start."""
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Range(least=0)] = 1
     place: Place | None = None
     """Where people are judged; over the starboard reservoir if not given."""
     plant: Literal["nonlinear", "linear"] = "nonlinear"
     """Equations of the emulated ship; the linear ones are their limit for small motions."""
-    actual_ship: dict[str, float] = Field(default_factory=dict)
+    actual_ship: dict[str, Finite] = Field(default_factory=dict)
     """Keys of the ship that differ from the vessel's, which is what the controller believes.
 
     Those of `SAILED` only.
     """
-    actual_from_s: Annotated[float, Field(ge=0)] = 0.0
+    actual_from_s: NotNegative = 0.0
     """When the difference comes about: cargo moved, fuel burnt."""
     voyage: tuple[Waypoint, ...] = ()
     """How course, speed, loading and sea change under way."""
-    retuner_latency_s: Annotated[float, Field(ge=0)] = 5.0
+    retuner_latency_s: NotNegative = 5.0
     """Time that identification and design take in simulated time."""
 
     @field_validator("sensors", mode="before")
@@ -237,7 +241,21 @@ class Scenario(Section):
             return [("sea", f"can't be made: {error}")]
         if not np.isfinite(amplitudes).all():
             return [("sea", "has waves beyond all scale: check height, period and slope")]
-        return []
+        waves = self.sea.sea(self.seed)
+        steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
+        if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
+            return []
+        # still water is a sea, too, and a ship under way may turn
+        return self.sea.without_moment() if steep > 0 and not self.voyage else []
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in vessel and sea."""
+        parts = {"vessel": self.vessel, "sea": self.sea}
+        return [
+            (f"{name}.{key}", reason)
+            for name, part in parts.items()
+            for key, reason in part.warnings()
+        ]
 
     def _voyage_problems(self) -> list[Problem]:
         problems = waypoint_problems(self.voyage, self.duration_s)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, Protocol, Self
+from typing import Annotated, Final, Literal, Protocol, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -24,19 +24,32 @@ from utank_hil.configuration.spectra import (
     read_spectra,
     utc,
 )
-from utank_hil.parameters import Positive, Problem, refuse
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import NotNegative, Problem, Range, refuse
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea
+
+Bearing = Annotated[float, Range(least=-360, most=360)]
+_FAST_M_S: Final = 20.0
+_STEEPEST: Final = 1 / 7
+"""Height per length at which a regular wave breaks in deep water (Michell 1893)."""
+
+
+class SpectrumSection(Protocol):
+    """A section that names a spectrum."""
+
+    def spectrum(self) -> Spectrum:
+        """The spectrum."""
 
 
 class _AnySea(Section):
     """How the ship meets the waves, and how much of their slope acts on it."""
 
-    heading_deg: float = 90.0
+    heading_deg: Bearing = 90.0
     """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
-    speed_m_s: Annotated[float, Field(ge=0)] = 0.0
-    """The ship's speed."""
+    speed_m_s: Annotated[float, Range(least=0, most=40)] = 0.0
+    """The ship's speed; the fastest ferries make 30."""
     effective_slope: EffectiveSlope = EffectiveSlope()
     roll_moment_table: Path | None = None
     """Roll moment against frequency and heading (`MomentTable`), instead of the effective slope."""
@@ -71,18 +84,28 @@ class _AnySea(Section):
         """Where the ship points at the start, and whether that is a course."""
         return self.heading_deg, False
 
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the sea and the way the ship meets it."""
+        if self.speed_m_s <= _FAST_M_S:
+            return super().warnings()
+        knots = self.speed_m_s * 3600 / 1852
+        return [*super().warnings(), ("speed_m_s", f"is {knots:.0f} knots: it is in m/s")]
 
-class SpectrumSection(Protocol):
-    """A section that names a spectrum."""
-
-    def spectrum(self) -> Spectrum:
-        """The spectrum."""
+    def without_moment(self) -> list[Problem]:
+        """Why these waves do not roll the ship at all."""
+        if self.effective_slope.coefficient == 0:
+            return [("sea.effective_slope.coefficient", "of 0 takes all of the waves' moment")]
+        reason = (
+            f"of {self.heading_deg:g} gives no roll moment: waves from straight ahead or astern do "
+            "not roll a ship in this model; choose another heading, or give a spreading"
+        )
+        return [("sea.heading_deg", reason)]
 
 
 class _IrregularSea(_AnySea, ABC):
     """A sea drawn from a spectrum."""
 
-    spreading: Annotated[float, Field(ge=0)] | None = None
+    spreading: NotNegative | None = None
     """Exponent s of the spreading cos^2s(theta / 2); long-crested without it."""
 
     @abstractmethod
@@ -149,7 +172,7 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
 
     direction_file: Path | None = None
     """Mean direction of the same station; then `course_deg` instead of `heading_deg`."""
-    course_deg: float | None = None
+    course_deg: Bearing | None = None
     """The ship's course, degrees clockwise from true north."""
     until: datetime | None = None
     """Start of the last record: from one to the next of those between, the sea passes linearly."""
@@ -223,8 +246,19 @@ class RegularSea(_AnySea):
     """One wave."""
 
     kind: Literal["regular"]
-    amplitude_m: Annotated[float, Field(ge=0)]
-    period_s: Positive
+    amplitude_m: NotNegative
+    period_s: Annotated[float, Range(above=0, most=60)]
+
+    @model_validator(mode="after")
+    def _not_broken(self) -> Self:
+        length_m = GRAVITY_M_S2 * self.period_s**2 / (2 * math.pi)
+        if 2 * self.amplitude_m > _STEEPEST * length_m:
+            reason = (
+                f"of {self.amplitude_m:g} m in a wave {length_m:.3g} m long: it breaks above "
+                f"{_STEEPEST * length_m / 2:.2g} m; lower it, or raise period_s"
+            )
+            refuse("sea", [("amplitude_m", reason)])
+        return self
 
     def sea(self, seed: int) -> Sea:  # noqa: ARG002, a regular sea has nothing to draw
         """The wave."""

@@ -102,14 +102,21 @@ class Range:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Let configuration files check the field as they read it."""
-        from pydantic_core import core_schema  # here: nothing but files needs it
+        # here: nothing but files needs it
+        from pydantic_core import PydanticCustomError, core_schema
+
+        def a_number(value: Any) -> Any:
+            if isinstance(value, bool | str):  # else ``yes`` were 1.0
+                raise PydanticCustomError("number_type", "must be a number")
+            return value
 
         def held(value: float) -> float:
             if not self.holds(value):
                 raise ValueError(self.demand)
             return value
 
-        return core_schema.no_info_after_validator_function(held, handler(source))
+        number = core_schema.no_info_before_validator_function(a_number, handler(source))
+        return core_schema.no_info_after_validator_function(held, number)
 
 
 Finite = Annotated[float, Range()]

@@ -64,9 +64,9 @@ def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(
 @pytest.mark.parametrize(
     ("sea", "key", "reason"),
     [
-        ({"kind": "swell"}, "law.sea", "'jonswap', 'ittc', 'pierson_moskowitz'"),
-        ({"kind": "regular", "amplitude_m": 1.0, "period_s": 9.0}, "law.sea", "'measured'"),
-        ({"kind": "jonswap", "hs_m": 0.0, "tp_s": 9.0}, "law.sea.hs_m", "must be positive"),
+        ({"kind": "swell"}, "law.sea.kind", "jonswap, ittc, pierson_moskowitz"),
+        ({"kind": "regular", "amplitude_m": 1.0, "period_s": 9.0}, "law.sea.kind", "measured"),
+        ({"kind": "jonswap", "hs_m": 0.0, "tp_s": 9.0}, "law.sea.hs_m", "must be above 0 and"),
         ({"kind": "ittc", "hs_m": 1.0}, "law.sea.tp_s", "is required but missing"),
         ({**KINDS["ittc"], "heading_deg": 90.0}, "law.sea.heading_deg", "is not a known key"),
         ({**KINDS["ittc"], "order": 0}, "law.sea.order", "must be 1 to"),

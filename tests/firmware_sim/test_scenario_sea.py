@@ -111,7 +111,7 @@ def test_a_time_with_a_zone_means_the_same_hour(tmp_path: Path) -> None:
          "is required with direction_file"),
         ({**MEASURED, "course_deg": 20.0}, "sea.course_deg", "needs direction_file"),
         ({**DIRECTED, "heading_deg": 90.0}, "sea.heading_deg", "and direction_file exclude each"),
-        ({"kind": "swell"}, "sea", "'jonswap', 'ittc', 'pierson_moskowitz'"),
+        ({"kind": "swell"}, "sea.kind", "jonswap, ittc, pierson_moskowitz"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_key(

@@ -14,7 +14,14 @@ from rich.markup import escape
 from typer.core import TyperGroup
 
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.configuration.files import ConfigError, load_config
+from utank_hil.configuration.files import (
+    ConfigError,
+    ConfigProblem,
+    Section,
+    load_config,
+    located,
+)
+from utank_hil.parameters import ParameterError
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -57,11 +64,23 @@ def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
 
 
 def load(path: Path, model: type[ModelT]) -> ModelT:
-    """Read a configuration, or list everything that is wrong with it and end with exit code 2."""
+    """Read a configuration, or list everything that is wrong with it and end with exit code 2.
+
+    What is unusual in it is a note.
+    """
     try:
-        return load_config(path, model)
+        loaded = load_config(path, model)
     except ConfigError as error:
         fail_with(error)
+    for warning in warnings_of(loaded, path):
+        notes.print("[yellow]warning:[/yellow]", escape(str(warning)), soft_wrap=True)
+    return loaded
+
+
+def warnings_of(loaded: BaseModel, path: Path) -> list[ConfigProblem]:
+    """What is unusual in a configuration, at the places where the values are written."""
+    found = loaded.warnings() if isinstance(loaded, Section) else []
+    return located(ParameterError("", found), path).problems
 
 
 def fail_with(error: ConfigError) -> NoReturn:

@@ -14,7 +14,7 @@ from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
-from utank_hil.parameters import Problem, refuse
+from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
@@ -31,15 +31,15 @@ class ControllerConfig(Section):
     name: str
     vessel: Vessel
     law: Law
-    delay_s: Annotated[float, Field(ge=0, le=1)] = 0.05
+    delay_s: Annotated[float, Range(least=0, most=1)] = 0.05
     """From the sampling of a measurement to the drive's answer to the command made of it."""
     accept_low_margins: bool = False
     """Use the law even if it misses the required margins."""
     limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
     """Those not given are the vessel's (`Vessel.default_limits`)."""
     safety: SafetyLimits = SafetyLimits()
-    command_timeout_ms: Annotated[float, Field(ge=20, le=100)] = 50.0
-    bit_rate: Annotated[int, Field(ge=10_000, le=1_000_000)] = 250_000
+    command_timeout_ms: Annotated[float, Range(least=20, most=100)] = 50.0
+    bit_rate: Annotated[int, Range(least=10_000, most=1_000_000)] = 250_000
     retuning: RetuningSettings | None = None
     """How the controller may retune itself; without it, it never does."""
 
@@ -65,6 +65,10 @@ class ControllerConfig(Section):
         problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
         refuse("", problems)
         return self
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the vessel."""
+        return [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
 
     def _limit_problems(self) -> list[Problem]:
         pressure_pa = self.vessel.pump.max_pressure_pa

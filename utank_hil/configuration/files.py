@@ -11,9 +11,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from utank_hil.configuration.known_keys import instead_of
+from utank_hil.configuration.error_words import words_for
+from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
-from utank_hil.parameters import ParameterError
+from utank_hil.parameters import ParameterError, Problem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -22,6 +23,10 @@ class Section(BaseModel):
     """One mapping of a configuration file: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the section, by keys within it; it can be used all the same."""
+        return []
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +80,18 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
     content = reader.read(Path(path))
     if () in reader.unread:
         raise ConfigError(reader.problems)
+    reader.refuse_strangers(content, model)
     problems = list(reader.problems)
+    if () in reader.unread:
+        raise ConfigError(problems)
     try:
         loaded = model.model_validate(content)
     except ValidationError as error:
         for item in error.errors():
             problems += reader.located(item, content, model)
     except (ArithmeticError, MemoryError, RecursionError) as error:
-        reason = f"holds a number beyond all scale, or too many of them: {error}"
-        problems.append(ConfigProblem(Path(path), "", reason))
+        why = f"holds a number beyond all scale, or too many of them: {error}"
+        problems.append(ConfigProblem(Path(path), "", why))
     if problems:
         raise ConfigError(problems)
     return loaded
@@ -104,7 +112,7 @@ def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigErr
     reader = _Reader()
     reader.read(Path(path))
     return ConfigError(
-        [reader.problem(_split(key) + _split(name), reason) for name, reason in error.problems]
+        [reader.problem(_split(key) + _split(name), why) for name, why in error.problems]
     )
 
 
@@ -203,22 +211,48 @@ class _Reader:
         self._origins[key] = file
         return self._resolve(content, key, file, (*stack, resolved))
 
+    def refuse_strangers(self, content: Any, model: type[BaseModel]) -> None:
+        """Name the files that were written for something else than they are named for."""
+        for key, file in sorted(self._origins.items(), key=lambda item: len(item[0])):
+            part = content
+            for name in key:
+                part = part[name]
+            known = sorted(known_keys(model, key) - {"name", "kind"})
+            own = [name for name in part if name not in ("name", "kind")]
+            strange = [name for name in own if name not in known and not nearest(name, known)]
+            above = any(key[: len(upper)] == upper for upper in self.unread)
+            if above or not known or len(strange) <= len(own) - len(strange):
+                continue
+            why = f"has the keys {', '.join(own)}; a file for this has {', '.join(known)}"
+            if key:
+                self.problems.append(self.problem_at_name(key, f"names {file}, which {why}"))
+            else:
+                self.problems.append(ConfigProblem(file, "", why))
+            self.unread.add(key)
+
     def located(self, error: Any, content: Any, model: type[BaseModel]) -> list[ConfigProblem]:
         """An error of validation as problems at the place where the value was written."""
         at = _written(error, content)
+        if error["type"] == "union_tag_invalid":
+            at = (*at, "kind")
         if any(at[: len(key)] == key for key in self.unread):
             return []
         cause = error.get("ctx", {}).get("error")
         if isinstance(cause, ParameterError):
             found = [(at + _split(name), reason) for name, reason in cause.problems]
         else:
-            found = [(at, _reason(error, model))]
+            found = [(at, words_for(error, model))]
         return [self.problem(key, reason) for key, reason in found]
 
     def problem(self, key: Key, reason: str) -> ConfigProblem:
         """A problem at the place where the value of a key is written."""
         file, within = self._within(key)
         return ConfigProblem(file, _dotted(within), reason)
+
+    def problem_at_name(self, key: Key, why: str) -> ConfigProblem:
+        """A problem of a whole file at the place where it is named."""
+        file, within = self._within(key[:-1])
+        return ConfigProblem(file, _dotted((*within, key[-1])), why)
 
     def _give_up(self, key: Key, problem: ConfigProblem) -> dict[str, Any]:
         self.problems.append(problem)
@@ -279,14 +313,3 @@ def _written(error: Any, content: Any) -> Key:
             content = content[part]
         key = (*key, part)
     return key
-
-
-def _reason(error: Any, model: type[BaseModel]) -> str:
-    reason = str(error["msg"]).removeprefix("Value error, ")
-    if error["type"] == "missing":
-        return "is required but missing"
-    if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        return "is not a known key" + instead_of(model, error["loc"])
-    if isinstance(error["input"], dict | list | tuple | BaseModel):
-        return reason
-    return f"{reason} (got {error['input']!r})"

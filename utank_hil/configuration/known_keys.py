@@ -1,6 +1,6 @@
 """Which keys a place in a configuration file may have, for the misspelt ones."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from types import NoneType, UnionType
@@ -20,12 +20,46 @@ def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
         The key as a validation error gives it, with the kinds of sections chosen by kind.
     """
     *parents, written = location
+    near = nearest(str(written), sorted(known_keys(model, parents)))
+    return f"; did you mean {near}?" if near else ""
+
+
+def nearest(written: str, known: Sequence[str]) -> str | None:
+    """The known word that a misspelt one most likely stands for; None if none resembles it."""
+    found = get_close_matches(written, known, n=1, cutoff=0.8)
+    return found[0] if found else None
+
+
+def known_keys(model: type[BaseModel], location: Iterable[str | int]) -> set[str]:
+    """Keys that may stand at a place, in any kind of section that may stand there."""
+    return {name for place in _places(model, location) for name in _members(place)}
+
+
+def kinds_at(model: type[BaseModel], location: Iterable[str | int]) -> list[str]:
+    """Kinds of sections that may stand at a place."""
+    return [
+        kind for place in _places(model, location) for kind in get_args(_members(place).get("kind"))
+    ]
+
+
+def _places(model: type[BaseModel], location: Iterable[str | int]) -> list[Any]:
+    """What may stand at a place: sections, each kind of them alone."""
     places: list[Any] = [model]
-    for part in parents:
+    for part in location:
         places = [inner for place in places for inner in _inside(place, part)]
-    known = {name for place in places for name in _members(place)}
-    near = get_close_matches(str(written), known, n=1)
-    return f"; did you mean {near[0]}?" if near else ""
+    return [kind for place in places for kind in _alone(place)]
+
+
+def _alone(place: Any) -> Iterator[Any]:
+    """The members of a union, without the marks on them."""
+    origin, arguments = get_origin(place), get_args(place)
+    if origin is Annotated:
+        yield from _alone(arguments[0])
+    elif origin in (Union, UnionType):
+        for kind in arguments:
+            yield from _alone(kind)
+    elif place is not NoneType:
+        yield place
 
 
 def _members(place: Any) -> dict[str, Any]:

@@ -3,16 +3,26 @@
 A scenario draws its waves from one; a law that foresees the waves is made for one.
 """
 
+import math
 from dataclasses import fields
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_validator
+import numpy as np
+from pydantic import (
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.parameters import ParameterError, Positive
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.sea import (
     MeasuredSpectra,
     Spectrum,
@@ -22,26 +32,62 @@ from utank_hil.sea import (
     pierson_moskowitz,
 )
 
+WaveHeight = Annotated[float, Range(above=0, most=30)]
+"""Significant height in m; the greatest ever measured is 19 m."""
+WavePeriod = Annotated[float, Range(above=0, most=40)]
+_STEEPEST: Final = 0.1
 
-class JonswapSpectrum(Section):
+
+class _GivenSea(Section):
+    """A sea of given height and period."""
+
+    hs_m: WaveHeight
+    tp_s: WavePeriod
+
+    @model_validator(mode="after")
+    def _not_broken(self) -> Self:
+        steepness = _steepness(self.hs_m, self.tp_s)
+        if steepness > _STEEPEST:
+            reason = (
+                f"of {self.hs_m:g} m at a peak period of {self.tp_s:g} s is a steepness of "
+                f"1/{1 / steepness:.2g}: such waves break; lower it, or raise tp_s"
+            )
+            refuse("sea", [("hs_m", reason)])
+        return self
+
+    def warnings(self) -> list[Problem]:
+        """Steeper than storms are: DNV-RP-C205, limiting average steepness."""
+        limit = float(np.interp(self.tp_s, (8, 15), (1 / 15, 1 / 25)))
+        steepness = _steepness(self.hs_m, self.tp_s)
+        if steepness <= limit:
+            return super().warnings()
+        reason = (
+            f"of {self.hs_m:g} m at a peak period of {self.tp_s:g} s is a steepness of "
+            f"1/{1 / steepness:.3g}; seas of this period hardly pass 1/{1 / limit:.3g}"
+        )
+        return [*super().warnings(), ("hs_m", reason)]
+
+
+def _steepness(hs_m: float, tp_s: float) -> float:
+    """Significant height per length of a wave of the peak period."""
+    return 2 * math.pi * hs_m / (GRAVITY_M_S2 * tp_s**2)
+
+
+class JonswapSpectrum(_GivenSea):
     """A growing sea."""
 
     kind: Literal["jonswap"]
-    hs_m: Positive
-    tp_s: Positive
-    gamma: Annotated[float, Field(ge=1, le=7)] = 3.3
+    gamma: Annotated[float, Range(least=1, most=7)] = 3.3
 
     def spectrum(self) -> Spectrum:
         """JONSWAP spectrum."""
         return jonswap(self.hs_m, self.tp_s, self.gamma)
 
 
-class IttcSpectrum(Section):
+class IttcSpectrum(_GivenSea):
     """A sea of given height and period, Bretschneider's two-parameter spectrum."""
 
     kind: Literal["ittc"]
-    hs_m: Positive
-    tp_s: Positive
 
     def spectrum(self) -> Spectrum:
         """ITTC spectrum."""
@@ -52,7 +98,7 @@ class PiersonMoskowitzSpectrum(Section):
     """A fully developed sea: the height settles the period."""
 
     kind: Literal["pierson_moskowitz"]
-    hs_m: Positive
+    hs_m: WaveHeight
 
     def spectrum(self) -> Spectrum:
         """Pierson-Moskowitz spectrum."""

@@ -5,11 +5,10 @@ import json
 from dataclasses import asdict
 from typing import Final
 
-import numpy as np
 from pydantic import model_validator
 
 from utank_hil.configuration.files import Section
-from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -52,24 +51,10 @@ class Vessel(Section):
         }
 
     @model_validator(mode="after")
-    def _tank_suits_the_ship(self) -> "Vessel":
-        refuse("", tank_problems(self.ship, self.tank))
+    def _plausible(self) -> "Vessel":
+        refuse("", vessel_problems(self.ship, self.tank, self.pump))
         return self
 
-
-def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
-    """Why a ship can't carry a tank: inertia and stability must stay positive with its water."""
-    try:
-        mass, _, stiffness = coupled_matrices(ship, tank)
-    except OverflowError:
-        return [("tank", "has a length or area beyond all scale")]
-    water = mass[1, 1] * (tank.width_m / 2) ** 2  # about the ship's axis, as in mass_ratio
-    if not (0 < water < mass[0, 0] and np.linalg.det(mass) > 0):
-        return [("tank", "has more roll inertia in its water than the ship: make it smaller")]
-    if not (stiffness[0, 0] > 0 and np.linalg.det(stiffness) > 0):
-        reason = (
-            "takes all of the ship's stability by its free surface: lower reservoir_area_m2 or "
-            "width_m"
-        )
-        return [("tank", reason)]
-    return []
+    def warnings(self) -> list[Problem]:
+        """What is unusual in the vessel."""
+        return vessel_warnings(self.ship, self.tank, self.pump)

@@ -1,5 +1,6 @@
 """YAML as configuration files are written in it: what plain YAML passes over is a problem here."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,6 +12,9 @@ Finding = tuple[Key, str]
 
 _STRING = "tag:yaml.org,2002:str"
 _MERGE = "tag:yaml.org,2002:merge"
+_INT = "tag:yaml.org,2002:int"
+_FLOAT = "tag:yaml.org,2002:float"
+_NUMBERS = (_INT, _FLOAT)
 
 
 class YamlError(ValueError):
@@ -18,7 +22,15 @@ class YamlError(ValueError):
 
 
 class _Loader(yaml.SafeLoader):
-    """Tells the place of a value that looks like a date or number but is none."""
+    """Tells the place of a value that looks like a date or number but is none.
+
+    Numbers are decimal, as in YAML 1.2: ``1e7`` is one, ``010`` is ten, ``1:30`` is text.
+    """
+
+    yaml_implicit_resolvers = {  # noqa: RUF012, PyYAML's own way
+        first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         try:
@@ -27,6 +39,18 @@ class _Loader(yaml.SafeLoader):
             raise yaml.constructor.ConstructorError(
                 None, None, f"{error}; put text in quotes", node.start_mark
             ) from error
+
+
+_Loader.add_implicit_resolver(_INT, re.compile(r"[-+]?[0-9]+$"), list("-+0123456789"))
+_Loader.add_implicit_resolver(
+    _FLOAT,
+    re.compile(
+        r"[-+]?(?:\.[0-9]+|[0-9]+\.?[0-9]*)(?:[eE][-+]?[0-9]+)?$"
+        r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
+    ),
+    list("-+.0123456789"),
+)
+_Loader.add_constructor(_INT, lambda _, node: int(node.value))
 
 
 def parse_yaml(text: str) -> tuple[Any, list[Finding]]:

@@ -60,8 +60,8 @@ class RollShip:
     quadratic_damping_nms2_rad2: Annotated[float, Range(least=0, most=_MOST)] = 0.0
     lift_damping_ns2_rad: Annotated[float, Range(least=0, most=_MOST)] = 0.0
     restoring_odd_nm: tuple[Finite, ...] = ()
-    displacement_n: float = 0.0
-    gz_step_rad: float = 0.0
+    displacement_n: Finite = 0.0
+    gz_step_rad: Finite = 0.0
     gz_m: tuple[Finite, ...] = ()
     offset_moment_nm: Finite = 0.0
     wind_moment_nm: Finite = 0.0

@@ -95,7 +95,9 @@ class ConstrainedDesign:
     measurement_std: tuple[Positive, ...] = (2e-4, 5e-4, 3.5e-3)
     pressure_noise_pa_rt_s: NotNegative = 10e3
     slope_noise_rad_rt_s: NotNegative = 2.5e-3
-    knots: tuple[int, ...] = (0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56)
+    knots: tuple[Annotated[int, Range()], ...] = (
+        *(0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56),
+    )
     horizon: Annotated[int, Range(least=1, most=MOST_HORIZON)] = 60
     pressure_weight_rad2: Positive = 2.6e-4
     level_weight_rad2_m2: NotNegative = 3e-5

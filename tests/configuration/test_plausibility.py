@@ -1,0 +1,220 @@
+"""Slips of unit and digit: what can't be is refused at its key, what is unusual is warned of."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from firmware_sim.scenario import Scenario
+from utank_hil.configuration import ConfigError, Vessel, load_config
+from utank_hil.configuration.yaml_text import parse_yaml
+
+CONFIGS = Path("configs").resolve()
+SHIPS = {path.stem: parse_yaml(path.read_text())[0] for path in CONFIGS.glob("ships/*.yaml")}
+STORM = {
+    **parse_yaml((CONFIGS / "scenarios" / "storm.yaml").read_text())[0],
+    "vessel": str(CONFIGS / "ships" / "thesis_first.yaml"),
+    "controllers": {"pd": str(CONFIGS / "controllers" / "pd.yaml")},
+}
+FIRST = "thesis_first"
+
+
+def told(folder: Path, content: Any, model: type[Any]) -> tuple[dict[str, str], dict[str, str]]:
+    """Refusals and warnings of a file, by key."""
+    file = folder / "changed.yaml"
+    file.write_text(yaml.safe_dump(content))
+    try:
+        return {}, dict(load_config(file, model).warnings())
+    except ConfigError as error:
+        return {problem.key: problem.reason for problem in error.problems}, {}
+
+
+def vessel(ship: str, **changes: Any) -> Any:
+    """A shipped ship with keys (``__`` for the dot) changed; a function changes what is there."""
+    content = copy.deepcopy(SHIPS[ship])
+    for key, value in changes.items():
+        section, name = key.split("__")
+        content[section][name] = value(content[section][name]) if callable(value) else value
+    return content
+
+
+def thousandth(value: float) -> float:
+    return value / 1000
+
+
+def thousandfold(value: float) -> float:
+    return value * 1000
+
+
+@pytest.mark.parametrize(
+    ("ship", "changes", "key", "words"),
+    [
+        (FIRST, {"tank__width_m": 17100}, "tank.width_m", "17100 m, wider than any ship"),
+        (FIRST, {"tank__height_m": 4880}, "tank.height_m", "4880 m in a tank 17.1 m wide"),
+        (FIRST, {"tank__density_kg_m3": 1.0}, "tank.density_kg_m3", "no liquid's density"),
+        (FIRST, {"ship__inertia_kg_m2": thousandth}, "ship.inertia_kg_m2",
+         "roll period of 0.4 s, short for a ship that holds a tank 17.1 m wide: it is in kg m2 "
+         "(in t m2 it would be 12.6 s)"),
+        (FIRST, {"ship__stiffness_nm_rad": thousandth}, "ship.stiffness_nm_rad",
+         "roll period of 397 s, long for a ship that holds a tank 17.1 m wide: it is in N m (in "
+         "kN m it would be 12.6 s)"),
+        (FIRST, {"ship__inertia_kg_m2": thousandth, "ship__stiffness_nm_rad": thousandth,
+                 "ship__damping_nms_rad": thousandth}, "tank",
+         "unless inertia_kg_m2 and stiffness_nm_rad are given in thousands (t m2, kN m)"),
+        (FIRST, {"ship__damping_nms_rad": thousandfold}, "ship.damping_nms_rad",
+         "is a damping ratio of 25; hulls have 0.005 to 0.15"),
+        ("patti_b", {"ship__quadratic_damping_nms2_rad2": thousandfold},
+         "ship.quadratic_damping_nms2_rad2", "at 10 degrees of roll"),
+        (FIRST, {"ship__displacement_n": 4.1e4}, "ship.displacement_n",
+         "a weight in newtons, not a mass"),
+        (FIRST, {"tank__damping_ratio": 10}, "tank.damping_ratio", "10 % is 0.10"),
+        (FIRST, {"tank__lz_m": -20}, "tank.lz_m",
+         "puts the duct 20 m above the ship's centre of gravity, and the tank is 17.1 m wide"),
+        (FIRST, {"tank__lx_m": 1000}, "tank.lx_m", "positive forward"),
+        (FIRST, {"tank__duct_area_m2": thousandth}, "tank.duct_area_m2",
+         "gives the water a period of 308 s, and the ship rolls in 12.6 s: about 4.26 m2 would "
+         "suit"),
+        (FIRST, {"tank__duct_area_m2": 62200}, "tank.duct_area_m2", "of one duct and of one"),
+        (FIRST, {"tank__reservoir_area_m2": 170}, "tank", "more roll inertia in its water"),
+        (FIRST, {"pump__max_pressure_pa": 25}, "pump.max_pressure_pa",
+         "is 0.0025 m of water, and a reservoir is full or empty at 4.88 m: it is in Pa, 25 kPa is "
+         "25e3"),
+        (FIRST, {"pump__max_pressure_pa": 50e6}, "pump.max_pressure_pa", "it is in Pa"),
+        ("naval_vessel", {"pump__max_power_w": 225}, "pump.max_power_w",
+         "is 0.225 kW, and to hold max_pressure_pa, 20 kPa, takes 27.1 kW even in still water: "
+         "raise it, or lower max_pressure_pa; it is in W, 225 kW is 225e3"),
+        (FIRST, {"pump__max_torque_nm": 200}, "pump.max_torque_nm", "it is in N m"),
+        (FIRST, {"pump__max_pressure_rate_pa_s": 500}, "pump.max_pressure_rate_pa_s",
+         "takes 100 s to the greatest pressure, and the ship rolls in 12.6 s"),
+        (FIRST, {"pump__lag_s": 100}, "pump.lag_s", "it is in seconds"),
+        (FIRST, {"pump__inertia_kg_m2": thousandfold}, "pump.inertia_kg_m2", "it is in kg m2"),
+        (FIRST, {"pump__radius_m": 985, "pump__pitch_m": 400}, "pump.radius_m", "is 985 m in a"),
+        (FIRST, {"tank__duct_area_m2": 1.13, "pump__duct_area_m2": 11, "pump__radius_m": 1.3,
+                 "pump__pitch_m": 0.53}, "pump.duct_area_m2",
+         "is 11 m2, and the tank's duct has 1.13 m2: the propeller fills the duct"),
+    ],
+)  # fmt: skip
+def test_what_can_not_be_is_refused_at_its_key_with_the_remedy(
+    tmp_path: Path, ship: str, changes: dict[str, Any], key: str, words: str
+) -> None:
+    refused, _ = told(tmp_path, vessel(ship, **changes), Vessel)
+    assert set(refused) == {key}
+    assert words in refused[key]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"tank__damping_ratio": 0.8}, "tank.damping_ratio", "creep instead of swing"),
+        ({"tank__damping_ratio": 0.0}, "tank.damping_ratio", "swing for ever"),
+        ({"tank__lz_m": 14.0}, "tank.lz_m", "14 m below"),
+        ({"tank__duct_area_m2": 0.6, "pump__duct_area_m2": 0.6, "pump__radius_m": 0.3,
+          "pump__pitch_m": 0.12}, "tank.duct_area_m2", "about 4.26 m2 would suit"),
+        ({"pump__max_power_w": 225e3}, "pump.max_power_w", "is 225 kW, and to hold"),
+        ({"pump__max_power_w": 225e6}, "pump.max_power_w", "times what the greatest pressure"),
+        ({"pump__max_pressure_pa": 1e3}, "pump.max_pressure_pa", "0.1 m of water"),
+        ({"pump__duct_area_m2": 15.0}, "pump.duct_area_m2", "make both the same"),
+    ],
+)  # fmt: skip
+def test_what_is_unusual_is_warned_of(
+    tmp_path: Path, changes: dict[str, Any], key: str, words: str
+) -> None:
+    refused, warned = told(tmp_path, vessel(FIRST, **changes), Vessel)
+    assert refused == {}
+    assert words in warned[key]
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+def test_shipped_vessels_are_plausible(tmp_path: Path, ship: str) -> None:
+    """But for the fishing boat's tank, which does take half of her stability."""
+    refused, warned = told(tmp_path, vessel(ship), Vessel)
+    assert refused == {}
+    expected = {"tank.reservoir_area_m2"} if ship == "patti_b" else set()
+    assert set(warned) == expected
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [
+        (section, key)
+        for section in ("ship", "tank", "pump")
+        for key in SHIPS[FIRST][section]
+        if key not in ("damping_nms_rad", "damping_ratio", "lx_m", "lz_m", "lift", "friction")
+    ],
+)
+@pytest.mark.parametrize("ship", SHIPS)
+def test_slip_by_a_thousand_never_passes_without_a_word(
+    tmp_path: Path, ship: str, section: str, key: str
+) -> None:
+    """Too small a rotor and too fast a rise do no harm; nor does a motor that is too strong."""
+    _, usual = told(tmp_path, vessel(ship), Vessel)
+    changes = [thousandfold, thousandth]
+    if key in ("inertia_kg_m2", "max_pressure_rate_pa_s") and section == "pump":
+        changes.remove(thousandth if key == "inertia_kg_m2" else thousandfold)
+    if key == "lag_s":
+        changes.remove(thousandth)
+    for change in changes:
+        refused, warned = told(tmp_path, vessel(ship, **{f"{section}__{key}": change}), Vessel)
+        assert set(refused) | (set(warned) - set(usual)), (ship, section, key, change)
+
+
+def jonswap(hs_m: float, tp_s: float, **more: Any) -> dict[str, Any]:
+    return {"kind": "jonswap", "hs_m": hs_m, "tp_s": tp_s, **more}
+
+
+def regular(**more: Any) -> dict[str, Any]:
+    return {"kind": "regular", "amplitude_m": 1.0, "period_s": 10.0, **more}
+
+
+@pytest.mark.parametrize(
+    ("sea", "key", "words"),
+    [
+        (jonswap(300, 60), "sea.hs_m", "must be above 0 and at most 30"),
+        (jonswap(300, 60), "sea.tp_s", "must be above 0 and at most 40"),
+        (jonswap(12, 8), "sea.hs_m", "a steepness of 1/8.3: such waves break"),
+        ({"kind": "pierson_moskowitz", "hs_m": 300}, "sea.hs_m", "at most 30"),
+        (regular(amplitude_m=15), "sea.amplitude_m", "it breaks above 11 m"),
+        (regular(heading_deg=420), "sea.heading_deg", "must be -360 to 360"),
+        (regular(speed_m_s=120), "sea.speed_m_s", "must be 0 to 40"),
+        (regular(heading_deg=0), "sea.heading_deg", "of 0 gives no roll moment"),
+        (jonswap(3, 10, heading_deg=180), "sea.heading_deg", "of 180 gives no roll moment"),
+        (jonswap(3, 10, effective_slope={"coefficient": 0}), "sea.effective_slope.coefficient",
+         "takes all of the waves' moment"),
+    ],
+)  # fmt: skip
+def test_sea_that_can_not_be_or_does_nothing_is_refused(
+    tmp_path: Path, sea: dict[str, Any], key: str, words: str
+) -> None:
+    refused, _ = told(tmp_path, {**STORM, "sea": sea}, Scenario)
+    assert words in refused[key]
+
+
+@pytest.mark.parametrize(
+    ("sea", "key", "words"),
+    [
+        (jonswap(8, 9), "sea.hs_m", "seas of this period hardly pass 1/15.9"),
+        (jonswap(3, 10, speed_m_s=22), "sea.speed_m_s", "is 43 knots"),
+    ],
+)
+def test_unusual_sea_is_warned_of(
+    tmp_path: Path, sea: dict[str, Any], key: str, words: str
+) -> None:
+    refused, warned = told(tmp_path, {**STORM, "sea": sea}, Scenario)
+    assert refused == {}
+    assert words in warned[key]
+
+
+@pytest.mark.parametrize(
+    "sea",
+    [
+        regular(amplitude_m=0.0),
+        jonswap(3, 10, heading_deg=0, spreading=10),
+        jonswap(3, 10, heading_deg=-90),
+        jonswap(3, 10, heading_deg=300, speed_m_s=10),
+        STORM["sea"] | {"file": str(CONFIGS / "seas/ndbc_41010_2019-02_spectral_density.txt")},
+    ],
+)
+def test_seas_that_can_be_pass(tmp_path: Path, sea: dict[str, Any]) -> None:
+    assert told(tmp_path, {**STORM, "sea": sea}, Scenario) == ({}, {})

@@ -1,0 +1,84 @@
+"""Is a ship with its tank and pump one that can be: what a wrong unit or a slip of a digit gives.
+
+Each figure is compared with what ships, tanks and pumps have. Far outside, by more than a hundred
+or so, the file is refused at the key that is most likely wrong; outside, it is a warning. The
+figures are ratios to the vessel's own size and period, so that a model in a basin passes as a
+container ship does. The limits are wide: they find slips, they do not judge a design.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from utank_hil.configuration.plausibility.drive import (
+    holding,
+    of_motor,
+    of_pump,
+    of_quickness,
+)
+from utank_hil.configuration.plausibility.figure import Figure
+from utank_hil.configuration.plausibility.hull import (
+    free_surface_nm_rad,
+    of_ship,
+    of_sizes,
+    of_tank,
+)
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import Problem
+
+__all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
+
+
+def vessel_problems(ship: RollShip, tank: Tank, pump: Pump) -> list[Problem]:
+    """Why a vessel can't be; only the first cause, as the figures that follow from it mislead."""
+    for stage in _stages(ship, tank, pump):
+        with np.errstate(all="ignore"):  # beyond all scale is refused by its figure
+            found = [(each.key, each.words) for each in stage() if each.refused]
+        if found:
+            return found
+    return tank_problems(ship, tank)
+
+
+def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump) -> list[Problem]:
+    """What is unusual in a vessel that has no problems."""
+    return [
+        (each.key, each.words)
+        for stage in _stages(ship, tank, pump)
+        for each in stage()
+        if each.warned
+    ]
+
+
+def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
+    """Why a ship can't carry a tank: inertia and stability must stay positive with its water."""
+    mass, _, stiffness = coupled_matrices(ship, tank)
+    water = mass[1, 1] * (tank.width_m / 2) ** 2  # about the ship's axis, as in mass_ratio
+    if not (0 < water < mass[0, 0] and np.linalg.det(mass) > 0):
+        reason = (
+            f"has more roll inertia in its water than the ship, {water:.3g} of "
+            f"{ship.inertia_kg_m2:.3g} kg m2: make it smaller, unless inertia_kg_m2 and "
+            "stiffness_nm_rad are given in thousands (t m2, kN m)"
+        )
+        return [("tank", reason)]
+    if not (stiffness[0, 0] > 0 and np.linalg.det(stiffness) > 0):
+        reason = (
+            f"takes all of the ship's stability by its free surface, "
+            f"{free_surface_nm_rad(ship, tank):.3g} of {ship.stiffness_nm_rad:.3g} N m/rad: lower "
+            "reservoir_area_m2 or width_m"
+        )
+        return [("tank", reason)]
+    return []
+
+
+def _stages(ship: RollShip, tank: Tank, pump: Pump) -> Iterator[Callable[[], Iterator[Figure]]]:
+    """The parts of a vessel in an order in which each is judged by those before it."""
+    yield partial(of_sizes, tank)
+    yield partial(of_ship, ship, tank)
+    yield partial(of_tank, ship, tank)
+    yield partial(of_pump, tank, pump)
+    yield partial(of_motor, pump)
+    yield partial(of_quickness, ship, pump)
