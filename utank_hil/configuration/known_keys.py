@@ -24,12 +24,15 @@ def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
     for part in parents:
         places = [inner for place in places for inner in _inside(place, part)]
     known = {name for place in places for name in _members(place)}
-    near = get_close_matches(str(written), known, n=1)
+    near = get_close_matches(str(written), known)
+    near.sort(key=lambda name: not name.startswith(str(written)))  # a unit left out
     return f"; did you mean {near[0]}?" if near else ""
 
 
 def _members(place: Any) -> dict[str, Any]:
     """Annotations of a section's keys, without the marks on them."""
+    if get_origin(place) in (Union, UnionType):
+        return {name: hint for kind in get_args(place) for name, hint in _members(kind).items()}
     if isinstance(place, type) and issubclass(place, BaseModel):
         return {name: field.annotation for name, field in place.model_fields.items()}
     if isinstance(place, type) and is_dataclass(place):
