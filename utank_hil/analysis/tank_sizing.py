@@ -139,6 +139,36 @@ class PumpDemand:
 
 
 @dataclass(frozen=True, slots=True)
+class TankCost:
+    """What a tank takes from the ship, and what it can hold.
+
+    Attributes
+    ----------
+    water_t : float
+    share_of_displacement : float or None
+        The water's; None for a ship without a displacement.
+    stability_taken : float
+        By the free surface, as a share.
+    gm_loss_m : float or None
+    water_period_s, damping_ratio : float
+        Of the water in the ship held still.
+    usable_level_m : float
+        As `usable_level_m`.
+    slope_capacity_rad : float
+        Effective wave slope that the usable level holds.
+    """
+
+    water_t: float
+    share_of_displacement: float | None
+    stability_taken: float
+    gm_loss_m: float | None
+    water_period_s: float
+    damping_ratio: float
+    usable_level_m: float
+    slope_capacity_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class _Demand:
     stability_share: Annotated[float, Range(least=LEAST_STABILITY_SHARE, most=MOST_STABILITY_SHARE)]
 
@@ -281,6 +311,23 @@ def _pressure_pa_per_m(tank: Tank, frequency_rad_s: float) -> float:
     inertia = tank.density_kg_m3 * tank.effective_length_m
     return abs(
         complex(stiffness - inertia * frequency_rad_s**2, frequency_rad_s * tank.loss_pa_per_m_s)
+    )
+
+
+def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
+    """What a tank takes from a ship."""
+    mass_kg, taken = water_moments(tank, 0.0).mass_kg, stability_taken(ship, tank)
+    level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
+    weighed = weight_n > 0
+    return TankCost(
+        water_t=mass_kg / 1e3,
+        share_of_displacement=mass_kg * GRAVITY_M_S2 / weight_n if weighed else None,
+        stability_taken=taken,
+        gm_loss_m=taken * ship.stiffness_nm_rad / weight_n if weighed else None,
+        water_period_s=2 * math.pi / tank.natural_frequency_rad_s,
+        damping_ratio=tank.damping_ratio,
+        usable_level_m=level_m,
+        slope_capacity_rad=wave_slope_capacity_rad(ship, tank, level_m),
     )
 
 

@@ -14,6 +14,7 @@ weights on the motion, until it meets them all.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -31,7 +32,7 @@ _MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
 class NoLawError(ValueError):
-    """No law of the kind is robust enough, however little it does."""
+    """No law of the kind is robust enough, or within the limits, however little it does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +84,27 @@ def scaled_law(plant: DesignPlant, slope_rad: float, peak_rad_s: float) -> LQGDe
     )
 
 
-def first_law(plant: DesignPlant, slope_rad: float, peak_rad_s: float) -> FirstLaw:
+def first_law(
+    plant: DesignPlant,
+    slope_rad: float,
+    peak_rad_s: float,
+    suits: Callable[[LQGDesign], bool] = lambda _: True,
+) -> FirstLaw:
     """The law of `scaled_law` with the greatest weights at which it meets the required margins.
 
     Its numbers have three digits, as they stand in a file.
 
+    Parameters
+    ----------
+    plant, slope_rad, peak_rad_s
+        As `scaled_law` takes them.
+    suits : callable, optional
+        What a law with all margins must be besides; smaller weights suit more.
+
     Raises
     ------
     NoLawError
-        If it meets them with no weights.
+        If no weights do.
     """
     design = scaled_law(plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()
@@ -101,11 +114,10 @@ def first_law(plant: DesignPlant, slope_rad: float, peak_rad_s: float) -> FirstL
         asked = replace(design, state_weight=weight)
         judged = robustness(asked.law(plant), plant, _MEASURED, with_delay_margin=False)
         failures = judged.failures()
-        if not failures:
+        if not failures and suits(asked):
             return FirstLaw(asked, factor, judged)
-    raise NoLawError(
-        f"no LQG law meets the required margins on this ship; the gentlest one is {failures[0]}"
-    )
+    gentlest = failures[0] if failures else "beyond the limits of pump and tank"
+    raise NoLawError(f"no LQG law will do on this ship; the gentlest one is {gentlest}")
 
 
 def _short(value: float) -> float:
