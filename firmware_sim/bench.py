@@ -26,6 +26,7 @@ from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
+from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, PassiveDesign
 from utank_hil.runtime import stop_on_signals
 
@@ -186,8 +187,12 @@ def jobs_of(
 ) -> list[Job]:
     """The passive tank's run, then one for each controller; `laws` as in `run_bench`."""
     laws = laws or {name: build_law(each) for name, each in scenario.controllers.items()}
-    first = next(iter(scenario.controllers.values()))
-    passive = first.model_copy(update={"law": PassiveDesign(), "retuning": None})
+    first = next(iter(scenario.controllers.values()), None)
+    if first is None:
+        content = {"name": PASSIVE, "vessel": scenario.vessel, "law": {"kind": "passive"}}
+        passive = ControllerConfig.model_validate(content)
+    else:
+        passive = first.model_copy(update={"law": PassiveDesign(), "retuning": None})
     return [
         Job(PASSIVE, scenario, passive, build_law(passive), PASSIVE_SCRIPT, seed, duration_s),
         *(

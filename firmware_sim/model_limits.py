@@ -95,7 +95,10 @@ def _sea(result: BenchResult) -> Iterator[str]:
 
 
 def _pump(result: BenchResult) -> Iterator[str]:
-    most = result.scenario.vessel.pump.max_speed_rad_s
+    pump = result.scenario.vessel.pump
+    if pump is None:
+        return
+    most = pump.max_speed_rad_s
     for run in result.runs:
         if run.pump_speed_rad_s > OVERSPEED * most:
             yield (

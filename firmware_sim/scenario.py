@@ -67,9 +67,10 @@ class Scenario(Section):
     drive: Annotated[DriveLimits, Field(default_factory=dict, validate_default=True)]
     """Limits not given follow from the vessel's pump."""
     controllers: Annotated[
-        dict[str, ControllerConfig], Field(min_length=1, max_length=MOST_CONTROLLERS)
+        dict[str, ControllerConfig], Field(default_factory=dict, max_length=MOST_CONTROLLERS)
     ]
-    operator: tuple[TimedAction, ...]
+    """One or more; none are needed where the vessel has no pump."""
+    operator: tuple[TimedAction, ...] = ()
     """What the operator does in the runs with a controller; in the passive run nobody arms."""
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative
@@ -105,8 +106,11 @@ class Scenario(Section):
         vessel = info.data.get("vessel")
         if vessel is None or not isinstance(drive, dict):
             return drive
-        pressure_pa = vessel.pump.max_pressure_pa
-        rate_pa_s = min(_DRIVE_RATE_PER_PRESSURE * pressure_pa, vessel.pump.max_pressure_rate_pa_s)
+        pump = vessel.pump
+        if pump is None:
+            return drive
+        pressure_pa = pump.max_pressure_pa
+        rate_pa_s = min(_DRIVE_RATE_PER_PRESSURE * pressure_pa, pump.max_pressure_rate_pa_s)
         return {"pressure_pa": pressure_pa, "pressure_rate_pa_s": rate_pa_s, **drive}
 
     @model_validator(mode="after")
@@ -115,6 +119,11 @@ class Scenario(Section):
         if self.settle_s >= self.duration_s:
             reason = "must be less than duration_s, else nothing is left to judge"
             problems.append(("settle_s", reason))
+        if self.vessel.pump is not None:
+            if not self.controllers:
+                problems.append(("controllers", "must name at least 1 for the vessel's pump"))
+            if "operator" not in self.model_fields_set:
+                problems.append(("operator", "is required but missing: who arms the controllers"))
         if PASSIVE in self.controllers:
             reason = (
                 "names one 'passive', the run without a controller that is always made: rename it"

@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from pydantic import BaseModel
 from rich.console import Console
@@ -15,19 +14,17 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from firmware_sim.commands.bench import STORM
+from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.commands.common import OUT, Json, fail, load, new_app, notes, prepare_out, shown
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import ControllerConfig, Vessel
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.sea import Harmonics
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint
     from utank_hil.analysis.tank_design import TankFigures
 
 PICTURE, FIGURES = "design.png", "design.json"
-REALISATIONS = 16  # of the sea, pooled: a lightly damped ship needs a fine spectrum
 
 design = new_app("Design a law or a tank: what it could be, and what it would cost.")
 
@@ -73,7 +70,7 @@ def controller(
             result = trade(
                 law,
                 loaded.plant,
-                _wave_moment(sea, vessel.ship),
+                pooled_wave_moment(sea, vessel.ship),
                 progress=lambda done: bar.update(task, completed=done),
             )
     except CalmSeaError as error:
@@ -143,19 +140,6 @@ class _VesselOfScenario(BaseModel):
     """Whom a scenario is for; the rest of it may cost the design of its controllers."""
 
     vessel: Vessel
-
-
-def _wave_moment(scenario: Scenario, ship: RollShip) -> Harmonics:
-    """The sea's moment on the ship, as many realisations with a share of the energy each."""
-    seas = [
-        scenario.sea.roll_moment(scenario.sea.sea(seed), ship.stiffness_nm_rad)
-        for seed in range(REALISATIONS)
-    ]
-    return Harmonics(
-        np.concatenate([sea.amplitude for sea in seas]) / math.sqrt(REALISATIONS),
-        np.concatenate([sea.frequency_rad_s for sea in seas]),
-        np.concatenate([sea.phase_rad for sea in seas]),
-    )
 
 
 def _trade_table(result: "Trade", title: str) -> Table:

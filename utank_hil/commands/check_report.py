@@ -61,6 +61,7 @@ def ship_json(vessel: Vessel) -> dict[str, Any]:
         "name": vessel.name,
         "configuration_version": vessel.version,
         **ship_figures(vessel),
+        "assumptions": list(vessel.assumptions),
         "limits": vessel.default_limits,
     }
 
@@ -74,15 +75,19 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         Frequencies in rad/s of the ship without water and of the water in a ship held still; the
         two motions that they make together (`modes`, from slow to fast); ratios as in
         `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
-        reservoir is full or empty; heel that the pump's greatest pressure holds.
+        reservoir is full or empty; heel that the pump's greatest pressure holds, None without a
+        pump.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
     _, _, stiffness = coupled_matrices(ship, tank)
     free = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = ship.natural_frequency_rad_s
-    push = [0.0, tank.reservoir_area_m2 * vessel.pump.max_pressure_pa]
-    heel_rad = np.linalg.solve(stiffness, push)[STATES.index("roll_rad")]
+    pump_heel_rad = None
+    if vessel.pump is not None:
+        push = [0.0, tank.reservoir_area_m2 * vessel.pump.max_pressure_pa]
+        heel_rad = np.linalg.solve(stiffness, push)[STATES.index("roll_rad")]
+        pump_heel_rad = float(abs(heel_rad))
     free_surface_nm_rad = stiffness[0, 1] ** 2 / stiffness[1, 1]
     return {
         "roll_frequency_rad_s": frequency,
@@ -99,7 +104,7 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         "coupling_ratio": figures.coupling_ratio,
         "stability_taken": float(free_surface_nm_rad / ship.stiffness_nm_rad),
         "level_limit_m": tank.level_limit_m,
-        "pump_heel_rad": float(abs(heel_rad)),
+        "pump_heel_rad": pump_heel_rad,
     }
 
 
@@ -218,17 +223,24 @@ def print_ship(vessel: Vessel) -> None:
     rest = Table(show_header=False)
     rest.add_column()
     rest.add_column(justify="right", no_wrap=True)
+    figures_of_pump = [("pump", "none")]
+    if vessel.pump is not None:
+        figures_of_pump = [
+            ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
+            ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
+        ]
     for text, value in (
         ("water's frequency per roll frequency", f"{figures['frequency_ratio']:.3f}"),
         ("mass ratio", f"{figures['mass_ratio']:.4f}"),
         ("coupling ratio", f"{figures['coupling_ratio']:.3f}"),
         ("stability taken by the free surface", f"{figures['stability_taken']:.1%}"),
         ("level at which a reservoir is full or empty", f"{figures['level_limit_m']:.2f} m"),
-        ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
-        ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
+        *figures_of_pump,
     ):
         rest.add_row(text, value)
     print_table(console, rest)
+    for assumption in vessel.assumptions:
+        console.print(f"Assumed: {assumption}.", soft_wrap=True)
 
 
 def _motion(frequency_rad_s: float, damping_ratio: float) -> tuple[str, str, str]:

@@ -110,6 +110,8 @@ def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
     for key in ("ship", "tank", "pump"):
         part = getattr(vessel, key)
+        if part is None:
+            continue
         content[key] = {
             field.name: getattr(part, field.name)
             for field in dataclasses.fields(part)

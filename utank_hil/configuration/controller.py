@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
-from utank_hil.control import DesignPlant, PredictiveDesign, PumpLimits
+from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.record_length import record_problems
@@ -71,7 +71,8 @@ class ControllerConfig(Section):
         return [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
 
     def _limit_problems(self) -> list[Problem]:
-        pressure_pa = self.vessel.pump.max_pressure_pa
+        pump = self.vessel.pump
+        pressure_pa = math.inf if pump is None else pump.max_pressure_pa
         level_m = self.vessel.tank.level_limit_m
         return [
             (
@@ -136,6 +137,12 @@ class ControllerConfig(Section):
         return [(f"retuning.{name}", reason) for name, reason in problems]
 
     def _law_problems(self) -> list[Problem]:
+        if self.vessel.pump is None and not isinstance(self.law, PassiveDesign):
+            reason = (
+                f"is {self.law.kind}, which drives a pump, but {self.vessel.name} has none: give "
+                "the vessel a pump, or take kind: passive"
+            )
+            return [("law.kind", reason)]
         found = sample_time(self.law)
         if found is None or is_whole_ticks(found[1]):
             return []
@@ -147,4 +154,5 @@ class ControllerConfig(Section):
     def plant(self) -> DesignPlant:
         """What the law is designed for."""
         vessel = self.vessel
-        return DesignPlant(vessel.ship, vessel.tank, self.delay_s, vessel.pump.lag_s, self.limits)
+        lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
+        return DesignPlant(vessel.ship, vessel.tank, self.delay_s, lag_s, self.limits)

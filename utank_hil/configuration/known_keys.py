@@ -26,7 +26,8 @@ def instead_of(model: type[BaseModel], location: tuple[str | int, ...]) -> str:
 
 def nearest(written: str, known: Sequence[str]) -> str | None:
     """The known word that a misspelt one most likely stands for; None if none resembles it."""
-    found = get_close_matches(written, known, n=1, cutoff=0.8)
+    without_unit = [name for name in known if written and name.startswith(f"{written}_")]
+    found = without_unit or get_close_matches(written, known, n=1, cutoff=0.8)
     return found[0] if found else None
 
 
@@ -64,6 +65,8 @@ def _alone(place: Any) -> Iterator[Any]:
 
 def _members(place: Any) -> dict[str, Any]:
     """Annotations of a section's keys, without the marks on them."""
+    if get_origin(place) in (Union, UnionType):
+        return {name: hint for kind in get_args(place) for name, hint in _members(kind).items()}
     if isinstance(place, type) and issubclass(place, BaseModel):
         return {name: field.annotation for name, field in place.model_fields.items()}
     if isinstance(place, type) and is_dataclass(place):

@@ -33,7 +33,7 @@ from utank_hil.parameters import Problem
 __all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
 
 
-def vessel_problems(ship: RollShip, tank: Tank, pump: Pump) -> list[Problem]:
+def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
     """Why a vessel can't be; only the first cause, as the figures that follow from it mislead."""
     for stage in _stages(ship, tank, pump):
         with np.errstate(all="ignore"):  # beyond all scale is refused by its figure
@@ -43,7 +43,7 @@ def vessel_problems(ship: RollShip, tank: Tank, pump: Pump) -> list[Problem]:
     return tank_problems(ship, tank)
 
 
-def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump) -> list[Problem]:
+def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
     """What is unusual in a vessel that has no problems."""
     return [
         (each.key, each.words)
@@ -74,11 +74,14 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
     return []
 
 
-def _stages(ship: RollShip, tank: Tank, pump: Pump) -> Iterator[Callable[[], Iterator[Figure]]]:
+def _stages(
+    ship: RollShip, tank: Tank, pump: Pump | None
+) -> Iterator[Callable[[], Iterator[Figure]]]:
     """The parts of a vessel in an order in which each is judged by those before it."""
     yield partial(of_sizes, tank)
     yield partial(of_ship, ship, tank)
     yield partial(of_tank, ship, tank)
-    yield partial(of_pump, tank, pump)
-    yield partial(of_motor, pump)
-    yield partial(of_quickness, ship, pump)
+    if pump is not None:
+        yield partial(of_pump, tank, pump)
+        yield partial(of_motor, pump)
+        yield partial(of_quickness, ship, pump)

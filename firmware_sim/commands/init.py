@@ -1,0 +1,234 @@
+"""``utank-hil init``: a project for a ship of one's own."""
+
+import json
+import math
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
+from utank_hil.analysis.tank_sizing import tank_cost
+from utank_hil.commands.common import Json, fail, notes, prepare_out, shown
+from utank_hil.commands.tables import print_table
+from utank_hil.parameters import ParameterError
+
+if TYPE_CHECKING:
+    from firmware_sim.starter import StarterProject
+    from utank_hil.analysis.tank_sizing import SizedTank
+
+_OPTIONS = {
+    "stability_share": "gm-loss",
+    "roll_damping_ratio": "roll-damping",
+    "damping_ratio": "roll-damping",
+}
+"""Options that are not named as the parameters they set."""
+_UNITS = ("_m", "_t", "_s")
+
+
+def init(
+    length: Annotated[float, typer.Option(help="Of the ship at the waterline, m.")],
+    beam: Annotated[float, typer.Option(help="At the waterline, m.")],
+    displacement: Annotated[float, typer.Option(help="Without the tank's water, t.")],
+    gm: Annotated[float, typer.Option(help="Metacentric height without the tank's water, m.")],
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write.")] = Path(
+        "my_ship"
+    ),
+    roll_period: Annotated[
+        float | None,
+        typer.Option(
+            help="Natural roll period without the tank's water, s.",
+            show_default="weather criterion's formula, with --draught",
+        ),
+    ] = None,
+    draught: Annotated[float | None, typer.Option(help="Mean moulded draught, m.")] = None,
+    roll_damping: Annotated[float, typer.Option(help="Damping ratio of the roll.")] = 0.05,
+    tank_breadth: Annotated[
+        float | None,
+        typer.Option(help="Room across the ship, m.", show_default="0.9 of the beam"),
+    ] = None,
+    tank_height: Annotated[
+        float | None,
+        typer.Option(help="From duct to roof, m.", show_default="0.4 of the beam"),
+    ] = None,
+    tank_length: Annotated[
+        float | None,
+        typer.Option(help="Room along the ship, m.", show_default="0.08 of the length"),
+    ] = None,
+    duct_below_cg: Annotated[
+        float | None,
+        typer.Option(
+            help="Duct below the centre of gravity, m; negative above.",
+            show_default="0.1 of the beam",
+        ),
+    ] = None,
+    gm_loss: Annotated[
+        float, typer.Option(help="Share of GM that the free surface may take, 0.03 to 0.25.")
+    ] = 0.15,
+    hs: Annotated[
+        float | None,
+        typer.Option(
+            help="Significant wave height of the scenario, m.",
+            show_default="by length and wave slope",
+        ),
+    ] = None,
+    tp: Annotated[
+        float | None,
+        typer.Option(help="Peak period of its sea, s.", show_default="near the roll period"),
+    ] = None,
+    name: Annotated[str, typer.Option(help="Of the ship.")] = "My ship",
+    json_: Json = False,
+) -> None:
+    """Write a starter project for your ship: tank, pump, law, sea.
+
+    The tank is sized by stability, frequency and room, the pump by the water it must move, and the
+    law is one that meets the required margins. Exit code 1: no tank can be, and why.
+
+    [bold]Example:[/bold] utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
+    --gm 0.9 --roll-period 9.5
+    """
+    from firmware_sim.starter import FILES, make_starter
+    from firmware_sim.starter_ship import StarterShip
+    from utank_hil.analysis.loop.scaled_law import NoLawError
+    from utank_hil.analysis.loop.sea_response import CalmSeaError
+    from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
+
+    prepare_out(folder, ())
+    for path in (folder / file for file in FILES):
+        if path.exists():
+            fail(f"{path}: is there already; name another folder, or remove it")
+    given = {
+        "breadth_m": tank_breadth,
+        "height_m": tank_height,
+        "length_m": tank_length,
+        "duct_below_cg_m": duct_below_cg,
+    }
+    try:
+        ship = StarterShip(name, length, beam, displacement, gm, roll_period, draught, roll_damping)
+        usual = TankRoom.in_hull(length, beam)
+    except ParameterError as error:
+        _fail_at(error)
+    try:
+        room = replace(usual, **{key: of for key, of in given.items() if of is not None})
+    except ParameterError as error:
+        _fail_at(error, "tank-")
+    for option, value in (("hs", hs), ("tp", tp)):
+        if value is not None and not 0 < value < math.inf:
+            fail(f"--{option}: must be positive and finite, got {value}")
+    try:
+        project = make_starter(ship, room, gm_loss, hs, tp)
+    except (TankImpossibleError, NoLawError) as error:
+        if json_:
+            sys.stdout.write(json.dumps({"possible": False, "reason": str(error)}) + "\n")
+        notes.print("[red]no tank:[/red]", escape(str(error)), soft_wrap=True)
+        raise typer.Exit(1) from None
+    except CalmSeaError as error:
+        fail(f"--tp: {error}")
+    except ParameterError as error:
+        _fail_at(error)
+    files = {file: folder / file for file in FILES}
+    for file, path in files.items():
+        path.write_text(project.texts[file], encoding="utf-8")
+    if json_:
+        figures = {"possible": True, **_as_json(project)}
+        told = {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
+        sys.stdout.write(json.dumps(told) + "\n")
+        return
+    console = Console(highlight=False)
+    print_table(console, _table(project))
+    for path in files.values():
+        console.print(f"written: {shown(path)}", soft_wrap=True)
+    console.print("Next:")
+    for command, file in (("check", "controller.yaml"), ("bench", "scenario.yaml")):
+        console.print(f"  utank-hil {command} {shown(files[file])}", soft_wrap=True)
+
+
+def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
+    """Name the options that are wrong, and end with exit code 2."""
+    for name, reason in error.problems:
+        option = _OPTIONS.get(name, name)
+        for unit in _UNITS:
+            option = option.removesuffix(unit)
+        option = option.replace("_", "-")
+        if option != "duct-below-cg":
+            option = prefix + option
+        notes.print("[red]error:[/red]", escape(f"--{option}: {reason}"), soft_wrap=True)
+    raise typer.Exit(2)
+
+
+def _as_json(project: "StarterProject") -> dict[str, Any]:
+    """What was found, in SI units."""
+    vessel, sized, law, pump = project.vessel, project.sized, project.law, project.vessel.pump
+    assert pump is not None
+    return {
+        "name": vessel.name,
+        "roll_period_s": 2 * math.pi / vessel.ship.natural_frequency_rad_s,
+        "tank": {
+            **asdict(tank_cost(vessel.ship, vessel.tank)),
+            "bound_by": sized.bound_by,
+            "reservoir_length_m": sized.reservoir_length_m,
+            "reservoir_breadth_m": sized.reservoir_breadth_m,
+            "duct_height_m": sized.duct_height_m,
+        },
+        "pump": {
+            **asdict(project.demand),
+            "max_pressure_pa": pump.max_pressure_pa,
+            "max_power_w": pump.max_power_w,
+        },
+        "law": {
+            "kind": law.design.kind,
+            "weight_factor": law.weight_factor,
+            "peak_sensitivity": law.robustness.nominal.peak_sensitivity,
+            "worst_radius": law.robustness.worst_radius,
+        },
+        "sea": project.sea,
+        "linear_prediction": prediction_json(project.prediction),
+    }
+
+
+def _table(project: "StarterProject") -> Table:
+    """Tank, pump, law and expected roll."""
+    sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
+    assert pump is not None
+    table = Table(
+        show_header=False,
+        title=escape(project.vessel.name),
+        caption=f"roll: linear prediction in a sea of {project.sea['hs_m']:g} m, "
+        f"{project.sea['tp_s']:g} s",
+    )
+    table.add_column()
+    table.add_column(justify="right")
+    ship, tank = project.vessel.ship, project.vessel.tank
+    rows = [
+        ("roll period", f"{2 * math.pi / ship.natural_frequency_rad_s:.2f} s"),
+        ("tank sized by", sized.bound_by),
+        (
+            "reservoirs, each",
+            f"{sized.reservoir_length_m:.2f} m along, {sized.reservoir_breadth_m:.2f} m across",
+        ),
+        ("duct, still water, roof at", _heights(sized)),
+        *cost_rows(tank_cost(ship, tank)),
+        ("pump moves the water by", f"{demand.level_m:.2f} m"),
+        (
+            "  with",
+            f"{pump.max_pressure_pa / 1e3:.3g} kPa, {demand.flow_m3_s:.3g} m³/s, "
+            f"{power(pump.max_power_w)}",
+        ),
+        ("law", f"LQG, weights ×{law.weight_factor:.3g}"),
+        ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),
+        *roll_rows(project.prediction),
+    ]
+    for text, value in rows:
+        table.add_row(text, value)
+    return table
+
+
+def _heights(sized: "SizedTank") -> str:
+    tank, duct_m = sized.tank, sized.duct_height_m
+    heights = (duct_m, duct_m + tank.height_m, duct_m + tank.height_m + tank.headroom_m)
+    return ", ".join(f"{height:.2f}" for height in heights) + " m"

@@ -1,0 +1,156 @@
+"""A starter project: vessel, controller and scenario, from what a naval architect has."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import yaml
+
+from firmware_sim import starter_text
+from firmware_sim.pooled_waves import pooled_wave_moment
+from firmware_sim.scenario import Scenario
+from firmware_sim.starter_ship import StarterShip
+from utank_hil.analysis.loop.scaled_law import FirstLaw, first_law
+from utank_hil.analysis.tank_prediction import (
+    RollPrediction,
+    SeaState,
+    predict_roll,
+)
+from utank_hil.analysis.tank_sizing import (
+    STABILITY_SHARE,
+    PumpDemand,
+    SizedTank,
+    TankRoom,
+    pump_demand,
+    pump_level_m,
+    size_pump,
+    size_tank,
+    usable_level_m,
+)
+from utank_hil.configuration import ControllerConfig, Vessel
+from utank_hil.configuration.ship_keys import WrittenShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+
+SHIP, CONTROLLER, SCENARIO, README = "ship.yaml", "controller.yaml", "scenario.yaml", "README.md"
+FILES: Final = (SHIP, CONTROLLER, SCENARIO, README)
+
+EFFECTIVE_SLOPE: Final = 0.7
+"""Of the sea on the ship: what is left of the true wave slope."""
+MOST_SLOPE_RAD: Final = math.radians(1.5)
+"""Significant effective slope of the starter's sea: the pump is made for no more."""
+PERIODS_S: Final = (3.0, 18.0)
+"""Peak periods of seas there are; within them the starter's sea has the ship's roll period."""
+_HEIGHT_PER_LENGTH = 1 / 40
+_HEIGHTS_M = (0.5, 5.0)
+_LEAST_LEVEL_CHANGE = 0.01  # a limit as the vessel has it anyway is not written
+
+
+@dataclass(frozen=True, slots=True)
+class StarterProject:
+    """A project that can be checked and benched.
+
+    Attributes
+    ----------
+    vessel : Vessel
+    sized : SizedTank
+    demand : PumpDemand
+        What the pump was made for.
+    law : FirstLaw
+    prediction : RollPrediction
+        In the scenario's sea.
+    sea : dict
+        Of the scenario.
+    texts : dict of str to str
+        Contents of `FILES`.
+    """
+
+    vessel: Vessel
+    sized: SizedTank
+    demand: PumpDemand
+    law: FirstLaw
+    prediction: RollPrediction
+    sea: dict[str, Any]
+    texts: dict[str, str]
+
+
+def starter_sea(
+    length_m: float, roll_period_s: float, hs_m: float | None = None, tp_s: float | None = None
+) -> dict[str, Any]:
+    """Sea of a scenario: at the roll period, and as high as her length and the pump allow.
+
+    Parameters
+    ----------
+    length_m, roll_period_s : float
+        Of the ship.
+    hs_m, tp_s : float, optional
+        Height and peak period, where they are given.
+    """
+    shortest_s, longest_s = PERIODS_S
+    period_s = tp_s or float(f"{min(max(roll_period_s, shortest_s), longest_s):.3g}")
+    wavenumber = (2 * math.pi / period_s) ** 2 / GRAVITY_M_S2
+    least_m, most_m = _HEIGHTS_M
+    height_m = min(max(_HEIGHT_PER_LENGTH * length_m, least_m), most_m)
+    height_m = min(height_m, 2 * MOST_SLOPE_RAD / (EFFECTIVE_SLOPE * wavenumber))
+    return {
+        "kind": "jonswap",
+        "hs_m": hs_m or float(f"{height_m:.2g}"),
+        "tp_s": period_s,
+        "effective_slope": {"coefficient": EFFECTIVE_SLOPE},
+    }
+
+
+def make_starter(
+    ship: StarterShip,
+    room: TankRoom,
+    stability_share: float = STABILITY_SHARE,
+    hs_m: float | None = None,
+    tp_s: float | None = None,
+) -> StarterProject:
+    """Size tank and pump, find a law, and write the files.
+
+    Parameters
+    ----------
+    ship : StarterShip
+    room : TankRoom
+    stability_share : float
+        That the free surface may take, as `size_tank` takes it.
+    hs_m, tp_s : float, optional
+        Of the scenario's sea.
+
+    Raises
+    ------
+    TankImpossibleError, NoLawError
+        If there is none for this ship.
+    ValueError
+        If a value can't be used.
+    """
+    written = WrittenShip(
+        displacement_t=ship.displacement_t,
+        gm_m=ship.gm_m,
+        roll_period_s=float(f"{ship.period_s:.4g}"),
+        damping_ratio=ship.roll_damping_ratio,
+    )
+    bare = written.ship()
+    sized = size_tank(bare, room, stability_share)
+    demand = pump_demand(bare, sized.tank, pump_level_m(bare, sized.tank))
+    pump = size_pump(sized.tank, demand)
+    texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}
+    # from here on with the numbers as they stand in the files
+    vessel = Vessel.model_validate(yaml.safe_load(texts[SHIP]))
+    content: dict[str, Any] = {"name": ship.name, "vessel": vessel, "law": {"kind": "passive"}}
+    usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
+    limits = {}
+    if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
+        limits["level_m"] = usable_m
+    config = ControllerConfig.model_validate(content | {"limits": limits})
+    sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s)
+    texts[SCENARIO] = starter_text.scenario_file(ship.name, sea)
+    scenario = Scenario.model_validate(
+        yaml.safe_load(texts[SCENARIO]) | {"vessel": vessel, "controllers": {"lqg": config}}
+    )
+    state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
+    law = first_law(config.plant, state.slope_rad, state.peak_rad_s)
+    texts[CONTROLLER] = starter_text.controller_file(ship.name, law, limits)
+    texts[README] = starter_text.readme(ship.name)
+    prediction = predict_roll(config.plant, state)
+    return StarterProject(vessel, sized, demand, law, prediction, sea, texts)

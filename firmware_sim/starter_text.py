@@ -1,0 +1,155 @@
+"""The files of a starter project, with comments."""
+
+import json
+import math
+from typing import Any
+
+from firmware_sim.starter_ship import StarterShip
+from utank_hil.analysis.loop.scaled_law import FirstLaw
+from utank_hil.analysis.tank_sizing import (
+    LOADINGS,
+    PUMP_SLOPE_RAD,
+    PumpDemand,
+    SizedTank,
+    TankRoom,
+    stability_taken,
+)
+from utank_hil.configuration.ship_keys import WrittenShip
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.water import water_moments
+
+
+def number(value: float) -> str:
+    """Four digits of a number, as YAML reads it."""
+    short = float(f"{value:.4g}")
+    if short == 0 or 1e-3 <= abs(short) < 1e6:
+        return repr(short)
+    return f"{short:.3e}"
+
+
+def ship_file(
+    ship: StarterShip,
+    written: WrittenShip,
+    room: TankRoom,
+    sized: SizedTank,
+    demand: PumpDemand,
+    pump: Pump,
+) -> str:
+    """The vessel: ship, tank and pump."""
+    tank, bare = sized.tank, written.ship()
+    water_t = water_moments(tank, 0.0).mass_kg / 1e3
+    share, taken = water_t / ship.displacement_t, stability_taken(bare, tank)
+    period = "as given"
+    if ship.roll_period_s is None:
+        period = "weather criterion's formula (IS Code 2008, A 2.3.4): measure it"
+    length_m, breadth_m = sized.reservoir_length_m, sized.reservoir_breadth_m
+    slope_deg = math.degrees(PUMP_SLOPE_RAD)
+    pressure_kpa, flow = demand.pressure_pa / 1e3, demand.flow_m3_s
+    return f"""\
+# {_line(ship.name)}, {ship.length_m:g} m by {ship.beam_m:g} m.
+# Written by `utank-hil init`: change what you know better.
+name: {json.dumps(ship.name)}
+ship:  # without the tank's water
+  displacement_t: {number(ship.displacement_t)}
+  gm_m: {number(ship.gm_m)}
+  roll_period_s: {number(written.roll_period_s)}  # {period}
+  damping_ratio: {number(ship.roll_damping_ratio)}  # of the roll: a decay test tells
+# Room: {room.breadth_m:.2f} m across, {room.height_m:.2f} m high, {length_m:.2f} m along the ship.
+# Size by {sized.bound_by}.
+# Water {water_t:.1f} t, {share:.1%} of the displacement.
+# Its free surface takes {taken * ship.gm_m:.2f} m of the GM, {taken:.0%}.
+tank:
+  width_m: {number(tank.width_m)}  # between the reservoirs' centre lines
+  height_m: {number(tank.height_m)}  # still water above the duct
+  # one reservoir, {length_m:.2f} m along and {breadth_m:.2f} m across the ship
+  reservoir_area_m2: {number(tank.reservoir_area_m2)}
+  # {sized.duct_height_m:.2f} m high; it tunes the water to the ship
+  duct_area_m2: {number(tank.duct_area_m2)}
+  lz_m: {number(tank.lz_m)}  # duct below the centre of gravity
+  damping_ratio: {number(tank.damping_ratio)}  # best for the passive tank: by throttling
+  headroom_m: {number(tank.headroom_m)}  # roof above the still water
+# Moves the water by {demand.level_m:.2f} m, which holds a wave slope of {slope_deg:.1f} degrees,
+# at {LOADINGS[0]:g} to {LOADINGS[-1]:g} of the roll period:
+# {pressure_kpa:.1f} kPa, {flow:.2f} m3/s, {demand.duct_speed_m_s:.1f} m/s in the duct.
+pump:
+  max_pressure_pa: {number(pump.max_pressure_pa)}
+  max_power_w: {number(pump.max_power_w)}
+"""
+
+
+def controller_file(name: str, law: FirstLaw, limits: dict[str, float]) -> str:
+    """The controller: its law in parameters."""
+    design, predictor = law.design, law.design.predictor
+    asked = "as scaled"
+    if law.weight_factor < 1:
+        asked = f"{law.weight_factor:g} of the scaled ones, at which all margins are met"
+    text = f"""\
+# The shipped LQG law, scaled to this ship and sea. Weights on roll, roll rate, level and its
+# rate: {asked}.
+name: {json.dumps(f"{name}, LQG")}
+vessel: ship.yaml
+law:
+  kind: lqg
+  predictor:
+    measured: [{", ".join(predictor.measured)}]
+    measurement_std: [{", ".join(map(number, predictor.measurement_std))}]
+    order: {predictor.order}
+    wave_peak_rad_s: {number(predictor.wave_peak_rad_s)}
+    wave_damping_ratio: {number(predictor.wave_damping_ratio)}
+    wave_slope_rad: {number(predictor.wave_slope_rad)}
+    pressure_noise_pa_rt_s: {number(predictor.pressure_noise_pa_rt_s)}
+    sample_time_s: {number(predictor.sample_time_s)}
+  state_weight: [{", ".join(map(number, design.state_weight))}]
+  washout_rad_s: {number(design.washout_rad_s)}
+"""
+    if limits:
+        text += "# beyond it the water in the duct would be too fast\n"
+        text += f"limits: {{level_m: {number(limits['level_m'])}}}\n"
+    return text
+
+
+def scenario_file(name: str, sea: dict[str, Any]) -> str:
+    """The scenario: a beam sea near the ship's roll period."""
+    return f"""\
+# A beam sea near her roll period, where a ship rolls most.
+name: {json.dumps(f"{name} in a beam sea")}
+vessel: ship.yaml
+sea:
+  kind: jonswap
+  hs_m: {number(sea["hs_m"])}
+  tp_s: {number(sea["tp_s"])}
+  effective_slope: {{coefficient: {number(sea["effective_slope"]["coefficient"])}}}
+controllers:
+  lqg: controller.yaml
+operator:
+  - {{time_s: 5.0, action: arm}}
+duration_s: 900
+settle_s: 60
+seed: 1
+"""
+
+
+def readme(name: str) -> str:
+    """What to do with the files."""
+    return f"""\
+# {_line(name)}
+
+| file | holds |
+|---|---|
+| `ship.yaml` | ship, tank and pump |
+| `controller.yaml` | the law |
+| `scenario.yaml` | the sea, and who arms when |
+
+```sh
+utank-hil check controller.yaml      # is the law robust enough for this ship
+utank-hil bench scenario.yaml        # without tank, passive, active: table, picture, recording
+utank-hil design tank ship.yaml --scenario scenario.yaml    # would another tank be better
+utank-hil design controller controller.yaml --scenario scenario.yaml
+```
+
+After a change in `ship.yaml` run `check` again: a law that misses its margins is refused.
+"""
+
+
+def _line(name: str) -> str:
+    return " ".join(name.split())

@@ -1,0 +1,137 @@
+"""``utank-hil init``: from a ship's dimensions to a project that is ready for the bench."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from firmware_sim.bench import BenchOptions, run_bench
+from firmware_sim.commands.init import init
+from firmware_sim.report import figures
+from firmware_sim.scenario import Scenario
+from utank_hil.commands.common import new_app
+from utank_hil.commands.gate import judge
+from utank_hil.configuration import ControllerConfig, Vessel, load_config
+
+PATROL = {"length": 63, "beam": 9.5, "displacement": 1900, "gm": 0.9, "roll-period": 9.5}
+SLOW = {"length": 200, "beam": 32.2, "displacement": 42000, "gm": 1.2, "draught": 11.5}
+STIFF = SLOW | {"gm": 3.5}
+TRAWLER = {"length": 24, "beam": 7.5, "displacement": 240, "gm": 0.7, "draught": 3.0}
+
+app = new_app()
+app.command("init")(init)
+
+
+def run(folder: Path, ship: dict[str, float], *more: str) -> Result:
+    options = [part for key, value in ship.items() for part in (f"--{key}", str(value))]
+    return CliRunner().invoke(app, [str(folder), *options, *more], env={"COLUMNS": "200"})
+
+
+@pytest.mark.parametrize("ship", [PATROL, SLOW, STIFF, TRAWLER], ids=lambda ship: str(ship["gm"]))
+def test_project_is_valid_and_its_law_is_let_on_the_bus(
+    tmp_path: Path, ship: dict[str, float]
+) -> None:
+    done = run(tmp_path, ship, "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    vessel = load_config(tmp_path / "ship.yaml", Vessel)
+    period_s = 2 * math.pi / vessel.ship.natural_frequency_rad_s
+    assert told["roll_period_s"] == pytest.approx(period_s)
+    if "roll-period" in ship:
+        assert period_s == pytest.approx(ship["roll-period"])
+    assert vessel.ship.displacement_n == pytest.approx(9806.65 * ship["displacement"])
+    controller = load_config(tmp_path / "controller.yaml", ControllerConfig)
+    judged = judge(controller, tmp_path / "controller.yaml")
+    assert judged.accepted
+    assert judged.robustness is not None
+    peak = judged.robustness.nominal.peak_sensitivity
+    assert told["law"]["peak_sensitivity"] == pytest.approx(peak)
+    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+    assert scenario.controllers["lqg"] == controller
+    found = told["linear_prediction"]
+    assert found["passive_below_no_tank"] > 0.2
+    assert found["active_below_passive"] > 0.2
+    assert set(told["files"]) == {"ship", "controller", "scenario", "README"}
+
+
+@pytest.mark.slow
+def test_on_the_bench_the_law_is_armed_and_better_than_passive(tmp_path: Path) -> None:
+    assert run(tmp_path, PATROL).exit_code == 0
+    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+    result = run_bench(scenario, BenchOptions(duration_s=200.0), lambda *_: None)
+    _, (passive, active) = figures(result)
+    assert (active.mode, active.fault, active.active_share) == ("ACTIVE", "NONE", 1.0)
+    assert active.roll.rms_rad < 0.8 * passive.roll.rms_rad
+    assert active.pump.level_peak_m < scenario.vessel.tank.level_limit_m
+
+
+def test_period_by_the_weather_criterion_is_said_in_the_file(tmp_path: Path) -> None:
+    assert run(tmp_path, TRAWLER).exit_code == 0
+    assert "weather criterion's formula" in (tmp_path / "ship.yaml").read_text()
+
+
+def test_what_to_do_next_can_be_done(tmp_path: Path) -> None:
+    done = run(tmp_path, PATROL)
+    for file in ("controller.yaml", "scenario.yaml"):
+        assert (tmp_path / file).exists()
+        assert file in done.output.partition("Next:")[2]
+
+
+def test_names_with_quotes_and_lines_are_names(tmp_path: Path) -> None:
+    name = 'The "Rolling\nStone": #1'
+    assert run(tmp_path, PATROL, "--name", name).exit_code == 0
+    assert load_config(tmp_path / "ship.yaml", Vessel).name == name
+
+
+def test_sea_can_be_given(tmp_path: Path) -> None:
+    told = json.loads(run(tmp_path, PATROL, "--hs", "2.25", "--tp", "8", "--json").stdout)
+    assert (told["sea"]["hs_m"], told["sea"]["tp_s"]) == (2.25, 8)
+    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+    assert scenario.sea.spectrum().hs_m == pytest.approx(2.25, rel=0.01)
+
+
+def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> None:
+    done = run(tmp_path, PATROL | {"gm": 0.15})
+    assert done.exit_code == 1
+    assert "a GM of 0.15 m can spare nothing for a free surface" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+    told = json.loads(run(tmp_path, PATROL | {"tank-length": 0.3}, "--json").stdout)
+    assert told["possible"] is False
+    assert "room's length" in told["reason"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"roll-period": -3}, "--roll-period: must be positive"),
+        ({"displacement": 0}, "--displacement: must be positive"),
+        ({"tank-height": -1}, "--tank-height: must be positive"),
+        ({"duct-below-cg": math.inf}, "--duct-below-cg: must be finite"),
+        ({"gm-loss": 0.5}, "--gm-loss: must be 0.03 to 0.25"),
+        ({"roll-damping": 2}, "--roll-damping: must be above 0 and below 1"),
+        ({"hs": 0}, "--hs: must be positive"),
+        ({"tp": 1}, "--tp: the sea has no waves below"),
+    ],
+)
+def test_wrong_options_are_named(tmp_path: Path, changes: dict[str, float], expected: str) -> None:
+    done = run(tmp_path, PATROL | {"roll-period": 20} | changes)
+    assert done.exit_code == 2
+    assert expected in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_period_or_draught_is_needed(tmp_path: Path) -> None:
+    ship = {key: value for key, value in PATROL.items() if key != "roll-period"}
+    done = run(tmp_path, ship)
+    assert done.exit_code == 2
+    assert "--roll-period: is needed, or else the draught" in done.stderr
+
+
+def test_files_that_are_there_stay(tmp_path: Path) -> None:
+    (tmp_path / "ship.yaml").write_text("mine\n")
+    done = run(tmp_path, PATROL)
+    assert done.exit_code == 2
+    assert "ship.yaml: is there already" in done.stderr
+    assert (tmp_path / "ship.yaml").read_text() == "mine\n"

@@ -1,0 +1,73 @@
+"""A vessel without a pump is benched as the passive tank that it has."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from firmware_sim.bench import jobs_of
+from firmware_sim.plant import Plant
+from firmware_sim.run import run_lockstep
+from firmware_sim.scenario import PASSIVE, Scenario
+from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.configuration import ConfigError, load_config
+from utank_hil.dynamics import coupled_model
+from utank_hil.tick import TICK_NS
+
+DURATION_S = 60.0
+
+
+def scenario_file(folder: Path, **changes: object) -> Path:
+    vessel = yaml.safe_load(Path("configs/ships/naval_vessel.yaml").read_text())
+    del vessel["pump"]
+    (folder / "vessel.yaml").write_text(yaml.safe_dump(vessel))
+    content = {
+        "name": "passive tank",
+        "vessel": "vessel.yaml",
+        "sea": {"kind": "regular", "amplitude_m": 0.1, "period_s": 6.0},
+        "duration_s": DURATION_S,
+        "settle_s": 0.0,
+    }
+    path = folder / "scenario.yaml"
+    path.write_text(yaml.safe_dump(content | changes))
+    return path
+
+
+class _NeverStopped:
+    def stopped(self, done_s: float) -> bool:
+        return False
+
+
+def test_bench_runs_its_tank_passive(tmp_path: Path) -> None:
+    scenario = load_config(scenario_file(tmp_path), Scenario)
+    (job,) = jobs_of(scenario, seed=1, duration_s=DURATION_S)
+    assert job.name == PASSIVE
+    run = run_lockstep(job, _NeverStopped())
+    assert not run.column("true_pressure_pa").any()
+    # the same motion by the transfer function: its last waves, where the start has died out
+    vessel = scenario.vessel
+    steady = run.between(DURATION_S - 12.0, DURATION_S)
+    roll = run.column("true_roll_rad")[steady]
+    system = coupled_model(vessel.ship, vessel.tank)
+    expected = motion_in_sea(None, system, ("roll_rad",), scenario.wave_moment(1)).roll_rms_rad
+    assert np.sqrt(np.mean(roll**2)) == pytest.approx(expected, rel=0.05)
+
+
+def test_plant_takes_no_command(tmp_path: Path) -> None:
+    scenario = load_config(scenario_file(tmp_path), Scenario)
+    vessel = scenario.vessel
+    plant = Plant(vessel.ship, vessel.tank, vessel.pump, scenario.wave_moment(1))
+    for tick in range(100):
+        plant.drive_pump(20e3, enabled=True)
+        plant.advance(tick * TICK_NS)
+        assert plant.pressure_pa == 0.0
+    assert plant.pump_power_w == 0.0
+    assert plant.flow_m3_s != 0.0
+
+
+def test_law_that_drives_a_pump_is_refused_there(tmp_path: Path) -> None:
+    controller = {"name": "PD", "vessel": "vessel.yaml", "law": {"kind": "pd"}}
+    path = scenario_file(tmp_path, controllers={"pd": controller})
+    with pytest.raises(ConfigError, match=r"controllers\.pd\.law\.kind: is pd, which drives"):
+        load_config(path, Scenario)

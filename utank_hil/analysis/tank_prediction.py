@@ -1,0 +1,281 @@
+"""How much a ship rolls in a sea without, with a passive and with an active tank, by linear theory.
+
+The active tank has the law of `first_law`, and is asked for less until twice the RMS of its
+pressure and level, their significant amplitudes, are within the limits of pump and tank: beyond
+them a linear prediction means little.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.robustness import PERIOD_SCALES
+from utank_hil.analysis.loop.scaled_law import FirstLaw, NoLawError, first_law
+from utank_hil.analysis.loop.sea_response import (
+    CalmSeaError,
+    MotionInSea,
+    motion_in_sea,
+    rms,
+    roll_response_without_tank,
+)
+from utank_hil.analysis.tank_sizing import EFFICIENCY, MOST_STABILITY_SHARE, stability_taken
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.optimal_tank import ship_ratios
+from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.sea import Harmonics
+
+STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
+FREQUENCY_RATIOS: Final = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4)
+
+_BANDS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class SeaState:
+    """What is known of a sea and its roll moment on a ship.
+
+    Attributes
+    ----------
+    wave_moment : Harmonics
+        In N m.
+    slope_rad : float
+        Significant amplitude of the effective wave slope.
+    peak_rad_s : float
+        Of the spectrum.
+    """
+
+    wave_moment: Harmonics
+    slope_rad: float
+    peak_rad_s: float
+
+    @classmethod
+    def on(cls, ship: RollShip, wave_moment: Harmonics) -> "SeaState":
+        """The sea as a ship feels it: waves up to twice her roll frequency, and their peak.
+
+        Raises
+        ------
+        CalmSeaError
+            If there are no such waves.
+        """
+        w, energy = wave_moment.frequency_rad_s, np.square(wave_moment.amplitude)
+        most_rad_s = 2 * ship.natural_frequency_rad_s
+        bands, edges = np.histogram(w, _BANDS, (0.0, most_rad_s), weights=energy)
+        if not bands.any():
+            raise CalmSeaError(
+                f"the sea has no waves below {most_rad_s:.2g} rad/s, twice the roll frequency, or "
+                "none from the side: it does not roll the ship"
+            )
+        peak = int(bands.argmax())
+        slope = 2 * math.sqrt(bands.sum() / 2) / ship.stiffness_nm_rad
+        return cls(wave_moment, slope, float(edges[peak : peak + 2].mean()))
+
+
+@dataclass(frozen=True, slots=True)
+class RollPrediction:
+    """Root mean squares of the linear motions in one sea.
+
+    Attributes
+    ----------
+    without_tank_rad : float
+    passive : MotionInSea
+    active : MotionInSea or None
+        None where there is no pump or no law.
+    mean_power_w : float or None
+        Of the pump's shaft, for what it gives the water.
+    law : FirstLaw or None
+        Of the active tank.
+    no_law : str
+        Why there is none.
+    """
+
+    without_tank_rad: float
+    passive: MotionInSea
+    active: MotionInSea | None
+    mean_power_w: float | None
+    law: FirstLaw | None
+    no_law: str = ""
+
+    @property
+    def passive_below_no_tank(self) -> float:
+        """Share by which the passive tank lowers the roll."""
+        return 1 - self.passive.roll_rms_rad / self.without_tank_rad
+
+    @property
+    def active_below_passive(self) -> float | None:
+        """Share by which the pump lowers the roll of the passive tank."""
+        if self.active is None:
+            return None
+        return 1 - self.active.roll_rms_rad / self.passive.roll_rms_rad
+
+
+@dataclass(frozen=True, slots=True)
+class LoadingPoint:
+    """One loading of a ship, with tank and law as they are.
+
+    Attributes
+    ----------
+    period_scale : float
+        Of the roll period, by the stiffness.
+    without_tank_rad, passive_rad : float
+        Roll RMS.
+    active_rad : float or None
+    """
+
+    period_scale: float
+    without_tank_rad: float
+    passive_rad: float
+    active_rad: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class SweepPoint:
+    """One tank of a sweep.
+
+    Attributes
+    ----------
+    stability_share, frequency_ratio : float
+        What the tank was given: share of stability, and frequency of the water per roll frequency.
+    mass_ratio : float
+    tank : Tank
+    prediction : RollPrediction
+    """
+
+    stability_share: float
+    frequency_ratio: float
+    mass_ratio: float
+    tank: Tank
+    prediction: RollPrediction
+
+
+def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> RollPrediction:
+    """Predict the roll of a ship without, with a passive and with an active tank.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+        With the limits of its pump.
+    sea : SeaState
+    pump : bool
+        Whether there is one.
+    """
+    ship, waves = plant.ship, sea.wave_moment
+    without = rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves)
+    passive = motion_in_sea(None, coupled_model(ship, plant.tank), (), waves)
+    if not pump:
+        return RollPrediction(without, passive, None, None, None, "there is no pump")
+
+    def within_limits(design: LQGDesign) -> bool:
+        motion = _active(plant, design, waves)
+        return (
+            2 * motion.pressure_rms_pa <= plant.limits.pressure_pa
+            and 2 * motion.level_rms_m <= plant.limits.level_m
+        )
+
+    try:
+        law = first_law(plant, sea.slope_rad, sea.peak_rad_s, within_limits)
+    except NoLawError as error:
+        return RollPrediction(without, passive, None, None, None, str(error))
+    active, power_w = _active(plant, law.design, waves), _mean_power_w(plant, law.design, waves)
+    return RollPrediction(without, passive, active, power_w, law)
+
+
+def loading_sensitivity(
+    plant: DesignPlant, sea: SeaState, prediction: RollPrediction
+) -> tuple[LoadingPoint, ...]:
+    """Roll at other roll periods of the ship, `PERIOD_SCALES`, in the same waves.
+
+    Tank and law stay as they are; the wave moment goes with the ship's stiffness.
+    """
+    points = []
+    for scale in PERIOD_SCALES:
+        stiffness = plant.ship.stiffness_nm_rad / scale**2
+        ship = replace(plant.ship, stiffness_nm_rad=stiffness)
+        waves = replace(sea.wave_moment, amplitude=sea.wave_moment.amplitude / scale**2)
+        loaded = replace(plant, ship=ship)
+        active = None
+        if prediction.law is not None:
+            design = prediction.law.design
+            active = _active(loaded, design, waves, design_plant=plant).roll_rms_rad
+        points.append(
+            LoadingPoint(
+                scale,
+                rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves),
+                motion_in_sea(None, coupled_model(ship, plant.tank), (), waves).roll_rms_rad,
+                active,
+            )
+        )
+    return tuple(points)
+
+
+def sweep_tank(
+    plant: DesignPlant,
+    sea: SeaState,
+    *,
+    pump: bool = True,
+    shares: Sequence[float] = STABILITY_SHARES,
+    ratios: Sequence[float] = FREQUENCY_RATIOS,
+) -> tuple[SweepPoint, ...]:
+    """Tanks of other mass and frequency in the same place, with the same losses and pump limits.
+
+    The reservoirs' area gives the share of stability, the duct's the frequency. Tanks that no duct
+    can make fast enough are left out.
+    """
+    points = []
+    for share in shares:
+        for ratio in ratios:
+            tank = _varied(plant.ship, plant.tank, share, ratio)
+            if tank is None:
+                continue
+            changed = replace(plant, tank=tank)
+            ratios_of, _ = ship_ratios(plant.ship, tank)
+            found = predict_roll(changed, sea, pump=pump)
+            points.append(SweepPoint(share, ratio, ratios_of.mass_ratio, tank, found))
+    return tuple(points)
+
+
+def _varied(ship: RollShip, tank: Tank, share: float, ratio: float) -> Tank | None:
+    area_m2 = tank.reservoir_area_m2 * share / stability_taken(ship, tank)
+    frequency = ratio * ship.natural_frequency_rad_s
+    duct_part_m = 2 * GRAVITY_M_S2 / frequency**2 - 2 * tank.height_m
+    if duct_part_m <= 0:
+        return None
+    duct_m2 = tank.width_m * area_m2 / duct_part_m
+    return replace(tank, reservoir_area_m2=area_m2, duct_area_m2=duct_m2)
+
+
+def _active(
+    plant: DesignPlant,
+    design: LQGDesign,
+    waves: Harmonics,
+    *,
+    design_plant: DesignPlant | None = None,
+) -> MotionInSea:
+    """Linear motion with a law, which may have been made for another plant."""
+    return motion_in_sea(
+        design.law(design_plant or plant),
+        coupled_model(plant.ship, plant.tank),
+        design.predictor.measured,
+        waves,
+        plant.delay_s,
+        plant.lag_s,
+    )
+
+
+def _mean_power_w(plant: DesignPlant, design: LQGDesign, waves: Harmonics) -> float:
+    """Mean hydraulic power of a linear loop per efficiency."""
+    law, system = design.law(plant), coupled_model(plant.ship, plant.tank)
+    w = waves.frequency_rad_s
+    seen = (w > 0) & (w < math.pi / law.sample_time_s)
+    motions, pressure = closed_loop_response(
+        law, system, design.predictor.measured, w[seen], plant.delay_s, plant.lag_s
+    )
+    rate = motions[:, system.output_labels.index("level_rate_m_s")]
+    per_wave = plant.tank.reservoir_area_m2 * (pressure * rate.conj()).real / 2
+    return float(np.sum(per_wave * waves.amplitude[seen] ** 2)) / EFFICIENCY

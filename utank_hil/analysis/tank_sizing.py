@@ -1,0 +1,343 @@
+"""A tank and pump for a ship, from her stability, her roll period and the room there is.
+
+For a ship of displacement weight W, metacentric height GM and roll frequency w, and a tank of duct
+length L, reservoir area At and still height H (`utank_hil.dynamics.tank`):
+
+* The free surface takes the share s = rho g At L^2 / (2 W GM) of the stability. A tank tuned to the
+  ship has s as its mass ratio as well, so s settles what a tank can do and what it costs. It is
+  chosen, and gives At.
+* Frequency and damping are those of the passive optimum (3.2), which gives the duct's area.
+* The level h lists a ship by s h / (L / 2): at the usable level the tank holds an effective wave
+  slope of that angle, the wave slope capacity.
+* The pressure that moves the water to a level h at a frequency w in the ship held still is
+  |2 rho g - w^2 rho (2H + L At/Ap) + i w r| h, with the loss r. The pump can do that at the roll
+  periods of `LOADINGS`, for the level that holds `PUMP_SLOPE_RAD`, and gives the flow At w h at the
+  same time.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Annotated, Final
+
+from utank_hil.analysis.tank_design import best_passive_tank
+from utank_hil.control.optimal_tank import ship_ratios
+from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
+from utank_hil.parameters import Finite, Positive, Range, range_problems, refuse
+
+STABILITY_SHARE: Final = 0.15
+"""Of the ship's stability that the free surface takes, unless something else is asked for."""
+LEAST_STABILITY_SHARE: Final = 0.03
+"""A smaller tank is not worth its room: the thesis's first ship has 0.05."""
+MOST_STABILITY_SHARE: Final = 0.25
+MOST_MASS_SHARE: Final = 0.04
+"""Of the displacement, the water."""
+LEAST_GM_M: Final = 0.15
+"""Metacentric height that must be left: IS Code 2008, part A, 2.2.4."""
+USABLE_SHARE: Final = 3.85 / 4.88
+"""Of the level at which a reservoir is full or empty, as on the first ship."""
+MOST_DUCT_SPEED_M_S: Final = 45.0 / 6.22
+"""Of the water: the first ship's at her pump's greatest flow."""
+PUMP_SLOPE_RAD: Final = math.radians(1.5)
+"""Effective wave slope that a pump is made for: its level holds the ship upright on it."""
+LOADINGS: Final = (0.85, 1.0, 1.15)
+"""Roll periods, of the ship's, at which the pump moves the water to the usable level."""
+EFFICIENCY: Final = 2.25 / 3.6
+"""Hydraulic power of a pump at its greatest pressure and flow per shaft power (`Pump.for_duct`)."""
+
+_RESERVOIR_SHARE = 0.2  # of the room's breadth, each, where the duct does not ask for less
+_DUCT_SHARE = 0.25  # of the room's height, at most
+_STILL_SHARE = 0.25  # of the water's effective length, at most: the duct has to do the rest
+_ROUNDS = 20
+_TOLERANCE = 1e-3
+
+
+class TankImpossibleError(ValueError):
+    """No tank that is worth having fits the ship or the room."""
+
+
+@dataclass(frozen=True, slots=True)
+class TankRoom:
+    """Room for a U-tube tank across the ship.
+
+    Parameters
+    ----------
+    breadth_m : float
+        Across the ship, between the outer walls of the reservoirs.
+    height_m : float
+        From the duct's bottom to the reservoirs' roof.
+    length_m : float
+        Along the ship.
+    duct_below_cg_m : float
+        Depth of the duct's centre below the ship's centre of gravity.
+
+    Raises
+    ------
+    ValueError
+        If a length is not positive.
+    """
+
+    breadth_m: Positive
+    height_m: Positive
+    length_m: Positive
+    duct_below_cg_m: Finite = 0.0
+
+    def __post_init__(self) -> None:
+        refuse("tank room", range_problems(self))
+
+    @classmethod
+    def in_hull(cls, length_m: float, beam_m: float) -> "TankRoom":
+        """Room that a ship of that length and beam usually has."""
+        return cls(0.9 * beam_m, 0.4 * beam_m, 0.08 * length_m, 0.1 * beam_m)
+
+
+@dataclass(frozen=True, slots=True)
+class SizedTank:
+    """A tank in its room.
+
+    Attributes
+    ----------
+    tank : Tank
+    reservoir_length_m, reservoir_breadth_m : float
+        Of one reservoir, along and across the ship.
+    duct_height_m : float
+        Of a duct as long as the reservoirs along the ship.
+    bound_by : str
+        What settled its size, in words.
+    """
+
+    tank: Tank
+    reservoir_length_m: float
+    reservoir_breadth_m: float
+    duct_height_m: float
+    bound_by: str
+
+
+@dataclass(frozen=True, slots=True)
+class PumpDemand:
+    """What a pump has to do to move the water to a level, in the ship held still.
+
+    Attributes
+    ----------
+    level_m : float
+        Amplitude.
+    pressure_pa, flow_m3_s : float
+        Amplitudes, the greatest over `LOADINGS`.
+    duct_speed_m_s : float
+        Of the water at that flow.
+    mean_power_w : float
+        Shaft power at the ship's own roll period, where the pump makes up for the water's losses.
+    """
+
+    level_m: float
+    pressure_pa: float
+    flow_m3_s: float
+    duct_speed_m_s: float
+    mean_power_w: float
+
+
+@dataclass(frozen=True, slots=True)
+class TankCost:
+    """What a tank takes from the ship, and what it can hold.
+
+    Attributes
+    ----------
+    water_t : float
+    share_of_displacement : float or None
+        The water's; None for a ship without a displacement.
+    stability_taken : float
+        By the free surface, as a share.
+    gm_loss_m : float or None
+    water_period_s, damping_ratio : float
+        Of the water in the ship held still.
+    usable_level_m : float
+        As `usable_level_m`.
+    slope_capacity_rad : float
+        Effective wave slope that the usable level holds.
+    """
+
+    water_t: float
+    share_of_displacement: float | None
+    stability_taken: float
+    gm_loss_m: float | None
+    water_period_s: float
+    damping_ratio: float
+    usable_level_m: float
+    slope_capacity_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Demand:
+    stability_share: Annotated[float, Range(least=LEAST_STABILITY_SHARE, most=MOST_STABILITY_SHARE)]
+
+    def __post_init__(self) -> None:
+        refuse("tank", range_problems(self))
+
+
+def size_tank(
+    ship: RollShip, room: TankRoom, stability_share: float = STABILITY_SHARE
+) -> SizedTank:
+    """The tank with a share of the ship's stability, or the greatest below it that can be.
+
+    Parameters
+    ----------
+    ship : RollShip
+        With her displacement.
+    room : TankRoom
+    stability_share : float
+        0.03 to 0.25.
+
+    Raises
+    ------
+    TankImpossibleError
+        If ship or room allow no tank of `LEAST_STABILITY_SHARE`; it says why, and what would help.
+    ValueError
+        If the share is out of its range or the ship has no displacement.
+    """
+    _Demand(stability_share)
+    if not ship.displacement_n > 0:
+        refuse("ship", [("displacement_n", "is needed to size a tank")])
+    gm_m = ship.stiffness_nm_rad / ship.displacement_n
+    spare = 1 - LEAST_GM_M / gm_m
+    if spare < LEAST_STABILITY_SHARE:
+        raise TankImpossibleError(
+            f"a GM of {gm_m:.2f} m can spare nothing for a free surface: {LEAST_GM_M} m must be "
+            "left (IS Code 2008, part A, 2.2.4)"
+        )
+    wanted, bound_by = stability_share, "the share of stability asked for"
+    if spare < wanted:
+        wanted, bound_by = spare, f"GM: {LEAST_GM_M} m must be left of {gm_m:.2f} m"
+    found, duct_m, tuned = None, math.inf, False
+    for _ in range(_ROUNDS):
+        found = _in_room(ship, room, wanted, duct_m, tuned=tuned)
+        mass_kg = water_moments(found.tank, 0.0).mass_kg
+        heavy = mass_kg * GRAVITY_M_S2 / (MOST_MASS_SHARE * ship.displacement_n)
+        long = found.reservoir_length_m / room.length_m
+        excess = max(heavy, long)
+        if excess > 1 + _TOLERANCE:
+            wanted /= excess
+            bound_by = f"the room's length, {room.length_m:.1f} m"
+            if heavy > long:
+                bound_by = f"the water's mass, {MOST_MASS_SHARE:.0%} of the displacement"
+        elif abs(found.duct_height_m - duct_m) < _TOLERANCE * room.height_m:
+            if tuned:
+                break
+            tuned = True  # the optimum takes long: from here on, where it is nearly right
+        duct_m = found.duct_height_m
+    assert found is not None
+    if wanted < LEAST_STABILITY_SHARE:
+        raise TankImpossibleError(
+            f"{bound_by}, lets a tank take {wanted:.1%} of the stability, and below "
+            f"{LEAST_STABILITY_SHARE:.0%} it does too little: a wider room (now "
+            f"{room.breadth_m:.1f} m) or a longer one would help"
+        )
+    return replace(found, bound_by=bound_by)
+
+
+def _in_room(
+    ship: RollShip, room: TankRoom, stability_share: float, duct_m: float, *, tuned: bool
+) -> SizedTank:
+    """Tank of a share of stability, as fast as the ship or tuned to her, above a duct so high."""
+    way_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2  # 2H + L At/Ap of a tuned tank
+    duct_m = min(duct_m, _DUCT_SHARE * room.height_m)
+    height_m = min((room.height_m - duct_m) / 2, _STILL_SHARE * way_m)
+    duct_part_m = way_m - 2 * height_m
+    # the duct is as high as L b / duct_part, with b the reservoirs' breadth and L + b the room's
+    root = room.breadth_m**2 - 4 * _DUCT_SHARE * room.height_m * duct_part_m
+    breadth_m = _RESERVOIR_SHARE * room.breadth_m
+    if root > 0:
+        breadth_m = min(breadth_m, (room.breadth_m - math.sqrt(root)) / 2)
+    width_m = room.breadth_m - breadth_m
+    area_m2 = 2 * stability_share * ship.stiffness_nm_rad / (1e3 * GRAVITY_M_S2 * width_m**2)
+    tank = Tank(
+        width_m=width_m,
+        height_m=height_m,
+        reservoir_area_m2=area_m2,
+        duct_area_m2=width_m * area_m2 / duct_part_m,
+        lz_m=room.duct_below_cg_m,
+        headroom_m=height_m,
+    )
+    if tuned:
+        tank = best_passive_tank(ship, tank)
+    length_m = area_m2 / breadth_m
+    return SizedTank(tank, length_m, breadth_m, tank.duct_area_m2 / length_m, "")
+
+
+def stability_taken(ship: RollShip, tank: Tank) -> float:
+    """Share of the ship's stability that the free surface takes."""
+    moment = tank.density_kg_m3 * GRAVITY_M_S2 * tank.reservoir_area_m2 * tank.width_m**2 / 2
+    return moment / ship.stiffness_nm_rad
+
+
+def wave_slope_capacity_rad(ship: RollShip, tank: Tank, level_m: float) -> float:
+    """Effective wave slope whose moment the water's weight balances at a level."""
+    return stability_taken(ship, tank) * level_m / (tank.width_m / 2)
+
+
+def usable_level_m(ship: RollShip, tank: Tank) -> float:
+    """Level that a pump may drive the water to: below the roof, and not too fast in the duct."""
+    _, roll_rad_s = ship_ratios(ship, tank)
+    fastest_rad_s = roll_rad_s / min(LOADINGS)
+    speed_per_level = fastest_rad_s * tank.reservoir_area_m2 / tank.duct_area_m2
+    return min(USABLE_SHARE * tank.level_limit_m, MOST_DUCT_SPEED_M_S / speed_per_level)
+
+
+def pump_level_m(ship: RollShip, tank: Tank) -> float:
+    """Level that a pump has to move: it holds `PUMP_SLOPE_RAD`, if it is usable."""
+    holding_m = PUMP_SLOPE_RAD / wave_slope_capacity_rad(ship, tank, 1.0)
+    return min(usable_level_m(ship, tank), holding_m)
+
+
+def pump_demand(ship: RollShip, tank: Tank, level_m: float) -> PumpDemand:
+    """What a pump has to do to move the water to a level."""
+    _, roll_rad_s = ship_ratios(ship, tank)
+    frequencies = [roll_rad_s / scale for scale in LOADINGS]
+    flow_m3_s = tank.reservoir_area_m2 * max(frequencies) * level_m
+    loss_w = tank.reservoir_area_m2 * tank.loss_pa_per_m_s * (roll_rad_s * level_m) ** 2 / 2
+    return PumpDemand(
+        level_m=level_m,
+        pressure_pa=max(_pressure_pa_per_m(tank, w) for w in frequencies) * level_m,
+        flow_m3_s=flow_m3_s,
+        duct_speed_m_s=flow_m3_s / tank.duct_area_m2,
+        mean_power_w=loss_w / EFFICIENCY,
+    )
+
+
+def _pressure_pa_per_m(tank: Tank, frequency_rad_s: float) -> float:
+    """Pressure amplitude per level amplitude in the ship held still."""
+    stiffness = 2 * tank.density_kg_m3 * GRAVITY_M_S2
+    inertia = tank.density_kg_m3 * tank.effective_length_m
+    return abs(
+        complex(stiffness - inertia * frequency_rad_s**2, frequency_rad_s * tank.loss_pa_per_m_s)
+    )
+
+
+def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
+    """What a tank takes from a ship."""
+    mass_kg, taken = water_moments(tank, 0.0).mass_kg, stability_taken(ship, tank)
+    level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
+    weighed = weight_n > 0
+    return TankCost(
+        water_t=mass_kg / 1e3,
+        share_of_displacement=mass_kg * GRAVITY_M_S2 / weight_n if weighed else None,
+        stability_taken=taken,
+        gm_loss_m=taken * ship.stiffness_nm_rad / weight_n if weighed else None,
+        water_period_s=2 * math.pi / tank.natural_frequency_rad_s,
+        damping_ratio=tank.damping_ratio,
+        usable_level_m=level_m,
+        slope_capacity_rad=wave_slope_capacity_rad(ship, tank, level_m),
+    )
+
+
+def size_pump(tank: Tank, demand: PumpDemand) -> Pump:
+    """Pump of the tank's duct for a demand, similar to the first ship's.
+
+    Its greatest flow goes with the root of its pressure; where the demand's flow asks for more
+    pressure than the demand does, the flow counts. Motor and drive are for pressure and flow at
+    once.
+    """
+    by_speed_pa = 50e3 * (demand.duct_speed_m_s / MOST_DUCT_SPEED_M_S) ** 2
+    pump = Pump.for_duct(tank.duct_area_m2, max(demand.pressure_pa, by_speed_pa))
+    return replace(pump, max_power_w=pump.max_pressure_pa * demand.flow_m3_s / EFFICIENCY)

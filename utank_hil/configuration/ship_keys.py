@@ -1,0 +1,198 @@
+"""The section ``ship`` as it may be written: `RollShip` in the keys of a naval architect too.
+
+With displacement D in kg, metacentric height GM, roll period T and damping ratio zeta, all of the
+ship without the tank's water::
+
+    stiffness = D g GM        inertia = stiffness (T / 2 pi)^2
+    linear damping = 2 zeta sqrt(inertia stiffness)
+
+Without a period, it is that of the weather criterion, IS Code 2008, part A, 2.3.4 (beam B, mean
+draught d, length L at the waterline)::
+
+    T = 2 C B / sqrt(GM),     C = 0.373 + 0.023 B / d - 0.043 L / 100
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import WrapValidator
+
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import ParameterError, Problem, Range, refuse
+
+NOT_GIVEN = math.nan
+"""No key of a file can have this value."""
+
+_PAIRS = (
+    ("displacement_t", "displacement_n"),
+    ("gm_m", "stiffness_nm_rad"),
+    ("roll_period_s", "inertia_kg_m2"),
+    ("damping_ratio", "damping_nms_rad"),
+)
+"""A naval architect's key and that of `RollShip` for the same quantity."""
+
+_MOST = 1e30  # as for `RollShip`; the keys below keep what is computed from them within it
+_Length = Annotated[float, Range(above=0, most=1e4)]
+
+
+def weather_criterion_period_s(
+    beam_m: float, draught_m: float, length_m: float, gm_m: float
+) -> float:
+    """Roll period that the IS Code 2008 (part A, 2.3.4) takes for a ship.
+
+    Parameters
+    ----------
+    beam_m, draught_m, length_m : float
+        Moulded breadth, mean moulded draught and length at the waterline.
+    gm_m : float
+        Metacentric height.
+    """
+    coefficient = 0.373 + 0.023 * beam_m / draught_m - 0.043 * length_m / 100
+    return 2 * coefficient * beam_m / math.sqrt(gm_m)
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenShip(RollShip):
+    """A ship as a file has it: each quantity by one of the keys that can give it.
+
+    Parameters
+    ----------
+    displacement_t : float
+        Of the ship without the tank's water; instead of `displacement_n`.
+    gm_m : float
+        Metacentric height without the tank's water; with `displacement_t` instead of
+        `stiffness_nm_rad`.
+    roll_period_s : float
+        Natural roll period without the tank's water; instead of `inertia_kg_m2`.
+    beam_m, draught_m, length_m : float
+        Of the hull at the waterline; instead of `roll_period_s`.
+    damping_ratio : float
+        Of the ship's roll; instead of `damping_nms_rad`.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is given twice or not at all.
+    """
+
+    inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
+    stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
+    damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
+    displacement_n: float = NOT_GIVEN
+    displacement_t: Annotated[float, Range(above=0, most=1e9)] = NOT_GIVEN
+    gm_m: Annotated[float, Range(above=0, most=1e3)] = NOT_GIVEN
+    roll_period_s: Annotated[float, Range(above=0, most=1e4)] = NOT_GIVEN
+    beam_m: _Length = NOT_GIVEN
+    draught_m: _Length = NOT_GIVEN
+    length_m: _Length = NOT_GIVEN
+    damping_ratio: Annotated[float, Range(least=0, most=1e3)] = NOT_GIVEN
+
+    def __post_init__(self) -> None:
+        twice = [
+            (own, f"and {other} give the same quantity: remove one of them")
+            for own, other in _PAIRS
+            if self.gives(own) and self.gives(other)
+        ]
+        refuse("ship", twice or self._missing())
+
+    def gives(self, name: str) -> bool:
+        """Whether a key stands in the file."""
+        return not math.isnan(getattr(self, name))
+
+    @property
+    def period_by_formula(self) -> bool:
+        """Whether the roll period is the weather criterion's."""
+        return not (self.gives("roll_period_s") or self.gives("inertia_kg_m2"))
+
+    def ship(self) -> RollShip:
+        """The ship in the terms of its equation.
+
+        Raises
+        ------
+        ValueError
+            As `RollShip`.
+        """
+        displacement_n = self._displacement_n
+        stiffness = self.stiffness_nm_rad
+        if self.gives("gm_m"):
+            stiffness = displacement_n * self.gm_m
+        inertia = self.inertia_kg_m2
+        if math.isnan(inertia):
+            inertia = stiffness * (self._period_s(stiffness) / (2 * math.pi)) ** 2
+        damping = self.damping_nms_rad if self.gives("damping_nms_rad") else 0.0
+        if self.gives("damping_ratio"):
+            damping = 2 * self.damping_ratio * math.sqrt(inertia * stiffness)
+        found = {
+            "inertia_kg_m2": inertia,
+            "stiffness_nm_rad": stiffness,
+            "damping_nms_rad": damping,
+            "displacement_n": 0.0 if math.isnan(displacement_n) else displacement_n,
+        }
+        own = {field.name: getattr(self, field.name) for field in fields(RollShip)}
+        try:
+            return RollShip(**(own | found))
+        except ParameterError as error:
+            problems = [(self._source(name), reason) for name, reason in error.problems]
+            raise ParameterError(error.owner, problems) from error
+
+    def _source(self, name: str) -> str:
+        """The key that a parameter of the ship was computed from."""
+        for own, other in _PAIRS:
+            if name == other and self.gives(own):
+                return own
+        return name
+
+    @property
+    def _displacement_n(self) -> float:
+        if self.gives("displacement_t"):
+            return 1e3 * GRAVITY_M_S2 * self.displacement_t
+        return self.displacement_n
+
+    def _period_s(self, stiffness_nm_rad: float) -> float:
+        if self.gives("roll_period_s"):
+            return self.roll_period_s
+        gm_m = stiffness_nm_rad / self._displacement_n
+        period_s = weather_criterion_period_s(self.beam_m, self.draught_m, self.length_m, gm_m)
+        if not period_s > 0:
+            reason = "is beyond the weather criterion's formula: give roll_period_s"
+            refuse("ship", [("length_m", reason)])
+        return period_s
+
+    def _missing(self) -> list[Problem]:
+        problems = []
+        weighed = self.gives("displacement_t") or self.displacement_n > 0
+        if not (self.gives("gm_m") or self.gives("stiffness_nm_rad")):
+            name, other = "stiffness_nm_rad", "displacement_t and gm_m"
+            if weighed:
+                name, other = "gm_m", "stiffness_nm_rad"
+            problems.append((name, f"is required but missing, or else {other}"))
+        elif self.gives("gm_m") and not weighed:
+            problems.append(("displacement_t", "is required with gm_m but missing"))
+        if self.period_by_formula:
+            hull = [name for name in ("beam_m", "draught_m", "length_m") if not self.gives(name)]
+            if len(hull) == 3:
+                reason = (
+                    "is required but missing, or else roll_period_s, or else beam_m, draught_m and "
+                    "length_m for the weather criterion's period"
+                )
+                problems.append(("inertia_kg_m2", reason))
+            else:
+                reason = "is required but missing for the roll period, or else roll_period_s"
+                problems += [(name, reason) for name in hull]
+                if not weighed and not self.gives("gm_m"):
+                    reason = "is required with beam_m but missing, or else roll_period_s"
+                    problems.append(("displacement_t", reason))
+        return problems
+
+
+def _as_ship(value: Any, written: Callable[[Any], WrittenShip]) -> RollShip:
+    return value if type(value) is RollShip else written(value).ship()
+
+
+if TYPE_CHECKING:
+    ShipFromFile = RollShip
+else:
+    ShipFromFile = Annotated[WrittenShip, WrapValidator(_as_ship)]
