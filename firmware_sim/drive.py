@@ -128,6 +128,10 @@ class PumpDrive:
             return
         command = self._commands.accept(frame)
         if command is None:
+            # out of sequence it may ask for nothing, but it may say stop
+            intact = self._commands.intact(frame)
+            if intact is not None and intact.control_word in _STOP_WORDS:
+                self._states.command(intact.control_word)
             return
         if not self._permitted(command, now_ns):
             if command.control_word in _STOP_WORDS:

@@ -163,6 +163,25 @@ def test_a_word_that_says_stop_stops_whatever_pressure_came_with_it(word: Contro
     assert bench.drive.refused == 1
 
 
+@pytest.mark.parametrize("lost", [3, 4, 12])
+@pytest.mark.parametrize("word", [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE])
+def test_a_stop_out_of_sequence_is_heard_and_an_enable_is_not(lost: int, word: ControlWord) -> None:
+    bench = armed(20e3)
+    for _ in range(lost):
+        bench.commands.frame(PumpCommand(20e3, ControlWord.ENABLE_OPERATION, 0.05))
+    bench.command(20e3, word)
+    bench.tick()
+    assert bench.told.state is not DriveState.OPERATION_ENABLED
+    bench = DriveBench()
+    bench.enable()
+    echo = bench.told.command_echo
+    for _ in range(4):
+        bench.commands.frame(PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05))
+    bench.command(2000.0)
+    bench.ticks(2)
+    assert bench.told.command_echo == echo
+
+
 def test_steps_toward_zero_are_never_refused() -> None:
     bench = armed(40e3)
     bench.command(1e3)

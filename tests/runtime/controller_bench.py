@@ -152,6 +152,10 @@ class ControllerBench:
         self.order = self.order._replace(**changes)  # type: ignore[arg-type]
         self._send(OperatorCommand, self.order)
 
+    def restart_panel(self) -> None:
+        """The panel's counter begins anew."""
+        self._senders[OperatorCommand] = CATALOGUE.transmitter(OperatorCommand)
+
     def send(self, frame: Frame) -> None:
         """Let the node hear one frame, now."""
         self.node.receive(frame, self.now_ns)

@@ -300,7 +300,7 @@ class ControllerNode:
             seen = self.seen
             self._retuning.update(
                 now_ns,
-                self.inbox.operator,
+                self.inbox.orders.last,
                 engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )

@@ -18,7 +18,6 @@ from utank_hil.canbus import (
     DriveStatus2,
     Frame,
     Heartbeat,
-    Mode,
     OperatorCommand,
     Quality,
     Receiver,
@@ -27,8 +26,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-
-NEVER_HEARD_NS = -(1 << 62)
+from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Attributes of the inbox that a law may measure."""
@@ -62,10 +60,8 @@ class Inbox:
         Received at `drive_ns`; the echo of a new command at `echo_ns`.
     power_w : float
         Electric power the drive takes.
-    operator : OperatorCommand or None
-        Last order, received at `panel_ns`.
-    requested_mode : Mode
-        Mode the operator wants; STANDBY as long as none was asked for.
+    orders : Orders
+        What the operator wants.
     versions_match : bool
         Drive and sensors run the controller's catalogue and configuration.
     address_conflict : bool
@@ -82,7 +78,8 @@ class Inbox:
         self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
         self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
         self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
-        self._subscribe(catalogue.receiver(OperatorCommand), self._on_operator)
+        self.orders = Orders(catalogue.receiver(OperatorCommand))
+        self._subscriptions[self.orders.can_id] = self.orders.accept, self.orders.obey
         self._matching: dict[int, bool] = {}
         for address in _MATCHED:
             heartbeat = catalogue.receiver(Heartbeat, address)
@@ -95,11 +92,9 @@ class Inbox:
         self.high_level = False
         self.drive_state: DriveState | None = None
         self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.operator: OperatorCommand | None = None
-        self.requested_mode = Mode.STANDBY
         self.versions_match = False
         self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
-        self.drive_ns = self.echo_ns = self.panel_ns = NEVER_HEARD_NS
+        self.drive_ns = self.echo_ns = NEVER_HEARD_NS
         self._echo: int | None = None
         self.address_conflict = False
         self.frames = 0
@@ -163,12 +158,6 @@ class Inbox:
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self.drive_fault = status.fault
         self.power_w = status.bus_voltage_v * status.current_a
-
-    def _on_operator(self, order: OperatorCommand, now_ns: int) -> None:
-        self.operator = order
-        asked = order.mode_request
-        self.requested_mode = Mode.STANDBY if asked is None else asked
-        self.panel_ns = now_ns
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
         versions = (beat.catalogue_version, beat.configuration_version)
