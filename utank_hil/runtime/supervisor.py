@@ -134,6 +134,11 @@ class Supervisor:
         seen.arming_ms = (now_ns - since_ns) / MILLISECOND_NS
         if not seen.armed or seen.requested_mode is not Mode.ACTIVE:
             self._disarm(Mode.STANDBY)
+            return
+        # being out of operation enabled does not count yet; all else counts until ACTIVE
+        refusal = judging.first_refusing(seen, self._limits)
+        if refusal is not None:
+            self._disarm(Mode.STANDBY, refusal[0])
         elif seen.drive_enabled:
             self._arming_since_ns = None
             self._drive_enabled_ns = now_ns
