@@ -213,6 +213,89 @@ def test_disarming_ramps_down_with_the_drive_enabled() -> None:
     assert supervisor.drive_wanted
 
 
+RAMPING = {"drive_enabled": True, "command_pa": 20e3}
+
+
+def disarmed_bench() -> Bench:
+    bench = armed_bench()
+    supervisor = bench.tick(**{**ACTIVE, "command_pa": 20e3, "armed": False})
+    assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
+    return bench
+
+
+@pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
+def test_whatever_ends_active_is_latched_during_the_ramp_after_disarming(
+    fault: Fault, reaction: Reaction, sign: dict[str, object]
+) -> None:
+    bench = disarmed_bench()
+    bench.tick(**RAMPING)
+    supervisor = bench.tick(**{**RAMPING, **sign})
+    assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, fault)
+    assert supervisor.demand is (Demand.RAMP if reaction is Reaction.RAMP else Demand.ZERO)
+
+
+def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found() -> None:
+    bench = disarmed_bench()
+    for _ in range(5):
+        assert bench.supervisor.mode is Mode.PASSIVE
+        bench.tick(**{**RAMPING, "drive_enabled": False})
+    assert bench.supervisor.fault is Fault.DRIVE_FAULT
+
+
+def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled() -> None:
+    bench = disarmed_bench()
+    began_ns = bench.now_ns - TICK_NS
+    while bench.supervisor.demand is Demand.RAMP:
+        assert bench.now_ns - began_ns <= 1000 * MILLISECOND_NS
+        bench.tick(**RAMPING)
+    assert bench.now_ns - TICK_NS - began_ns == 1000 * MILLISECOND_NS
+    assert bench.supervisor.mode is Mode.PASSIVE
+    assert bench.supervisor.drive_wanted
+
+
+def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> None:
+    bench = disarmed_bench()
+    bench.tick(**{**ACTIVE, **RAMPING, "arm_edge": True})
+    for _ in range(200):
+        bench.tick(**{**ACTIVE, **RAMPING})
+    assert bench.supervisor.demand is Demand.CONTROL
+
+
+def ends_within_ms(sign: dict[str, object]) -> int:
+    """The shortest time to zero that the table asks for."""
+    found = conditions_in(replace(HEALTHY, **sign), Reaction.RAMP)  # type: ignore[arg-type]
+    return min(condition.zero_within_ms for _, condition in found)
+
+
+RAMP_SIGNS = [sign for _, reaction, sign in SIGNS if reaction is Reaction.RAMP]
+
+
+@pytest.mark.parametrize("first", [*RAMP_SIGNS, "disarmed"])
+@pytest.mark.parametrize("second", RAMP_SIGNS)
+@pytest.mark.parametrize("later_ms", [10, 300, 900])
+@pytest.mark.parametrize("first_lasts", [False, True])
+def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(
+    first: dict[str, object] | str, second: dict[str, object], later_ms: int, first_lasts: bool
+) -> None:
+    if isinstance(first, str):
+        bench, sign, first_within_ms = disarmed_bench(), {}, 1000
+        began_ns = bench.now_ns - TICK_NS
+    else:
+        bench, sign, first_within_ms = armed_bench(), first, ends_within_ms(first)
+        began_ns = bench.now_ns
+        bench.tick(**{**ACTIVE, **RAMPING, **sign})
+    later_ns = began_ns + later_ms * MILLISECOND_NS
+    zero_ns = began_ns + first_within_ms * MILLISECOND_NS
+    while bench.supervisor.demand is Demand.RAMP:
+        both = sign if first_lasts else {}
+        if bench.now_ns >= later_ns:
+            zero_ns = min(zero_ns, later_ns + ends_within_ms(second) * MILLISECOND_NS)
+            both = {**both, **second}
+        assert bench.now_ns <= zero_ns
+        bench.tick(**{**RAMPING, **both})
+    assert bench.now_ns - zero_ns <= 2 * TICK_NS
+
+
 def test_operators_stop_is_immediate() -> None:
     bench = armed_bench()
     assert bench.tick(**ACTIVE, stop=True).demand is Demand.ZERO

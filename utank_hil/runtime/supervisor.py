@@ -19,6 +19,9 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
+DISARMED_ZERO_WITHIN_MS: Final = 1000
+"""When the pressure is cut after disarming, even if the ramp has not come to its end."""
+_NEVER_NS: Final = 1 << 62
 
 
 class Demand(Enum):
@@ -54,7 +57,7 @@ class Supervisor:
         self.degraded = False
         self._arming_since_ns: int | None = None
         self._drive_enabled_ns = 0
-        self._zero_at_ns = 0
+        self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
     @property
     def arming(self) -> bool:
@@ -75,16 +78,18 @@ class Supervisor:
         self.degraded = judging.first_halving(seen, self._limits) is not None
         found = judging.first_ending(seen, self._limits)
         if found is not None:
-            self._latch(*found, now_ns)
+            self._latch(*found, seen, now_ns)
         elif seen.stop:
             self._disarm(Mode.STANDBY)
         elif not seen.armed or seen.requested_mode is not _ACTIVE:
             # through PASSIVE even on the way to STANDBY: there the pressure ramps down
             self._disarm(Mode.PASSIVE)
+            self._zero_at_ns = now_ns + DISARMED_ZERO_WITHIN_MS * MILLISECOND_NS
 
     def _while_faulted(self, seen: Observations, now_ns: int) -> None:
         if self.demand is Demand.RAMP:
             self._note_drive(seen, now_ns)
+            self._ramp(seen, now_ns)
             if (
                 now_ns >= self._zero_at_ns
                 or seen.stop
@@ -100,6 +105,15 @@ class Supervisor:
             self._disarm(Mode.STANDBY)
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
+        if self.mode is Mode.PASSIVE and seen.command_pa != 0.0:
+            # still ramping down, so what ends ACTIVE ends this
+            self._note_drive(seen, now_ns)
+            found = judging.first_ending(seen, self._limits)
+            if found is not None:
+                self._latch(*found, seen, now_ns)
+                return
+            if now_ns >= self._zero_at_ns:
+                self.demand = Demand.ZERO
         missing = judging.first_awaited(seen, self._limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
@@ -145,6 +159,7 @@ class Supervisor:
             self.mode = Mode.ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
+            self._zero_at_ns = _NEVER_NS
         else:
             found = judging.first_giving_up(seen, self._limits)
             if found is not None:
@@ -158,14 +173,23 @@ class Supervisor:
         # in PASSIVE the drive holds zero pressure, enabled; elsewhere it is off
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
+        self._zero_at_ns = _NEVER_NS
 
-    def _latch(self, fault: Fault, condition: Condition, now_ns: int) -> None:
+    def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
         self.mode = Mode.FAULT
         self.fault = fault
-        self._zero_at_ns = now_ns + condition.zero_within_ms * MILLISECOND_NS
+        self._arming_since_ns = None
         stop = condition.reaction is Reaction.STOP
         self.demand = Demand.ZERO if stop else Demand.RAMP
         self.drive_wanted = not stop
+        self._ramp(seen, now_ns)
+
+    def _ramp(self, seen: Observations, now_ns: int) -> None:
+        """Shorten the ramp to the earliest end that a condition asks for."""
+        found = judging.soonest_ramp(seen, self._limits)
+        if found is not None:
+            zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
+            self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
 
     def _note_drive(self, seen: Observations, now_ns: int) -> None:
         if seen.drive_enabled:
