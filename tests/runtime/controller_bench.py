@@ -89,10 +89,11 @@ class ControllerBench:
     ) -> None:
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
+        self.level = LevelObserver(VESSEL.tank, 2 * TICK_S)
         self.node = ControllerNode(
             self.law,
             measure_of(("roll_rad", "level_m")),
-            LevelObserver(VESSEL.tank, 2 * TICK_S),
+            self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
             ControllerSettings(configuration_version=VERSION),

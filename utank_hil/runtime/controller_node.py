@@ -169,7 +169,7 @@ class ControllerNode:
         self._status_schedule = Schedule(self._status.cycle_ns)
         self._started = self._answered = False
         self.start_ns = self.last_ns = 0
-        self._observed_ns = 0
+        self._observed_cycles = 0
         self._frames_sent = 0
         self._law_pa = 0.0
         self._law_failed = self._law_raised = False  # raised: until the operator resets
@@ -224,7 +224,7 @@ class ControllerNode:
         if not self._started:
             self._started = True
             self.start_ns = now_ns
-        self._estimate()
+        self._estimate(now_ns)
         self._observe(now_ns)
         self.supervisor.update(self.seen, now_ns)
         self._control(now_ns)
@@ -240,12 +240,15 @@ class ControllerNode:
         self.command_pa = 0.0
         return [self._command_frame(ControlWord.QUICK_STOP)]
 
-    def _estimate(self) -> None:
-        """Level and its rate from what was measured."""
-        inbox = self.inbox
-        if inbox.tank_ns != self._observed_ns:
-            self._level.update(inbox.level_m, inbox.pressure_pa)
-            self._observed_ns = inbox.tank_ns
+    def _estimate(self, now_ns: int) -> None:
+        """Level and its rate from measurements, or from the model while one is missing."""
+        inbox, level = self.inbox, self._level
+        cycles = inbox.tank_cycles - self._observed_cycles
+        if cycles:
+            level.update(inbox.level_m, inbox.pressure_pa, cycles)
+            self._observed_cycles = inbox.tank_cycles
+        elif (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s:
+            level.predict(inbox.pressure_pa)
 
     def _observe(self, now_ns: int) -> None:
         """Ages, states and operator's edges, for the supervisor."""

@@ -26,6 +26,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
+from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
@@ -51,7 +52,7 @@ class Inbox:
     roll_rad, roll_rate_rad_s : float
         Of the last good motion sample, received at `motion_ns`.
     port_level_m, starboard_level_m : float
-        Above still water, received at `tank_ns`.
+        Above still water, received at `tank_ns`, `tank_cycles` of the message after the first.
     high_level : bool
         A high-level switch is closed or broken.
     pressure_pa : float
@@ -96,6 +97,10 @@ class Inbox:
         self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
         self.drive_ns = self.echo_ns = NEVER_HEARD_NS
         self._echo: int | None = None
+        self.tank_cycles = self._cycles = self._tank_lost = 0
+        self._tank_frame_ns = NEVER_HEARD_NS
+        # a longer gap than the counter bridges is told by the time
+        self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
         self.address_conflict = False
         self.frames = 0
 
@@ -135,13 +140,23 @@ class Inbox:
             self.motion_ns = now_ns
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
+        self._count_cycles(now_ns)
         # the switches count whatever the gauges say, and a broken switch counts as closed
         self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in _USABLE:
             return
         if math.isfinite(tank.port_level_m + tank.starboard_level_m):
             self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
-            self.tank_ns = now_ns
+            self.tank_ns, self.tank_cycles = now_ns, self._cycles
+
+    def _count_cycles(self, now_ns: int) -> None:
+        """Count the cycles since the last frame; by its counter, since time of receipt jitters."""
+        lost, since_ns = self._tank.lost, now_ns - self._tank_frame_ns
+        if since_ns > self._tank_gap_ns:
+            self._cycles += round(since_ns / self._tank.cycle_ns)
+        else:
+            self._cycles += 1 + lost - self._tank_lost
+        self._tank_lost, self._tank_frame_ns = lost, now_ns
 
     def _on_pump(self, pump: SensorPump, now_ns: int) -> None:
         if pump.quality in _USABLE and math.isfinite(pump.pressure_pa):
