@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand
+from utank_hil.retuning import RetuningOrder
 from utank_hil.runtime.orders import Orders
 
 QUIET = OperatorCommand(Mode.ACTIVE, True, False, False, False)
@@ -69,6 +70,34 @@ def test_what_is_let_go_between_two_looks_is_heard() -> None:
         assert wishes.stop == ("stop" in pressed)
         assert wishes.reset_edge == ("reset" in pressed)
         assert wishes.arm_edge == ("arm" in pressed)
+
+
+@pytest.mark.parametrize("frames_a_sample", [1, 2, 3, 10])
+def test_every_press_for_the_retuning_is_heard_however_seldom_the_law_looks(
+    frames_a_sample: int,
+) -> None:
+    line = Line()
+    line.say()
+    assert line.orders.take_retuning() == RetuningOrder()
+    for button in ("retune", "undo", "forbid_retuning"):
+        for at in range(frames_a_sample):
+            heard = []
+            for _ in range(2):
+                for number in range(frames_a_sample):
+                    line.say(**{button: number == at and not heard})
+                    line.orders.take()  # the supervisor looks every tick
+                heard.append(line.orders.take_retuning())
+            name = "forbidden" if button == "forbid_retuning" else button
+            assert heard == [RetuningOrder(**{name: True}), RetuningOrder()]
+
+
+def test_retuning_stays_forbidden_while_the_button_is_down() -> None:
+    line = Line()
+    line.say(forbid_retuning=True)
+    for _ in range(3):
+        assert line.orders.take_retuning().forbidden
+    line.say(lost=9, forbid_retuning=False)
+    assert line.orders.take_retuning().forbidden
 
 
 @given(st.integers(0, 40), st.booleans())

@@ -303,7 +303,7 @@ class ControllerNode:
             seen = self.seen
             self._retuning.update(
                 now_ns,
-                self.inbox.orders.last,
+                self.inbox.orders.take_retuning(),
                 engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver
 from utank_hil.canbus.endpoints import MAX_LOST
+from utank_hil.retuning.adaptive import RetuningOrder
 
 NEVER_HEARD_NS: Final = -(1 << 62)
 
@@ -30,6 +31,9 @@ class Wishes(NamedTuple):
     stop: bool
     arm_edge: bool
     reset_edge: bool
+
+
+_NOTHING: Final = RetuningOrder()
 
 
 class Orders:
@@ -61,6 +65,7 @@ class Orders:
         self.heard_ns = NEVER_HEARD_NS
         self._stop_heard = self._disarm_heard = False
         self._arm_edge = self._reset_edge = False
+        self._retuning = _NOTHING
 
     def accept(self, frame: Frame) -> OperatorCommand | None:
         """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
@@ -74,9 +79,16 @@ class Orders:
     def obey(self, order: OperatorCommand, now_ns: int) -> None:
         """Take an accepted message."""
         before = self.last
-        if before is not None and now_ns - self.heard_ns <= self._gap_ns:
-            self._arm_edge |= order.arm and not before.arm
-            self._reset_edge |= order.reset and not before.reset
+        if before is None or now_ns - self.heard_ns > self._gap_ns:
+            before = order
+        self._arm_edge |= order.arm and not before.arm
+        self._reset_edge |= order.reset and not before.reset
+        retune, undo, forbidden = self._retuning
+        self._retuning = RetuningOrder(
+            retune or (order.retune and not before.retune),
+            undo or (order.undo and not before.undo),
+            forbidden or order.forbid_retuning,
+        )
         self.last, self.heard_ns = order, now_ns
         asked = order.mode_request
         self.requested_mode = Mode.STANDBY if asked is None else asked
@@ -92,3 +104,11 @@ class Orders:
         )
         self._stop_heard = self._disarm_heard = self._arm_edge = self._reset_edge = False
         return wishes
+
+    def take_retuning(self) -> RetuningOrder:
+        """Return what was ordered of the retuning since the last call, a sample of the law ago."""
+        order, last = self._retuning, self.last
+        self._retuning = _NOTHING
+        if last is not None and last.forbid_retuning:
+            return order._replace(forbidden=True)
+        return order
