@@ -215,6 +215,10 @@ class ControllerNode:
         """Take one frame from the bus."""
         self.inbox.receive(frame, now_ns)
 
+    def other_frames(self, count: int) -> None:
+        """Take note of frames of other kinds on the bus."""
+        self.inbox.frames += count
+
     def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
         """Take note that the bus could not be read or written."""
         self._observer.link_error(now_ns)

@@ -68,7 +68,7 @@ class Inbox:
     address_conflict : bool
         Somebody else sends with the controller's address.
     frames : int
-        Frames heard so far, good and bad.
+        Frames heard so far, good and bad, of any kind.
     """
 
     def __init__(self, catalogue: Catalogue, configuration_version: int) -> None:
