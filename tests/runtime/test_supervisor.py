@@ -165,6 +165,48 @@ def test_reset_needs_the_cause_gone_and_does_not_arm() -> None:
         assert bench.tick(**ACTIVE).demand is not Demand.CONTROL
 
 
+@pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
+def test_reset_is_refused_with_its_reason_while_any_cause_lasts(
+    fault: Fault, reaction: Reaction, sign: dict[str, object]
+) -> None:
+    for first in ({"link_lost": True}, sign):
+        bench = armed_bench()
+        bench.tick(**{**ACTIVE, **first})
+        latched = bench.supervisor.fault
+        for _ in range(101):
+            bench.tick(**sign)
+        assert bench.supervisor.reset_refused_by is Fault.NONE
+        bench.tick(**sign, reset_edge=True)
+        for _ in range(60):
+            bench.tick(**sign)
+        supervisor = bench.supervisor
+        assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, latched)
+        assert supervisor.reset_refused_by is fault
+        for _ in range(60):  # the refusal is not taken back when the cause goes
+            assert bench.tick().mode is Mode.FAULT
+        assert bench.tick(reset_edge=True).mode is Mode.STANDBY
+        assert supervisor.reset_refused_by is Fault.NONE
+
+
+def test_old_levels_that_only_halve_the_pressure_refuse_a_reset_too() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    for _ in range(60):
+        bench.tick(tank_age_ms=200, reset_edge=True)
+    assert bench.supervisor.mode is Mode.FAULT
+    assert bench.supervisor.fault is Fault.BUS_LOST
+
+
+def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault() -> None:
+    for ticks, mode in ((45, Mode.STANDBY), (55, Mode.FAULT)):
+        bench = armed_bench()
+        bench.tick(**{**ACTIVE, "drive_fault": True})
+        bench.tick(drive_fault=True, reset_edge=True)
+        for _ in range(ticks):
+            bench.tick(drive_fault=True)
+        assert bench.tick().mode is mode
+
+
 def test_arm_bit_held_since_before_the_start_never_arms() -> None:
     bench = Bench()
     for _ in range(50):

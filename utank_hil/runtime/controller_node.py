@@ -294,8 +294,8 @@ class ControllerNode:
         # in charge nothing but disarming and arming again brings back a law that has ended
         if anew and (seen.arm_edge or seen.reset_edge) and self.supervisor.mode is not _ACTIVE:
             anew.reset()
-        if self._law_raised and seen.reset_edge:
-            self._law_raised = False
+        if self._law_failed and seen.reset_edge:
+            self._law_failed = self._law_raised = False
             self._controller.reset()
 
     def _answer(self, now_ns: int) -> float:

@@ -21,6 +21,8 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 _ACTIVE: Final = Mode.ACTIVE
 DISARMED_ZERO_WITHIN_MS: Final = 1000
 """When the pressure is cut after disarming, even if the ramp has not come to its end."""
+RESET_WITHIN_MS: Final = 500
+"""How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
 _NEVER_NS: Final = 1 << 62
 
 
@@ -39,13 +41,15 @@ class Supervisor:
     ----------
     mode : Mode
     fault : Fault
-        Why the mode is FAULT (latched); in INIT, what is still missing; else NONE, or why the last
-        arming was refused.
+        Why the mode is FAULT (latched until reset); in INIT, what is still missing; else NONE, or
+        why the last arming was refused.
     demand : Demand
     drive_wanted : bool
         Whether the drive should be in operation enabled.
     degraded : bool
         Whether only half the pressure is allowed.
+    reset_refused_by : Fault
+        What lasts, in FAULT after a reset was refused; else NONE.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -55,7 +59,9 @@ class Supervisor:
         self.demand = Demand.ZERO
         self.drive_wanted = False
         self.degraded = False
+        self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
+        self._reset_until_ns: int | None = None
         self._drive_enabled_ns = 0
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
@@ -97,12 +103,19 @@ class Supervisor:
             ):
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
-        if (
-            seen.reset_edge
-            and self.demand is Demand.ZERO
-            and not judging.first_awaited(seen, self._limits)
-        ):
+        if seen.reset_edge and self.demand is Demand.ZERO:
+            self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
+        if self._reset_until_ns is not None:
+            self._continue_reset(seen, now_ns, self._reset_until_ns)
+
+    def _continue_reset(self, seen: Observations, now_ns: int, until_ns: int) -> None:
+        seen.drive_out_ms = 0.0  # off, as it should be
+        lasts = judging.first_lasting(seen, self._limits)
+        if lasts is None:
             self._disarm(Mode.STANDBY)
+        elif now_ns >= until_ns:
+            self._reset_until_ns = None
+            self.reset_refused_by = lasts[0]
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
         if self.mode is Mode.PASSIVE and seen.command_pa != 0.0:
@@ -174,6 +187,8 @@ class Supervisor:
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
         self._zero_at_ns = _NEVER_NS
+        self._reset_until_ns = None
+        self.reset_refused_by = Fault.NONE
 
     def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
         self.mode = Mode.FAULT
