@@ -117,6 +117,9 @@ class PumpDrive:
         self._moving_ns = 0
         self._echo: int | None = None
         self._setpoint_pa = 0.0
+        # frames come with jitter, the set-point only every cycle: a tick of grace in all
+        self._grace_pa = limits.pressure_rate_pa_s * self.period_ns * NANOSECONDS
+        self._credit_pa = self._grace_pa
         self._refused_in_a_row = 0
         self._shown_state = self._states.state
         self._ticks = 0
@@ -128,6 +131,10 @@ class PumpDrive:
             return
         command = self._commands.accept(frame)
         if command is None:
+            # out of sequence it may ask for nothing, but it may say stop
+            intact = self._commands.intact(frame)
+            if intact is not None and intact.control_word in _STOP_WORDS:
+                self._states.command(intact.control_word)
             return
         if not self._permitted(command, now_ns):
             if command.control_word in _STOP_WORDS:
@@ -139,6 +146,8 @@ class PumpDrive:
                 self._states.trip(DriveFault.COMMAND_REFUSED)
             return
         self._refused_in_a_row = 0
+        left_pa = self._reach_pa(now_ns) - self._step_away_pa(command.pressure_pa)
+        self._credit_pa = min(left_pa, self._grace_pa)
         self._accepted_ns = now_ns
         self._timeout_ns = round(command.timeout_s / NANOSECONDS)
         self._echo = self._commands.counter
@@ -153,13 +162,20 @@ class PumpDrive:
             return False
         if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
             return False
-        toward_zero = abs(pressure_pa) <= abs(self._setpoint_pa) and (
-            pressure_pa * self._setpoint_pa >= 0.0
-        )
-        # a tick of grace: frames come with jitter, the set-point only every cycle
-        elapsed_s = (now_ns - self._accepted_ns + self.period_ns) * NANOSECONDS
-        step_pa = abs(pressure_pa - self._setpoint_pa)
-        return toward_zero or step_pa <= limits.pressure_rate_pa_s * elapsed_s
+        step_pa = self._step_away_pa(pressure_pa)
+        # both ends of a step may have been rounded away from where they were
+        return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA
+
+    def _step_away_pa(self, pressure_pa: float) -> float:
+        """Step from the set-point, 0 if it is one toward zero."""
+        setpoint_pa = self._setpoint_pa
+        toward_zero = abs(pressure_pa) <= abs(setpoint_pa) and pressure_pa * setpoint_pa >= 0.0
+        return 0.0 if toward_zero else abs(pressure_pa - setpoint_pa)
+
+    def _reach_pa(self, now_ns: int) -> float:
+        """Farthest step that the time since the last command and the grace that is left allow."""
+        since_s = (now_ns - self._accepted_ns) * NANOSECONDS
+        return self._limits.pressure_rate_pa_s * since_s + self._credit_pa
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Watch over the commands, drive the pump, report."""

@@ -69,8 +69,10 @@ def message(**changes):
     return can.Message(**(values | changes))
 
 
-def error_frame(classes):
-    return can.Message(arbitration_id=classes, is_extended_id=False, is_error_frame=True, data=[0])
+def error_frame(classes, detail=0):
+    return can.Message(
+        arbitration_id=classes, is_extended_id=False, is_error_frame=True, data=[0, detail]
+    )
 
 
 def failure(number):
@@ -115,7 +117,12 @@ def test_the_kernel_filters_only_when_asked(buses):
 
 @pytest.mark.parametrize(
     ("classes", "meaning"),
-    [(0x040, "bus-off"), (0x020, "no node acknowledges"), (0x001, "transmit timeout")],
+    [
+        (0x040, "bus-off"),
+        (0x020, "no node acknowledges"),
+        (0x010, "transceiver fault"),
+        (0x001, "transmit timeout"),
+    ],
 )
 def test_error_frames_that_say_nothing_gets_through_are_port_errors(buses, classes, meaning):
     port = SocketCanPort("can0")
@@ -123,6 +130,47 @@ def test_error_frames_that_say_nothing_gets_through_are_port_errors(buses, class
     with pytest.raises(PortError, match=f"can0: {meaning}; check wiring"):
         port.receive()
     assert port.error_frames == 1
+
+
+@pytest.mark.parametrize(
+    ("detail", "meaning"),
+    [
+        (0x01, "receive buffer overflow"),
+        (0x02, "transmit buffer overflow"),
+        (0x10, "error-passive on receiving"),
+        (0x20, "error-passive on sending"),
+    ],
+)
+def test_problems_of_the_controller_that_lose_frames_are_port_errors(buses, detail, meaning):
+    port = SocketCanPort("can0")
+    buses[0].script = [error_frame(0x004, detail)]
+    with pytest.raises(PortError, match=f"can0: {meaning}"):
+        port.receive()
+    for warning in (error_frame(0x004, 0x04), error_frame(0x004, 0x08), error_frame(0x004, 0x40)):
+        buses[0].script = [warning]
+        assert list(port.receive()) == []
+    assert port.others == 4
+
+
+@pytest.mark.parametrize("wrong", [error_frame(0x040), failure(errno.EIO)])
+def test_frames_that_came_with_an_error_are_not_lost(buses, wrong):
+    port = SocketCanPort("can0")
+    buses[0].script = [message(), wrong, message()]
+    before = list(port.receive())
+    with pytest.raises(PortError):
+        port.receive()
+    assert before + list(port.receive()) == [FRAME, FRAME]
+    assert list(port.receive()) == []
+
+
+def test_a_flood_of_error_frames_does_not_hold_frames_back(buses):
+    port = SocketCanPort("can0")
+    buses[0].script = [*(error_frame(0x040) for _ in range(100)), message()]
+    assert list(port.receive()) == [FRAME]
+    with pytest.raises(PortError, match="bus-off"):
+        port.receive()
+    assert list(port.receive()) == []
+    assert port.error_frames == 100
 
 
 def test_a_down_interface_is_reported_until_something_works_again(buses):

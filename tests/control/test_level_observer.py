@@ -55,6 +55,41 @@ def test_gauge_noise_hardly_reaches_the_rate():
     assert np.std((noisy - quiet)[500:, 1]) < 0.02
 
 
+@pytest.mark.parametrize("lost_of", [2, 3, 4, 5, 10])
+@pytest.mark.parametrize("told", [False, True])
+def test_rate_is_right_though_measurements_are_lost(lost_of, told):
+    record = swing(60, 0.25)
+    observer, found, pressure, periods = LevelObserver(TANK, PERIOD_S), [], 0.0, 0
+    for k, (level, _, now) in enumerate(record):
+        periods += 1
+        if k % lost_of:  # all but one are lost
+            if told:
+                observer.predict(pressure)
+        else:
+            observer.update(level, pressure, periods)
+            periods = 0
+        pressure = now
+        found.append((observer.level_m, observer.rate_m_s))
+    error = np.array(found) - record[:, :2]
+    if not told:  # looked at when a measurement has come
+        error = error[::lost_of]
+    error = error[len(error) // 2 :]
+    assert np.std(error[:, 1]) < 0.13 * np.std(record[:, 1])
+    assert np.std(error[:, 0]) < 0.03
+
+
+def test_starts_anew_at_the_level_after_a_second_without_measurements():
+    observer = LevelObserver(TANK, PERIOD_S)
+    for level in np.linspace(0, 1, 50):
+        observer.update(level, 0.0)
+    assert observer.rate_m_s > 0.5
+    while observer.next_due_s < np.inf:
+        observer.predict(0.0)
+    observer.update(-1.0, 0.0, 51)
+    assert (observer.level_m, observer.rate_m_s) == (-1.0, 0.0)
+    assert observer.next_due_s == PERIOD_S
+
+
 def test_bad_settings_are_refused():
     with pytest.raises(ValueError, match="must be positive"):
         LevelObserver(TANK, 0.0)

@@ -163,6 +163,86 @@ def test_a_word_that_says_stop_stops_whatever_pressure_came_with_it(word: Contro
     assert bench.drive.refused == 1
 
 
+@pytest.mark.parametrize("lost", [3, 4, 12])
+@pytest.mark.parametrize("word", [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE])
+def test_a_stop_out_of_sequence_is_heard_and_an_enable_is_not(lost: int, word: ControlWord) -> None:
+    bench = armed(20e3)
+    for _ in range(lost):
+        bench.commands.frame(PumpCommand(20e3, ControlWord.ENABLE_OPERATION, 0.05))
+    bench.command(20e3, word)
+    bench.tick()
+    assert bench.told.state is not DriveState.OPERATION_ENABLED
+    bench = DriveBench()
+    bench.enable()
+    echo = bench.told.command_echo
+    for _ in range(4):
+        bench.commands.frame(PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05))
+    bench.command(2000.0)
+    bench.ticks(2)
+    assert bench.told.command_echo == echo
+
+
+RATE_PA_S = DriveLimits().pressure_rate_pa_s
+
+
+@given(st.lists(st.tuples(st.integers(0, 25), st.floats(-1e3, 5e3)), max_size=60))
+def test_set_point_never_moves_faster_than_the_rate_and_a_tick_in_all(
+    frames: list[tuple[int, float]],
+) -> None:
+    bench = DriveBench()
+    bench.enable()
+    bench.command(0.0)
+    taken = [(bench.now_ns, 0.0)]
+    for later_ms, step_pa in frames:
+        bench.now_ns += later_ms * MS
+        pressure_pa = 8.0 * round((taken[-1][1] + step_pa) / 8.0)
+        bench.command(pressure_pa)
+        if not bench.drive.refused:
+            taken.append((bench.now_ns, pressure_pa))
+        bench.drive.refused = 0
+    for at, (begin_ns, begin_pa) in enumerate(taken):
+        for end_ns, end_pa in taken[at:]:
+            free_pa = abs(begin_pa)  # down to zero it may step
+            allowed_pa = RATE_PA_S * (end_ns - begin_ns + TICK_NS) * 1e-9 + 8.0
+            assert abs(end_pa - begin_pa) <= free_pa + allowed_pa + 1e-6
+            if begin_pa * end_pa >= 0:
+                assert abs(end_pa) - abs(begin_pa) <= allowed_pa + 1e-6
+
+
+def test_many_frames_in_a_moment_have_one_tick_of_grace_together() -> None:
+    bench = DriveBench()
+    bench.enable()
+    bench.command(0.0)
+    for pressure_pa in range(0, 48_000, 2400):
+        bench.command(pressure_pa)
+    assert bench.drive.refused > 0
+    bench.tick()
+    bench.tick()
+    bench.command(0.0)
+    for step in range(1, 20):
+        bench.now_ns += MS
+        bench.command(2400.0 * step)
+    assert bench.drive.refused > 15
+
+
+@given(st.lists(st.integers(0, 10), min_size=20, max_size=80), st.integers(0, 20))
+def test_a_ramp_at_the_drives_own_limit_is_never_refused_for_jitter(
+    late_ms: list[int], hold: int
+) -> None:
+    bench = DriveBench(DriveLimits(pressure_rate_pa_s=100_123.0))
+    bench.enable()
+    bench.command(0.0)
+    sent_ns = bench.now_ns
+    asked_pa, step_pa = 0.0, 100_123.0 * 0.02
+    for index, late in enumerate(late_ms):
+        sent_ns += 20 * MS
+        if index >= hold:
+            asked_pa = step_pa * ((index - hold) % 24)  # down at once, and up again
+        bench.now_ns = sent_ns + late * MS
+        bench.command(asked_pa)
+    assert bench.drive.refused == 0
+
+
 def test_steps_toward_zero_are_never_refused() -> None:
     bench = armed(40e3)
     bench.command(1e3)

@@ -13,6 +13,7 @@ from utank_hil.retuning import (
     Answer,
     Candidate,
     ModelSummary,
+    RetuningOrder,
     RetuningSettings,
 )
 
@@ -85,6 +86,7 @@ class Rig:
         self.command_pa = 0.0
         self.commands: list[float] = []
         self.order = QUIET
+        self._before: OperatorCommand | None = None
         self.engaged = self.fresh = True
 
     def run(self, samples: int) -> None:
@@ -92,8 +94,15 @@ class Rig:
             controller = self.controller
             if self.samples:
                 controller.applied(np.array([self.command_pa]))
+            order, before = self.order, self._before or self.order
+            self._before = order
+            pressed = RetuningOrder(
+                order.retune and not before.retune,
+                order.undo and not before.undo,
+                order.forbid_retuning,
+            )
             controller.update(
-                self.samples * SAMPLE_NS, self.order, engaged=self.engaged, fresh=self.fresh
+                self.samples * SAMPLE_NS, pressed, engaged=self.engaged, fresh=self.fresh
             )
             y = np.array([self.roll(self.samples, self.command_pa)])
             self.command_pa = float(controller.step(y)[0])

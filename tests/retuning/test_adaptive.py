@@ -17,6 +17,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX
 from utank_hil.retuning import Candidate, Refusal
+from utank_hil.retuning.adaptive import TRIAL_PATIENCE
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_bank import FADE_SAMPLES
 
@@ -199,3 +200,33 @@ def test_model_as_long_as_what_is_kept_is_taken_and_watched() -> None:
     rig.run_until(RETUNED)
     rig.run(3 * KEPT)
     assert rig.controller.laws.accepted.monitor.change >= 1.0
+
+
+@pytest.mark.parametrize("fresh_of", [0, 3, 10])
+def test_a_trial_that_can_not_be_judged_ends_in_half_as_long_again(fresh_of: int) -> None:
+    rig = Rig(ToyRetuner(candidate_of(-3e5)))  # the roll would say that it is worse
+    rig.run(300)
+    rig.press(retune=True)
+    rig.run_until(TRIAL)
+    begin = rig.samples
+    rig.roll = lambda k, u: 0.25 * np.sin(0.1 * k) if rig.fresh else 0.02 * np.sin(0.1 * k)
+    while rig.controller.state is TRIAL:
+        rig.fresh = fresh_of > 0 and rig.samples % fresh_of == 0
+        rig.run(1)
+        assert (rig.samples - begin) * SAMPLE_TIME_S <= TRIAL_PATIENCE * SETTINGS.trial_s + 1
+    assert rig.controller.state is REFUSED
+    assert "could not be judged" in rig.reasons
+    assert rig.controller.laws.on_trial is None
+
+
+def test_roll_above_its_limit_ends_an_identification_though_the_tanks_levels_are_old() -> None:
+    rig = Rig(ToyRetuner())
+    rig.run(300)
+    rig.press(retune=True)
+    rig.fresh = False
+    rig.run(10)
+    assert rig.controller.state is IDENTIFY
+    rig.roll = lambda k, u: 0.31
+    rig.run(2)
+    assert rig.controller.state is REFUSED
+    assert "roll is above" in rig.reasons

@@ -1,12 +1,22 @@
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from retuning_toys import candidate_of, law_of
+from retuning_toys import SUMMARY, Rig, ToyRetuner, candidate_of, law_of
 
+from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
+from utank_hil.dynamics.linear import STATES
 from utank_hil.retuning import Candidate, Refusal
-from utank_hil.retuning.answer import answer_bytes, read_answer
+from utank_hil.retuning.admission import Admission, WarmUp
+from utank_hil.retuning.admission import _candidate_gains as admission_gains
+from utank_hil.retuning.admission import _gains as gains_of
+from utank_hil.retuning.answer import LONGEST_BYTES, answer_bytes, read_answer
+from utank_hil.retuning.history import SampleHistory
 
 
 @pytest.mark.parametrize("washout_rad_s", [0.0, 0.02])
@@ -40,6 +50,91 @@ def test_nonsense_is_refused(data: bytes) -> None:
         except ValueError:
             continue
         assert isinstance(answer, Refusal)
+
+
+def law_of_size(order: int, horizon: int, outputs: int, gain: float = 0.0) -> Candidate:
+    law = PredictiveLaw(
+        np.full((order, 1, 1), gain),
+        np.full((order, 1, outputs), gain),
+        np.full((horizon, 1, outputs), gain),
+        0.2,
+    )
+    model = ARX(
+        np.full((order, outputs, outputs), gain), np.full((order + 1, outputs, 1), gain), 0.2
+    )
+    return Candidate(law, 0.02, model, SUMMARY)
+
+
+def test_the_largest_answer_that_a_configuration_can_ask_for_fits_its_mailbox() -> None:
+    whole = answer_bytes(law_of_size(MOST_ORDER, MOST_SAMPLES, len(STATES)))
+    assert len(whole) == LONGEST_BYTES
+    assert isinstance(read_answer(whole), Candidate)
+
+
+@pytest.mark.parametrize(
+    "size", [(MOST_ORDER + 1, 5, 1), (5, MOST_SAMPLES + 1, 1), (5, 5, len(STATES) + 1)]
+)
+def test_a_larger_law_is_refused(size: tuple[int, int, int]) -> None:
+    with pytest.raises(ValueError, match="a dimension of"):
+        read_answer(answer_bytes(law_of_size(*size)))
+
+
+@pytest.mark.parametrize("character", ["x", "\n", "é"])
+def test_a_long_refusal_is_cut(character: str) -> None:
+    refusal = read_answer(b"REFUSAL " + (character * (1 << 20)).encode())
+    assert isinstance(refusal, Refusal)
+    assert len("".join(refusal.reasons)) <= 4000
+    assert len(refusal.reasons) <= 20
+
+
+@pytest.mark.parametrize("washout_rad_s", [0.0, 0.02, 1e308])
+def test_admission_of_the_largest_law_allocates_no_square_of_its_order(
+    washout_rad_s: float,
+) -> None:
+    outputs = 2
+    candidate = replace(
+        law_of_size(MOST_ORDER, MOST_SAMPLES, outputs, 1e-3), washout_rad_s=washout_rad_s
+    )
+    configured, history = law_of(1e5, outputs=outputs), SampleHistory(1000, outputs)
+    admission = Admission(configured, history, 0)
+    tracemalloc.start()
+    try:
+        warm_up = admission.admit(candidate)
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert isinstance(warm_up, WarmUp)
+    assert peak_bytes < MOST_ORDER**2
+
+
+@given(st.data())
+def test_gains_are_those_of_the_whole_laws_matrices(data: st.DataObject) -> None:
+    outputs = data.draw(st.integers(1, 2))
+    gain = data.draw(st.floats(-1e6, 1e6))
+    washout_rad_s = data.draw(st.sampled_from([0.0, 0.02, 3.0]))
+    candidate = candidate_of(gain, washout_rad_s, order=7, outputs=outputs)
+    whole = candidate.whole_law()
+    assert admission_gains(candidate.law, whole) == pytest.approx(gains_of(whole), rel=1e-12)
+
+
+extreme = st.sampled_from([0.0, -1.0, 1e-308, -5e-324, 1e9, -1e200, 1.7e308, -1.7e308])
+
+
+@given(st.data())
+def test_no_answer_of_finite_numbers_makes_a_warning_in_the_loop(data: st.DataObject) -> None:
+    whole = bytearray(answer_bytes(candidate_of(1e5, 0.02)))
+    numbers = np.frombuffer(whole, offset=8)
+    for _ in range(data.draw(st.integers(1, 3))):
+        begin = data.draw(st.integers(5, len(numbers) - 1))
+        numbers[begin : begin + data.draw(st.integers(1, 6))] = data.draw(extreme)
+    try:
+        answer = read_answer(bytes(whole))
+    except ValueError as error:
+        answer = Refusal((str(error),))
+    rig = Rig(ToyRetuner(answer))
+    rig.run(200)
+    rig.press(retune=True)  # numpy's warnings are errors in these tests
+    rig.run(300)
 
 
 @given(st.data())

@@ -66,6 +66,15 @@ def test_on_schedule_it_begins_by_itself_and_again_so_long_after_the_end() -> No
     assert (rig.samples - ended) * SAMPLE_TIME_S == pytest.approx(60.0, abs=0.5)
 
 
+def test_a_dead_retuner_is_looked_at_every_ten_minutes_however_short_the_schedule() -> None:
+    rig = Rig(ToyRetuner(alive=False), replace(SETTINGS, every_s=0.5))
+    rig.run(round(3600 / SAMPLE_TIME_S))
+    assert len(states(rig)) == 6
+    assert set(states(rig)) == {REFUSED}
+    rig.press(retune=True)  # an order is answered at once all the same
+    assert len(states(rig)) == 7
+
+
 def test_changed_ship_is_noticed_and_a_higher_sea_is_not() -> None:
     def roll(k: int, u: float) -> float:
         # at first a wave of one period, then twice as high, then of half the period

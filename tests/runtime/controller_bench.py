@@ -89,10 +89,11 @@ class ControllerBench:
     ) -> None:
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
+        self.level = LevelObserver(VESSEL.tank, 2 * TICK_S)
         self.node = ControllerNode(
             self.law,
             measure_of(("roll_rad", "level_m")),
-            LevelObserver(VESSEL.tank, 2 * TICK_S),
+            self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
             ControllerSettings(configuration_version=VERSION),
@@ -151,6 +152,10 @@ class ControllerBench:
         """Change what the panel sends from now on; it sends at once on a change."""
         self.order = self.order._replace(**changes)  # type: ignore[arg-type]
         self._send(OperatorCommand, self.order)
+
+    def restart_panel(self) -> None:
+        """The panel's counter begins anew."""
+        self._senders[OperatorCommand] = CATALOGUE.transmitter(OperatorCommand)
 
     def send(self, frame: Frame) -> None:
         """Let the node hear one frame, now."""

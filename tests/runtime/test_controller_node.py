@@ -12,6 +12,7 @@ from controller_bench import (
     ControllerBench,
     ToyLaw,
 )
+from toy_nodes import FakeClock, ToyPort
 
 from utank_hil.canbus import (
     Address,
@@ -28,6 +29,7 @@ from utank_hil.canbus import (
     SensorMotion,
     SensorPump,
 )
+from utank_hil.runtime import RealTimeLoop
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.tick import TICK_NS
@@ -200,6 +202,21 @@ def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
         bench.tick(late_ticks=1)
     heard_and_said = 285 / 2 + 70
     assert bench.column("bus_load")[-1] == pytest.approx(heard_and_said * 143 / 250e3, rel=0.02)
+
+
+def test_frames_of_other_kinds_load_the_bus() -> None:
+    bench = ControllerBench(START_NS)
+    port = ToyPort()
+    loop = RealTimeLoop([bench.node], port, clock=FakeClock())
+
+    def stop() -> bool:
+        port.others += 16  # 1600 a second
+        port.receive_fails = loop.statistics.ticks % 2 == 1  # counted all the same
+        return loop.statistics.ticks > 250
+
+    loop.run(stop)
+    assert bench.node.seen.bus_load > 0.9
+    assert loop.statistics.others_received == port.others - 16
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 import math
 from collections.abc import Iterable
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ TIMES = {
     SensorTank: "tank_ns",
     SensorPump: "pump_ns",
     DriveStatus1: "drive_ns",
-    OperatorCommand: "panel_ns",
+    OperatorCommand: "orders.heard_ns",
 }
 # what a law may measure: attribute of the emulated ship, and how far noise and delay may be off it
 TRUE = {
@@ -84,8 +85,18 @@ class Line:
 
     def content(self) -> dict[str, object]:
         """Everything that the inbox shows but the count of frames."""
-        shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {"frames"}
-        return {name: getattr(self.inbox, name) for name in shown | {"level_m"}}
+        shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {
+            "frames",
+            "orders",
+        }
+        return {
+            **{name: getattr(self.inbox, name) for name in shown | {"level_m"}},
+            **{
+                name: value
+                for name, value in vars(self.inbox.orders).items()
+                if name != "_receiver"
+            },
+        }
 
 
 def test_good_frames_are_kept_with_the_time_they_came() -> None:
@@ -99,9 +110,9 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert inbox.pressure_pa == 8e3
     assert inbox.power_w == pytest.approx(20e3)
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
-    assert inbox.requested_mode is Mode.ACTIVE
+    assert inbox.orders.requested_mode is Mode.ACTIVE
     came_ns = {kind: 1010 + 10 * index for index, kind in enumerate(GOOD)}
-    assert {kind: getattr(inbox, name) for kind, name in TIMES.items()} == {
+    assert {kind: attrgetter(name)(inbox) for kind, name in TIMES.items()} == {
         kind: came_ns[kind] for kind in TIMES
     }
     assert inbox.echo_ns == inbox.drive_ns
@@ -229,9 +240,9 @@ def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
     line = Line()
-    assert line.inbox.requested_mode is Mode.STANDBY
+    assert line.inbox.orders.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
-    assert line.inbox.requested_mode is Mode.STANDBY
+    assert line.inbox.orders.requested_mode is Mode.STANDBY
 
 
 class Listener:

@@ -93,19 +93,64 @@ def test_buttons_of_an_armed_panel(action: Action, mode: Mode, armed: bool) -> N
     assert table.last.reset == (action is Action.RESET)
 
 
-@pytest.mark.parametrize(("action", "bit"), [(Action.STOP, "stop"), (Action.RESET, "reset")])
-def test_edge_button_is_held_for_half_a_second_and_then_let_go(action: Action, bit: str) -> None:
+def test_edge_button_is_held_for_half_a_second_and_then_let_go() -> None:
     table = Table()
     table.run(3)
-    table.panel.press(action)
+    table.panel.press(Action.RESET)
     pressed_ms = (table.now_ns - START_NS) / MS
     table.run(20)
-    held = [time_ms for time_ms, command in table.heard if getattr(command, bit)]
+    held = [time_ms for time_ms, command in table.heard if command.reset]
     assert held[0] == pressed_ms
     assert held[-1] - pressed_ms < 500
     assert len(held) >= 3  # so that two may be lost
     let_go = next(time_ms for time_ms, command in table.heard if time_ms > held[-1])
     assert let_go - pressed_ms <= 500
+
+
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.FAULT, Mode.INIT])
+def test_stop_is_held_until_the_controller_answers_it(mode: Mode) -> None:
+    table = Table()
+    table.panel.press(Action.ARM)
+    table.run(3)
+    table.panel.press(Action.STOP)
+    table.run(1)
+    table.hear(mode)  # sent before the stop was heard
+    table.run(100)
+    assert table.last.stop
+    for unanswered in (Mode.ACTIVE, Mode.PASSIVE):
+        table.hear(unanswered)
+        table.run(2)
+        assert table.last.stop
+    table.hear(mode)
+    table.run(1)
+    assert not table.last.stop
+
+
+def test_stop_is_held_for_half_a_second_though_it_is_answered() -> None:
+    table = Table()
+    table.run(1)
+    table.panel.press(Action.STOP)
+    for _ in range(5):
+        table.tick()
+        table.hear(Mode.STANDBY)
+        assert table.last.stop
+    table.hear(Mode.STANDBY)
+    table.tick()
+    assert not table.last.stop
+
+
+def test_arm_is_refused_while_stop_is_held() -> None:
+    table = Table()
+    table.panel.press(Action.STOP)
+    table.run(3)
+    table.panel.press(Action.ARM)
+    table.run(20)
+    table.hear(Mode.STANDBY)
+    table.run(20)
+    assert not any(command.arm for _, command in table.heard)
+    table.panel.press(Action.ARM)
+    table.run(1)
+    assert table.last.arm
 
 
 @pytest.mark.parametrize("late_ticks", [0, 7])

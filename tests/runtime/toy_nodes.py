@@ -69,6 +69,7 @@ class ToyPort:
         self.arriving: list[Frame] = []
         self.send_fails = False
         self.receive_fails = False
+        self.others = 0
 
     def send(self, frame: Frame) -> None:
         if self.send_fails:

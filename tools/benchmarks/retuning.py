@@ -27,12 +27,12 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
-from utank_hil.canbus import Mode, OperatorCommand, RetuningState
+from utank_hil.canbus import RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import PredictiveDesign, wave_arx
 from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import sample
-from utank_hil.retuning import AdaptiveController, RetunerProcess, make_pulses
+from utank_hil.retuning import AdaptiveController, RetunerProcess, RetuningOrder, make_pulses
 from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
@@ -133,13 +133,12 @@ def retune_once(config: ControllerConfig, times: dict[str, list[float]]) -> None
             retuner,
         )
         ship = _Rolling(config)
-        order = OperatorCommand(Mode.ACTIVE, True, False, False, False)
         handed_over = 0.0
         for k in range(round((settings.identification_s + 2 * settings.trial_s) / period_s)):
             before, candidate = controller.state, controller.candidate
             if before is RetuningState.DESIGN and candidate is None:
                 time.sleep(period_s)  # the other process works in true time
-            pressed = order._replace(retune=k == BEGUN)
+            pressed = RetuningOrder(retune=k == BEGUN)
             start = time.perf_counter()
             controller.update(round(k * period_s * SECOND_NS), pressed, engaged=True, fresh=True)
             middle = time.perf_counter()

@@ -124,6 +124,13 @@ class Receiver(Generic[T]):
             return message
         return self._accept_out_of_step(message, counter)
 
+    def intact(self, frame: Frame) -> T | None:
+        """Return the message of a frame that is whole, whatever its counter; nothing changes.
+
+        For what must act even out of sequence, as a stop.
+        """
+        return self._decode(frame.data) if len(frame.data) == FRAME_BYTES else None
+
     def _accept_out_of_step(self, message: T, counter: int) -> T | None:
         following = (counter + 1) & _COUNTER_MASK
         if not self._protected:

@@ -13,6 +13,10 @@ class PortError(OSError):
 class Port(Protocol):
     """A bus as seen by a runner; never blocks."""
 
+    @property
+    def others(self) -> int:
+        """What was received so far and is no `Frame`: it loads the bus all the same."""
+
     def send(self, frame: Frame) -> None:
         """Queue one frame for transmission.
 

@@ -34,8 +34,17 @@ _REMEDIES: Final = {
 #: Error classes of <linux/can/error.h> after which no frame is transmitted.
 _ERROR_CLASSES: Final = {
     0x001: "transmit timeout",
+    0x010: "transceiver fault",
     0x020: "no node acknowledges",
     0x040: "bus-off",
+}
+_CONTROLLER_PROBLEM: Final = 0x004
+# their details, in the second data byte; a warning level (0x04, 0x08) is counted only
+_CONTROLLER_PROBLEMS: Final = {
+    0x01: "receive buffer overflow",
+    0x02: "transmit buffer overflow",
+    0x10: "error-passive on receiving",
+    0x20: "error-passive on sending",
 }
 _CHECK_BUS: Final = "check wiring, termination and bit rate"
 
@@ -58,6 +67,8 @@ class SocketCanPort:
     ----------
     error_frames, standard_frames, remote_frames : int
         Received frames that are not a `Frame`: error frames, 11-bit identifiers, remote frames.
+    others : int
+        All of these.
 
     Raises
     ------
@@ -72,6 +83,7 @@ class SocketCanPort:
         self.remote_frames = 0
         self._can_ids = None if can_ids is None else tuple(can_ids)
         self._down = False
+        self._pending: PortError | None = None
         self._closed = False
         self._bus: can.BusABC | None = None
         self._open_bus()
@@ -89,32 +101,51 @@ class SocketCanPort:
     def receive(self) -> Sequence[Frame]:
         """Return received frames, at most `MAX_FRAMES_PER_CALL`; see `Port.receive`.
 
-        Frames read just before an error are lost.
+        An error is raised by the next call where frames came with it: one of them may say stop.
         """
+        if self._pending is not None:
+            pending, self._pending = self._pending, None
+            raise pending
+        frames, error = self._read()
+        if error is not None:
+            if not frames:
+                raise error
+            self._pending = error
+        elif frames:
+            self._down = False
+        elif self._down:
+            # the kernel reports it only once, and later reads look like a quiet bus
+            raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
+        return frames
+
+    @property
+    def others(self) -> int:
+        """Frames of all other kinds."""
+        return self.error_frames + self.standard_frames + self.remote_frames
+
+    def _read(self) -> tuple[list[Frame], PortError | None]:
+        """Frames, and the first error that came with them."""
         bus = self._open_bus()
         frames: list[Frame] = []
+        first: PortError | None = None
         for _ in range(MAX_FRAMES_PER_CALL):
             try:
                 # not recv(0), which uses the wall clock and blocks when that is set back
                 message, _filtered = bus._recv_internal(0)
             except (can.CanError, OSError) as error:
-                raise self._failure(error) from error
+                return frames, first or self._failure(error)
             if message is None:
                 break
             if message.is_error_frame:
-                self._take_error_frame(message.arbitration_id)
+                problem = self._problem(message)
+                first = first or problem
             elif message.is_remote_frame:
                 self.remote_frames += 1
             elif not message.is_extended_id:
                 self.standard_frames += 1
             else:
                 frames.append(Frame(message.arbitration_id, bytes(message.data)))
-        if frames:
-            self._down = False
-        elif self._down:
-            # the kernel reports it only once, and later reads look like a quiet bus
-            raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
-        return frames
+        return frames, first
 
     def close(self) -> None:
         """Release the socket; idempotent."""
@@ -150,11 +181,18 @@ class SocketCanPort:
                 raise self._failure(error) from error
         return self._bus
 
-    def _take_error_frame(self, classes: int) -> None:
+    def _problem(self, message: can.Message) -> PortError | None:
+        """Count an error frame; the error that it stands for, None if it only warns."""
         self.error_frames += 1
+        classes = message.arbitration_id
         for error_class, meaning in _ERROR_CLASSES.items():
             if classes & error_class:
-                raise self._port_error(meaning, _CHECK_BUS)
+                return self._port_error(meaning, _CHECK_BUS)
+        detail = message.data[1] if classes & _CONTROLLER_PROBLEM and len(message.data) > 1 else 0
+        for bit, meaning in _CONTROLLER_PROBLEMS.items():
+            if detail & bit:
+                return self._port_error(meaning, _CHECK_BUS)
+        return None
 
     def _failure(self, error: can.CanError | OSError) -> PortError:
         """Record what an error says about the interface, and convert it with its remedy."""

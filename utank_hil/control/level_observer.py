@@ -6,11 +6,18 @@ pump make most of the water's acceleration, so they are fed forward; what is lef
 the ship's push::
 
     h'' = (P - 2 rho g h - loss h') / (rho (2H + L At/Ap)) + unknown
+
+Where measurements are missing the model goes on alone, and the next one corrects for the whole time
+that has passed: with pole^n in the place of the pole, after n periods.
 """
 
 import math
+from typing import Final
 
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+
+LONGEST_GAP_S: Final = 1.0
+"""After a longer one the model says nothing any more: a fresh start at the measured level."""
 
 
 class LevelObserver:
@@ -47,22 +54,53 @@ class LevelObserver:
             )
         pole = math.exp(-bandwidth_rad_s * period_s)
         self._period_s = period_s
+        self._pole = pole
         self._alpha = 1.0 - pole**2
         self._beta = (1.0 - pole) ** 2
+        self._longest = round(LONGEST_GAP_S / period_s)
+        self._ahead = 0  # periods since the last measurement
         self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
         self._stiffness_pa_m = 2 * tank.density_kg_m3 * GRAVITY_M_S2
         self._loss_pa_s_m = tank.loss_pa_per_m_s
         self.level_m = 0.0
         self.rate_m_s = 0.0
 
-    def update(self, measured_m: float, pressure_pa: float) -> None:
-        """Take the next level and the pump's pressure since the last one."""
+    @property
+    def next_due_s(self) -> float:
+        """Time from the last measurement to the end of the period that comes next."""
+        return (self._ahead + 1) * self._period_s if self._ahead < self._longest else math.inf
+
+    def update(self, measured_m: float, pressure_pa: float, periods: int = 1) -> None:
+        """Take the next level and the pump's pressure since the last one.
+
+        Parameters
+        ----------
+        measured_m : float
+        pressure_pa : float
+        periods : int
+            Since the last measurement; more than one after a gap.
+        """
+        alpha, beta = self._alpha, self._beta
+        if periods > self._longest:
+            self.level_m, self.rate_m_s, self._ahead = measured_m, 0.0, 0
+            return
+        for _ in range(self._ahead, periods):
+            self.predict(pressure_pa)
+        self._ahead = 0
+        if periods > 1:
+            pole = self._pole**periods
+            alpha, beta = 1.0 - pole**2, (1.0 - pole) ** 2 / periods
+        surprise_m = measured_m - self.level_m
+        self.level_m += alpha * surprise_m
+        self.rate_m_s += beta / self._period_s * surprise_m
+
+    def predict(self, pressure_pa: float) -> None:
+        """Go on by a period without a measurement."""
         period_s = self._period_s
         push_pa = (
             pressure_pa - self._stiffness_pa_m * self.level_m - self._loss_pa_s_m * self.rate_m_s
         )
         gain_m_s = push_pa / self._inertia_pa_s2_m * period_s
-        predicted_m = self.level_m + (self.rate_m_s + gain_m_s / 2) * period_s
-        surprise_m = measured_m - predicted_m
-        self.level_m = predicted_m + self._alpha * surprise_m
-        self.rate_m_s += gain_m_s + self._beta / period_s * surprise_m
+        self.level_m += (self.rate_m_s + gain_m_s / 2) * period_s
+        self.rate_m_s += gain_m_s
+        self._ahead += 1

@@ -4,7 +4,7 @@ Exports what the controller's process needs. Identification and design (`redesig
 of their own and are not imported here.
 """
 
-from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
+from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent, RetuningOrder
 from utank_hil.retuning.answer import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.pulses import make_pulses
 from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner
@@ -21,6 +21,7 @@ __all__ = [
     "Retuner",
     "RetunerProcess",
     "RetuningEvent",
+    "RetuningOrder",
     "RetuningSettings",
     "SimulatedRetuner",
     "make_pulses",

@@ -14,7 +14,8 @@ machine between two steps. These are its states and all transitions:
     DESIGN     the accepted law       TRIAL      a candidate was admitted and is warmed up
                                       REFUSED    a refusal, no answer in time, or not admitted
     TRIAL      the law on trial       RETUNED    the trial is over: the law is accepted
-                                      REFUSED    worse, a command that is not finite, or `reset`
+                                      REFUSED    worse, a command that is not finite, `reset`, or
+                                                 not judged in half as long again
     any of the three                  IDLE       forbidden, or no longer engaged
                                       UNDONE     undo: from TRIAL back to the accepted law, from
                                                  the others to the one before it (IDLE if none)
@@ -26,12 +27,12 @@ The limits on pressure, rate, level and power apply to the sum of law and pulses
 """
 
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import OperatorCommand, RetuningState
+from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX, LinearLaw
 from utank_hil.retuning.admission import (
     WARM_UP_CHUNK,
@@ -49,10 +50,14 @@ from utank_hil.retuning.trial import MovingWindow, WindowStatistics, worsening
 
 EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is dropped before the end of the trial."""
+TRIAL_PATIENCE: Final = 1.5
+"""A trial that lasts so many times its length, for want of measurements, is given up."""
 MOST_TRIES: Final = 3
 """Identifications of one change of the ship; if all are refused, the new ship counts as normal."""
 RETRY_NS: Final = 600_000_000_000
-"""Least time from one retuning to the next because of a change, for the monitor to learn."""
+"""Least time from one retuning to the next because of a change, for the monitor to learn; and to
+the next without an order after the retuner was found dead.
+"""
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (
@@ -62,6 +67,22 @@ _NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 _BUSY: Final = (RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
 _IDENTIFY, _DESIGN, _TRIAL = _BUSY
+
+
+class RetuningOrder(NamedTuple):
+    """What the operator ordered since the last sample.
+
+    Attributes
+    ----------
+    retune, undo : bool
+        The button was pressed.
+    forbidden : bool
+        Retuning is forbidden, or was for a moment.
+    """
+
+    retune: bool = False
+    undo: bool = False
+    forbidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,23 +175,19 @@ class AdaptiveController:
         self._request_number = 0
         self._requested = False
         self._tries = 0
-        self._now_ns = self._submitted_ns = 0
+        self._now_ns = self._submitted_ns = self._trial_since_ns = self._not_before_ns = 0
         self._idle_since_ns: int | None = None
-        self._retune_bit = self._undo_bit = True  # a bit set at the start is no edge
         self._applied_pa = 0.0
         self._roll_rad = 0.0
         self._fresh = self._engaged = False
 
-    def update(
-        self, now_ns: int, order: OperatorCommand | None, *, engaged: bool, fresh: bool
-    ) -> None:
+    def update(self, now_ns: int, order: RetuningOrder, *, engaged: bool, fresh: bool) -> None:
         """Advance the state machine; call once before every `step`.
 
         Parameters
         ----------
         now_ns : int
-        order : OperatorCommand or None
-            State of the operator's buttons.
+        order : RetuningOrder
         engaged : bool
             Whether this controller's command drives the pump.
         fresh : bool
@@ -179,11 +196,7 @@ class AdaptiveController:
         self._now_ns, self._engaged, self._fresh = now_ns, engaged, fresh
         if self._idle_since_ns is None:
             self._idle_since_ns = now_ns
-        forbidden = order is not None and order.forbid_retuning
-        ordered = order is not None and order.retune and not self._retune_bit
-        undo = order is not None and order.undo and not self._undo_bit
-        if order is not None:
-            self._retune_bit, self._undo_bit = order.retune, order.undo
+        ordered, undo, forbidden = order
         if forbidden or undo or not engaged:
             self._requested = False
         if not engaged:
@@ -245,6 +258,7 @@ class AdaptiveController:
             return
         self._requested = False
         if not self._retuner.alive:
+            self._not_before_ns = self._now_ns + RETRY_NS
             self._finish(
                 RetuningState.REFUSED,
                 f"{reason}, but the retuner shows no sign of life: try again later",
@@ -259,6 +273,8 @@ class AdaptiveController:
         """Reason to retune without a request; empty if there is none."""
         settings = self._settings
         assert self._idle_since_ns is not None
+        if self._now_ns < self._not_before_ns:
+            return ""
         idle_ns = self._now_ns - self._idle_since_ns
         if settings.every_s is not None and idle_ns >= settings.every_s * 1e9:
             return "on schedule"
@@ -278,7 +294,8 @@ class AdaptiveController:
         return factor is not None and self.laws.accepted.monitor.change > factor
 
     def _identify(self) -> None:
-        if self._fresh and abs(self._roll_rad) > self._settings.roll_limit_rad:
+        # whatever else is old: the roll is judged as it was last known
+        if abs(self._roll_rad) > self._settings.roll_limit_rad:
             self._abort("the roll is above the limit for identification")
         elif self._pulses_given == len(self._pulses_pa):
             self._request_number += 1
@@ -309,6 +326,7 @@ class AdaptiveController:
         self.laws.try_out(law)
         self._warm_up = None
         self._trial_window.clear()
+        self._trial_since_ns = self._now_ns
         assert self.candidate is not None
         found = self.candidate.summary
         self._enter(
@@ -319,6 +337,9 @@ class AdaptiveController:
 
     def _check_trial(self) -> None:
         settings, tried = self._settings, self._trial_window
+        if self._now_ns - self._trial_since_ns > TRIAL_PATIENCE * settings.trial_s * 1e9:
+            self._abort("the trial could not be judged: too many measurements were missing")
+            return
         if tried.samples < self._least_samples:
             return
         factor = 1.0 if tried.full else EARLY_FACTOR

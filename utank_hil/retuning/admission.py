@@ -4,7 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.control import LinearLaw
+from utank_hil.arrays import FloatArray
+from utank_hil.control import LinearLaw, PredictiveLaw
+from utank_hil.control.washout import WashoutLaw
 from utank_hil.retuning.answer import Candidate
 from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.history import SampleHistory
@@ -16,6 +18,8 @@ WARM_UP_CHUNK: Final = 50
 """Samples of the warm-up done in one sample time."""
 GAIN_FACTOR: Final = 30.0
 """Largest gains of a candidate, relative to the configured law's."""
+MOST_COEFFICIENTS: Final = 1e9
+"""Sum of a model's coefficients, or of gains on a reference: far beyond sense, and no overflow."""
 
 
 class Admission:
@@ -60,9 +64,13 @@ class Admission:
             return str(error)
         if law.sample_time_s != self._sample_time_s:
             return f"the law's sample time is {law.sample_time_s} s"
-        on_commands, on_outputs = _gains(law)
+        on_commands, on_outputs = _candidate_gains(candidate.law, law)
         if not (on_commands <= self._most_on_commands and on_outputs <= self._most_on_outputs):
             return "the law's gains are out of bounds"
+        if not max(map(_sum, (model.alpha, model.beta, candidate.law.reference_gains))) <= (
+            MOST_COEFFICIENTS
+        ):
+            return "the law's model is out of bounds"
         service = MonitoredLaw(law.controller(), ChangeMonitor(model, self._roll))
         return WarmUp(service, self._history)
 
@@ -107,6 +115,17 @@ def _gains(law: LinearLaw) -> tuple[float, float]:
     first state there, so the first column of A holds the gains on past commands.
     """
     model = law.matrices()
-    with np.errstate(over="ignore", invalid="ignore"):
-        on_commands, outputs = float(np.abs(model.A[:, 0]).sum()), float(np.abs(model.B).sum())
-    return on_commands, outputs
+    return _sum(model.A[:, 0]), _sum(model.B)
+
+
+def _candidate_gains(inner: PredictiveLaw, whole: LinearLaw) -> tuple[float, float]:
+    """`_gains` of a predictive law, alone or washed, without its matrices: they cost many ticks."""
+    share = whole.share if isinstance(whole, WashoutLaw) else 0.0
+    outputs = (1 - share) * _sum(inner.output_gains) + share * inner.output_gains.shape[2]
+    return _sum(inner.input_gains), outputs
+
+
+def _sum(values: FloatArray) -> float:
+    """Sum of the absolute values; infinite if it overflows."""
+    with np.errstate(over="ignore"):
+        return float(np.abs(values).sum())

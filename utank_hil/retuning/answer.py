@@ -1,6 +1,7 @@
 """The retuner's answer: a candidate law, or a refusal with reasons.
 
-Both pass between processes as plain bytes. Decoding executes no code and rejects anything else.
+Both pass between processes as plain bytes. Decoding executes no code and rejects anything else, and
+anything too large for the loop to read, to build and to step between two ticks.
 """
 
 import math
@@ -11,12 +12,27 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control import ARX, LinearLaw, PredictiveLaw
+from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
+from utank_hil.dynamics.linear import STATES
 
 _CANDIDATE: Final = b"CANDIDAT"
 _REFUSAL: Final = b"REFUSAL "
-_LONGEST: Final = 2000  # samples, of a law's or model's memory and of a horizon
 _REASONS_BYTES: Final = 4000
+_MOST_REASONS: Final = 20
+_MOST_OUTPUTS: Final = len(STATES)
+_HEAD: Final = 7
+
+LONGEST_BYTES: Final = 8 * (
+    1
+    + _HEAD
+    + 9
+    + MOST_ORDER * (1 + _MOST_OUTPUTS)
+    + MOST_SAMPLES * _MOST_OUTPUTS
+    + MOST_ORDER * _MOST_OUTPUTS**2
+    + (MOST_ORDER + 1) * _MOST_OUTPUTS
+)
+"""Of an answer that can be read: kind, head, summary, the law's gains and its model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,11 +148,13 @@ def read_answer(data: bytes) -> Answer:
     """
     kind, content = data[:8], data[8:]
     if kind == _REFUSAL:
-        return Refusal(tuple(content.decode(errors="replace").split("\n")))
+        reasons = content[:_REASONS_BYTES].decode(errors="replace").split("\n")
+        return Refusal(tuple(reasons[:_MOST_REASONS]))
     if kind != _CANDIDATE or len(content) % 8:
         raise ValueError("the answer is neither a candidate nor a refusal")
     values = _Values(np.frombuffer(content))
-    order, inputs, outputs, horizon, model_order = (values.size() for _ in range(5))
+    order, inputs, outputs = values.size(MOST_ORDER), values.size(1), values.size(_MOST_OUTPUTS)
+    horizon, model_order = values.size(MOST_SAMPLES), values.size(MOST_ORDER)
     washout_rad_s, sample_time_s = values.take(2).tolist()
     summary = ModelSummary(*values.take(len(fields(ModelSummary))).tolist())
     law = PredictiveLaw(
@@ -173,10 +191,10 @@ class _Values:
         self._next += count
         return taken
 
-    def size(self) -> int:
+    def size(self, most: int) -> int:
         """The next number as a dimension."""
         value = float(self.take(1)[0])
-        if not (1 <= value <= _LONGEST and math.floor(value) == value):
+        if not (1 <= value <= most and math.floor(value) == value):
             raise ValueError(f"the answer has a dimension of {value}")
         return int(value)
 

@@ -22,12 +22,11 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
 from utank_hil.one_thread import one_thread_each
-from utank_hil.retuning.answer import Answer, Refusal, read_answer
+from utank_hil.retuning.answer import LONGEST_BYTES, Answer, Refusal, read_answer
 from utank_hil.retuning.mailbox import Mailbox
 from utank_hil.retuning.retuner import RetuneFunction
 from utank_hil.retuning.worker import run_watchdog
 
-_ANSWER_BYTES: Final = 1 << 20
 _START_S: Final = 30.0
 _ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
 _HANGS_S: Final = 600.0
@@ -63,7 +62,7 @@ class RetunerProcess(Closing):
     ) -> None:
         rows, columns = longest_record
         self._requests = Mailbox(8 * (rows * columns + 1))
-        self._answers = Mailbox(_ANSWER_BYTES)
+        self._answers = Mailbox(LONGEST_BYTES)
         self._process = multiprocessing.get_context("spawn").Process(
             target=run_watchdog,
             args=(retune, self._requests, self._answers, os.getpid(), hangs_after_s),

@@ -169,7 +169,7 @@ class ControllerNode:
         self._status_schedule = Schedule(self._status.cycle_ns)
         self._started = self._answered = False
         self.start_ns = self.last_ns = 0
-        self._observed_ns = 0
+        self._observed_cycles = 0
         self._frames_sent = 0
         self._law_pa = 0.0
         self._law_failed = self._law_raised = False  # raised: until the operator resets
@@ -215,6 +215,10 @@ class ControllerNode:
         """Take one frame from the bus."""
         self.inbox.receive(frame, now_ns)
 
+    def other_frames(self, count: int) -> None:
+        """Take note of frames of other kinds on the bus."""
+        self.inbox.frames += count
+
     def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
         """Take note that the bus could not be read or written."""
         self._observer.link_error(now_ns)
@@ -224,7 +228,7 @@ class ControllerNode:
         if not self._started:
             self._started = True
             self.start_ns = now_ns
-        self._estimate()
+        self._estimate(now_ns)
         self._observe(now_ns)
         self.supervisor.update(self.seen, now_ns)
         self._control(now_ns)
@@ -240,12 +244,15 @@ class ControllerNode:
         self.command_pa = 0.0
         return [self._command_frame(ControlWord.QUICK_STOP)]
 
-    def _estimate(self) -> None:
-        """Level and its rate from what was measured."""
-        inbox = self.inbox
-        if inbox.tank_ns != self._observed_ns:
-            self._level.update(inbox.level_m, inbox.pressure_pa)
-            self._observed_ns = inbox.tank_ns
+    def _estimate(self, now_ns: int) -> None:
+        """Level and its rate from measurements, or from the model while one is missing."""
+        inbox, level = self.inbox, self._level
+        cycles = inbox.tank_cycles - self._observed_cycles
+        if cycles:
+            level.update(inbox.level_m, inbox.pressure_pa, cycles)
+            self._observed_cycles = inbox.tank_cycles
+        elif (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s:
+            level.predict(inbox.pressure_pa)
 
     def _observe(self, now_ns: int) -> None:
         """Ages, states and operator's edges, for the supervisor."""
@@ -287,8 +294,8 @@ class ControllerNode:
         # in charge nothing but disarming and arming again brings back a law that has ended
         if anew and (seen.arm_edge or seen.reset_edge) and self.supervisor.mode is not _ACTIVE:
             anew.reset()
-        if self._law_raised and seen.reset_edge:
-            self._law_raised = False
+        if self._law_failed and seen.reset_edge:
+            self._law_failed = self._law_raised = False
             self._controller.reset()
 
     def _answer(self, now_ns: int) -> float:
@@ -300,7 +307,7 @@ class ControllerNode:
             seen = self.seen
             self._retuning.update(
                 now_ns,
-                self.inbox.operator,
+                self.inbox.orders.take_retuning(),
                 engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )

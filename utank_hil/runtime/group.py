@@ -7,7 +7,7 @@ from typing import Final
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.runtime.errors import NodeError
-from utank_hil.runtime.hooks import LinkObserver, Stoppable
+from utank_hil.runtime.hooks import LinkObserver, LoadObserver, Stoppable
 from utank_hil.runtime.node import Node, Selective
 
 OUTSIDE: Final = -1
@@ -139,6 +139,12 @@ class NodeGroup:
                     node.link_error(now_ns, reason)
                 except Exception as error:
                     raise NodeError(node.name, "link_error", now_ns, error) from error
+
+    def other_frames(self, count: int) -> None:
+        """Tell every `LoadObserver` of frames that no node is handed."""
+        for node in self._nodes:
+            if isinstance(node, LoadObserver):
+                node.other_frames(count)
 
     def stop(self, now_ns: int, send: Send) -> None:
         """Stop every `Stoppable` node and pass its last frames to `send`.

@@ -19,6 +19,14 @@ class LinkObserver(Protocol):
 
 
 @runtime_checkable
+class LoadObserver(Protocol):
+    """A node that measures the load of the bus."""
+
+    def other_frames(self, count: int) -> None:
+        """Take note of what was received and is no `Frame`: other identifiers, remote, errors."""
+
+
+@runtime_checkable
 class Stoppable(Protocol):
     """A node that sends last frames before the process ends."""
 

@@ -18,7 +18,6 @@ from utank_hil.canbus import (
     DriveStatus2,
     Frame,
     Heartbeat,
-    Mode,
     OperatorCommand,
     Quality,
     Receiver,
@@ -27,8 +26,8 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
-
-NEVER_HEARD_NS = -(1 << 62)
+from utank_hil.canbus.endpoints import MAX_LOST
+from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Attributes of the inbox that a law may measure."""
@@ -53,7 +52,7 @@ class Inbox:
     roll_rad, roll_rate_rad_s : float
         Of the last good motion sample, received at `motion_ns`.
     port_level_m, starboard_level_m : float
-        Above still water, received at `tank_ns`.
+        Above still water, received at `tank_ns`, `tank_cycles` of the message after the first.
     high_level : bool
         A high-level switch is closed or broken.
     pressure_pa : float
@@ -62,16 +61,14 @@ class Inbox:
         Received at `drive_ns`; the echo of a new command at `echo_ns`.
     power_w : float
         Electric power the drive takes.
-    operator : OperatorCommand or None
-        Last order, received at `panel_ns`.
-    requested_mode : Mode
-        Mode the operator wants; STANDBY as long as none was asked for.
+    orders : Orders
+        What the operator wants.
     versions_match : bool
         Drive and sensors run the controller's catalogue and configuration.
     address_conflict : bool
         Somebody else sends with the controller's address.
     frames : int
-        Frames heard so far, good and bad.
+        Frames heard so far, good and bad, of any kind.
     """
 
     def __init__(self, catalogue: Catalogue, configuration_version: int) -> None:
@@ -82,7 +79,8 @@ class Inbox:
         self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
         self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
         self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
-        self._subscribe(catalogue.receiver(OperatorCommand), self._on_operator)
+        self.orders = Orders(catalogue.receiver(OperatorCommand))
+        self._subscriptions[self.orders.can_id] = self.orders.accept, self.orders.obey
         self._matching: dict[int, bool] = {}
         for address in _MATCHED:
             heartbeat = catalogue.receiver(Heartbeat, address)
@@ -95,12 +93,14 @@ class Inbox:
         self.high_level = False
         self.drive_state: DriveState | None = None
         self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.operator: OperatorCommand | None = None
-        self.requested_mode = Mode.STANDBY
         self.versions_match = False
         self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
-        self.drive_ns = self.echo_ns = self.panel_ns = NEVER_HEARD_NS
+        self.drive_ns = self.echo_ns = NEVER_HEARD_NS
         self._echo: int | None = None
+        self.tank_cycles = self._cycles = self._tank_lost = 0
+        self._tank_frame_ns = NEVER_HEARD_NS
+        # a longer gap than the counter bridges is told by the time
+        self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
         self.address_conflict = False
         self.frames = 0
 
@@ -140,13 +140,23 @@ class Inbox:
             self.motion_ns = now_ns
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
+        self._count_cycles(now_ns)
         # the switches count whatever the gauges say, and a broken switch counts as closed
         self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in _USABLE:
             return
         if math.isfinite(tank.port_level_m + tank.starboard_level_m):
             self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
-            self.tank_ns = now_ns
+            self.tank_ns, self.tank_cycles = now_ns, self._cycles
+
+    def _count_cycles(self, now_ns: int) -> None:
+        """Count the cycles since the last frame; by its counter, since time of receipt jitters."""
+        lost, since_ns = self._tank.lost, now_ns - self._tank_frame_ns
+        if since_ns > self._tank_gap_ns:
+            self._cycles += round(since_ns / self._tank.cycle_ns)
+        else:
+            self._cycles += 1 + lost - self._tank_lost
+        self._tank_lost, self._tank_frame_ns = lost, now_ns
 
     def _on_pump(self, pump: SensorPump, now_ns: int) -> None:
         if pump.quality in _USABLE and math.isfinite(pump.pressure_pa):
@@ -163,12 +173,6 @@ class Inbox:
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self.drive_fault = status.fault
         self.power_w = status.bus_voltage_v * status.current_a
-
-    def _on_operator(self, order: OperatorCommand, now_ns: int) -> None:
-        self.operator = order
-        asked = order.mode_request
-        self.requested_mode = Mode.STANDBY if asked is None else asked
-        self.panel_ns = now_ns
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
         versions = (beat.catalogue_version, beat.configuration_version)

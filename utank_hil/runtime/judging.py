@@ -39,7 +39,12 @@ _AWAITED: Final = sorted(
 
 first_stopping: Final = _first_of(_STOPPING)
 first_ending: Final = _first_of(_ENDING)
+soonest_ramp: Final = _first_of(
+    tuple(sorted(_with(Reaction.RAMP), key=lambda coded: coded[1].zero_within_ms))
+)
 first_refusing: Final = _first_of(_ENDING + _with(Reaction.REFUSE))
+first_lasting: Final = _first_of(_ENDING + tuple(c for c in _AWAITED if c not in _ENDING))
+"""What keeps a fault from being reset."""
 first_giving_up: Final = _first_of(_with(Reaction.GIVE_UP))
 first_halving: Final = _first_of(_with(Reaction.HALVE))
 first_awaited: Final = _first_of(tuple(_AWAITED))

@@ -26,7 +26,7 @@ _NO_DRIVE_FAULT: Final = DriveFault.NONE
 class Observations:
     """What the supervisor looks at in one tick; one object, overwritten every tick.
 
-    Edges are True in the one tick that first saw them.
+    Edges are True in the one tick that first saw them, and so is whatever stops or disarms.
 
     Attributes
     ----------
@@ -126,7 +126,6 @@ class Observer:
         self._last_ns: int | None = None
         self._late_history = 0
         self._link_lost_ns: int | None = None
-        self._arm_bit = self._reset_bit = True  # a bit that is set before we look is no edge
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._load_since_ns = 0
         self._frames_counted = 0
@@ -138,6 +137,7 @@ class Observer:
     def observe(self, now_ns: int, frames_sent: int) -> None:
         """Overwrite `seen`, once a tick; `frames_sent` by the node since its start."""
         inbox, seen = self._inbox, self.seen
+        orders = inbox.orders
         if self._last_ns is None:
             self._last_ns = self._load_since_ns = now_ns
         late_ns = max(0, now_ns - self._last_ns - TICK_NS)
@@ -150,7 +150,7 @@ class Observer:
         seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
         seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
         seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
-        seen.panel_age_ms = (now_ns - inbox.panel_ns) / MILLISECOND_NS
+        seen.panel_age_ms = (now_ns - orders.heard_ns) / MILLISECOND_NS
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (
             inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
@@ -166,15 +166,8 @@ class Observer:
         seen.heel_rad += HEEL_SHARE * (inbox.roll_rad - seen.heel_rad)
         if self._load_schedule.due(now_ns):
             self._count_load(now_ns, inbox.frames + frames_sent)
-        order = inbox.operator
-        seen.requested_mode = inbox.requested_mode
-        seen.armed = order is not None and order.arm
-        seen.stop = order is not None and order.stop
-        seen.arm_edge = seen.armed and not self._arm_bit
-        reset = order is not None and order.reset
-        seen.reset_edge = reset and not self._reset_bit
-        if order is not None:
-            self._arm_bit, self._reset_bit = seen.armed, reset
+        seen.requested_mode = orders.requested_mode
+        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = orders.take()
 
     def _count_load(self, now_ns: int, frames: int) -> None:
         # at the first tick only a backlog was received

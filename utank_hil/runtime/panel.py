@@ -18,6 +18,8 @@ from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
 """How long an edge-triggered button stays pressed: longer than two lost messages."""
+_UNDER_POWER = (Mode.ACTIVE, Mode.PASSIVE, None)
+"""Modes that a stop has not ended yet."""
 
 
 class Action(Enum):
@@ -35,7 +37,7 @@ class Action(Enum):
     PERMIT = "permit"
 
 
-_EDGES = (Action.STOP, Action.RESET, Action.RETUNE, Action.UNDO)
+_EDGES = (Action.RESET, Action.RETUNE, Action.UNDO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,9 @@ class TimedAction:
 class OperatorPanel:
     """Sends OPERATOR_CMD in its cycle of the catalogue, and on change.
 
+    Stop is held until the controller answers with a mode without power, and for `EDGE_NS` at least.
+    Until then arming is refused.
+
     Parameters
     ----------
     catalogue : Catalogue
@@ -73,6 +78,8 @@ class OperatorPanel:
     ----------
     status : ControllerStatus or None
         Latest status of the controller.
+    stopping : bool
+        Whether stop is held.
     """
 
     name = "panel"
@@ -96,6 +103,8 @@ class OperatorPanel:
         self._armed = False
         self._forbidden = False
         self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
+        self._stopped_ns = 0
+        self.stopping = False
         self._pressed: list[Action] = []
         self._sent: OperatorCommand | None = None
         self._ticks = 0
@@ -105,10 +114,17 @@ class OperatorPanel:
         """Press a button; it takes effect with the next tick."""
         self._pressed.append(action)
 
-    def receive(self, frame: Frame, now_ns: int) -> None:  # noqa: ARG002
+    def receive(self, frame: Frame, now_ns: int) -> None:
         """Take the controller's status."""
-        if frame.can_id == self._listener.can_id:
-            self.status = self._listener.accept(frame) or self.status
+        if frame.can_id != self._listener.can_id:
+            return
+        status = self._listener.accept(frame)
+        if status is None:
+            return
+        self.status = status
+        # an earlier one may have been on its way when stop was pressed
+        if now_ns - self._stopped_ns >= EDGE_NS and status.mode not in _UNDER_POWER:
+            self.stopping = False
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send the state of the buttons when it is due or has changed."""
@@ -123,7 +139,7 @@ class OperatorPanel:
         command = OperatorCommand(
             mode_request=self._mode,
             arm=self._armed,
-            stop=now_ns < self._pressed_until_ns[Action.STOP],
+            stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
             acknowledge=False,
             retune=now_ns < self._pressed_until_ns[Action.RETUNE],
@@ -144,8 +160,11 @@ class OperatorPanel:
     def _take(self, action: Action, now_ns: int) -> None:
         if action in _EDGES:
             self._pressed_until_ns[action] = now_ns + EDGE_NS
+        if action is Action.STOP:
+            self.stopping, self._stopped_ns = True, now_ns
         if action is Action.ARM:
-            self._mode, self._armed = Mode.ACTIVE, True
+            if not self.stopping:
+                self._mode, self._armed = Mode.ACTIVE, True
         elif action in (Action.FORBID, Action.PERMIT):
             self._forbidden = action is Action.FORBID
         elif action in (Action.PASSIVE, Action.DISARM):

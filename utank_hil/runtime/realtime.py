@@ -64,6 +64,7 @@ class RealTimeLoop:
         self._clock = MonotonicClock() if clock is None else clock
         self.statistics = LoopStatistics() if statistics is None else statistics
         self._sent: list[tuple[int, Frame]] = []
+        self._others = 0 if port is None else port.others
 
     def run(self, stop: Callable[[], bool] = _never, duration_ns: int | None = None) -> None:
         """Run until `stop()` is true or the time is up; then let the nodes send their last frames.
@@ -131,12 +132,17 @@ class RealTimeLoop:
         if self._port is None:
             return ()
         try:
-            frames = self._port.receive()
+            frames: Sequence[Frame] = self._port.receive()
         except PortError as error:
             self.statistics.receive_errors += 1
             self._group.link_error(now_ns, str(error))
-            return ()
+            frames = ()
         self.statistics.frames_received += len(frames)
+        others = self._port.others - self._others
+        if others:
+            self._others += others
+            self.statistics.others_received += others
+            self._group.other_frames(others)
         return frames
 
     def _send(self, sender: int, frame: Frame, now_ns: int) -> None:

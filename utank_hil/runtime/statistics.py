@@ -97,6 +97,8 @@ class LoopStatistics:
     skipped : int
         Grid points without a tick.
     frames_sent, frames_received : int
+    others_received : int
+        Received frames of other kinds, see `Port.others`.
     send_errors, receive_errors : int
         `PortError` exceptions of the port.
     real_time : bool
@@ -110,6 +112,7 @@ class LoopStatistics:
     skipped: int = 0
     frames_sent: int = 0
     frames_received: int = 0
+    others_received: int = 0
     send_errors: int = 0
     receive_errors: int = 0
     real_time: bool = False

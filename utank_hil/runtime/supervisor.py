@@ -19,6 +19,11 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
+DISARMED_ZERO_WITHIN_MS: Final = 1000
+"""When the pressure is cut after disarming, even if the ramp has not come to its end."""
+RESET_WITHIN_MS: Final = 500
+"""How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
+_NEVER_NS: Final = 1 << 62
 
 
 class Demand(Enum):
@@ -36,13 +41,15 @@ class Supervisor:
     ----------
     mode : Mode
     fault : Fault
-        Why the mode is FAULT (latched); in INIT, what is still missing; else NONE, or why the last
-        arming was refused.
+        Why the mode is FAULT (latched until reset); in INIT, what is still missing; else NONE, or
+        why the last arming was refused.
     demand : Demand
     drive_wanted : bool
         Whether the drive should be in operation enabled.
     degraded : bool
         Whether only half the pressure is allowed.
+    reset_refused_by : Fault
+        What lasts, in FAULT after a reset was refused; else NONE.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -52,9 +59,11 @@ class Supervisor:
         self.demand = Demand.ZERO
         self.drive_wanted = False
         self.degraded = False
+        self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
+        self._reset_until_ns: int | None = None
         self._drive_enabled_ns = 0
-        self._zero_at_ns = 0
+        self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
     @property
     def arming(self) -> bool:
@@ -75,16 +84,18 @@ class Supervisor:
         self.degraded = judging.first_halving(seen, self._limits) is not None
         found = judging.first_ending(seen, self._limits)
         if found is not None:
-            self._latch(*found, now_ns)
+            self._latch(*found, seen, now_ns)
         elif seen.stop:
             self._disarm(Mode.STANDBY)
         elif not seen.armed or seen.requested_mode is not _ACTIVE:
             # through PASSIVE even on the way to STANDBY: there the pressure ramps down
             self._disarm(Mode.PASSIVE)
+            self._zero_at_ns = now_ns + DISARMED_ZERO_WITHIN_MS * MILLISECOND_NS
 
     def _while_faulted(self, seen: Observations, now_ns: int) -> None:
         if self.demand is Demand.RAMP:
             self._note_drive(seen, now_ns)
+            self._ramp(seen, now_ns)
             if (
                 now_ns >= self._zero_at_ns
                 or seen.stop
@@ -92,14 +103,30 @@ class Supervisor:
             ):
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
-        if (
-            seen.reset_edge
-            and self.demand is Demand.ZERO
-            and not judging.first_awaited(seen, self._limits)
-        ):
+        if seen.reset_edge and self.demand is Demand.ZERO:
+            self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
+        if self._reset_until_ns is not None:
+            self._continue_reset(seen, now_ns, self._reset_until_ns)
+
+    def _continue_reset(self, seen: Observations, now_ns: int, until_ns: int) -> None:
+        seen.drive_out_ms = 0.0  # off, as it should be
+        lasts = judging.first_lasting(seen, self._limits)
+        if lasts is None:
             self._disarm(Mode.STANDBY)
+        elif now_ns >= until_ns:
+            self._reset_until_ns = None
+            self.reset_refused_by = lasts[0]
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
+        if self.mode is Mode.PASSIVE and seen.command_pa != 0.0:
+            # still ramping down, so what ends ACTIVE ends this
+            self._note_drive(seen, now_ns)
+            found = judging.first_ending(seen, self._limits)
+            if found is not None:
+                self._latch(*found, seen, now_ns)
+                return
+            if now_ns >= self._zero_at_ns:
+                self.demand = Demand.ZERO
         missing = judging.first_awaited(seen, self._limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
@@ -134,12 +161,18 @@ class Supervisor:
         seen.arming_ms = (now_ns - since_ns) / MILLISECOND_NS
         if not seen.armed or seen.requested_mode is not Mode.ACTIVE:
             self._disarm(Mode.STANDBY)
+            return
+        # being out of operation enabled does not count yet; all else counts until ACTIVE
+        refusal = judging.first_refusing(seen, self._limits)
+        if refusal is not None:
+            self._disarm(Mode.STANDBY, refusal[0])
         elif seen.drive_enabled:
             self._arming_since_ns = None
             self._drive_enabled_ns = now_ns
             self.mode = Mode.ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
+            self._zero_at_ns = _NEVER_NS
         else:
             found = judging.first_giving_up(seen, self._limits)
             if found is not None:
@@ -153,14 +186,25 @@ class Supervisor:
         # in PASSIVE the drive holds zero pressure, enabled; elsewhere it is off
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
+        self._zero_at_ns = _NEVER_NS
+        self._reset_until_ns = None
+        self.reset_refused_by = Fault.NONE
 
-    def _latch(self, fault: Fault, condition: Condition, now_ns: int) -> None:
+    def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
         self.mode = Mode.FAULT
         self.fault = fault
-        self._zero_at_ns = now_ns + condition.zero_within_ms * MILLISECOND_NS
+        self._arming_since_ns = None
         stop = condition.reaction is Reaction.STOP
         self.demand = Demand.ZERO if stop else Demand.RAMP
         self.drive_wanted = not stop
+        self._ramp(seen, now_ns)
+
+    def _ramp(self, seen: Observations, now_ns: int) -> None:
+        """Shorten the ramp to the earliest end that a condition asks for."""
+        found = judging.soonest_ramp(seen, self._limits)
+        if found is not None:
+            zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
+            self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
 
     def _note_drive(self, seen: Observations, now_ns: int) -> None:
         if seen.drive_enabled:

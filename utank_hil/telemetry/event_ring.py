@@ -22,6 +22,7 @@ _WORDS: Final = ("length", *(f"text_{number}" for number in range(_TEXT_WORDS)))
 _CAPACITY: Final = 64  # a retuning has four events in four minutes; readers poll every 0.5 s
 _LONGEST_BYTES: Final = 8 * _TEXT_WORDS
 _MOST_BYTES_A_CHARACTER: Final = 6  # of an escaped character in JSON
+_CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
 
 
 class EventWriter(Closing):
@@ -53,10 +54,12 @@ class EventWriter(Closing):
         start_ns : int
             Time of the first telemetry row; readers get the time since then.
         """
-        data = _encoded(event, event.reasons, start_ns)
+        reasons = event.reasons
+        if sum(map(len, reasons)) > _LONGEST_BYTES:
+            reasons = _cut(reasons)  # first: encoding takes long for what would be thrown away
+        data = _encoded(event, reasons, start_ns)
         if len(data) > _LONGEST_BYTES:
-            length = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
-            data = _encoded(event, ("; ".join(event.reasons)[:length] + " ...",), start_ns)
+            data = _encoded(event, _cut(reasons), start_ns)
         self._row[0] = len(data)
         self._text[: len(data)] = np.frombuffer(data, dtype=np.uint8)
         self._ring.write(self._row)
@@ -106,6 +109,11 @@ def event_text(event: RetuningEvent) -> str:
     """Text of an event, such as `retuning REFUSED: the record is too short`."""
     text = f"retuning {event.state.name}"
     return f"{text}: {'; '.join(event.reasons)}" if event.reasons else text
+
+
+def _cut(reasons: tuple[str, ...]) -> tuple[str]:
+    """Reasons short enough for a row, whatever their characters."""
+    return ("; ".join(reasons)[:_CUT] + " ...",)
 
 
 def _encoded(event: RetuningEvent, reasons: tuple[str, ...], start_ns: int) -> bytes:

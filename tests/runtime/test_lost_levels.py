@@ -1,0 +1,70 @@
+"""The level's rate is right whatever share of the tank's frames is lost, repeated or bad."""
+
+import math
+from collections.abc import Callable, Iterable
+from itertools import count
+
+import pytest
+from controller_bench import ControllerBench
+
+from utank_hil.canbus import Frame, Quality, SensorTank, Switch
+from utank_hil.tick import TICK_NS
+
+RATE_M_S = 0.5
+FREQUENCY_RAD_S = 0.6
+
+
+def worst_rate_error(
+    change: Callable[[int, Frame], Iterable[Frame]], quality: Callable[[int], Quality]
+) -> float:
+    """Largest error of the rate, as a share of its amplitude, over the last half of 40 s."""
+    bench = ControllerBench()
+    numbers, ticks = count(), count()
+    worst = 0.0
+    bench.spoil = lambda kind, frame: (
+        change(next(numbers), frame) if kind is SensorTank else (frame,)
+    )
+    for tick in ticks:
+        time_s = tick * TICK_NS * 1e-9
+        level_m = RATE_M_S / FREQUENCY_RAD_S * math.sin(FREQUENCY_RAD_S * time_s)
+        bench.tank = SensorTank(-level_m, level_m, Switch.OFF, Switch.OFF, quality(tick))
+        bench.tick()
+        if time_s > 20:
+            true_m_s = RATE_M_S * math.cos(FREQUENCY_RAD_S * time_s)
+            worst = max(worst, abs(bench.level.rate_m_s - true_m_s))
+        if time_s > 40:
+            return worst / RATE_M_S
+    raise AssertionError
+
+
+def always_good(tick: int) -> Quality:
+    return Quality.GOOD
+
+
+@pytest.mark.parametrize("one_of", [1, 2, 3, 4, 5, 10])
+def test_lost_frames(one_of: int) -> None:
+    error = worst_rate_error(lambda k, frame: () if k % one_of else (frame,), always_good)
+    assert error < (0.1 if one_of <= 4 else 0.2)
+
+
+@pytest.mark.parametrize("bad_of", [2, 3])
+def test_bad_quality(bad_of: int) -> None:
+    error = worst_rate_error(
+        lambda k, frame: (frame,), lambda tick: Quality.BAD if tick // 2 % bad_of else Quality.GOOD
+    )
+    assert error < 0.1
+
+
+@pytest.mark.parametrize("late_of", [2, 3, 7])
+def test_frames_that_come_a_tick_late_or_two_at_once(late_of: int) -> None:
+    held: list[Frame] = []
+
+    def change(number: int, frame: Frame) -> Iterable[Frame]:
+        held.append(frame)
+        if number % late_of == 1:
+            return ()
+        frames = held.copy()
+        held.clear()
+        return frames
+
+    assert worst_rate_error(change, always_good) < 0.1

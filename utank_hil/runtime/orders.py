@@ -1,0 +1,114 @@
+"""What the operator orders, from the frames of a panel.
+
+Only an accepted frame can ask for something. Whatever says stop or disarms acts from any intact
+frame, in or out of sequence: after a gap the first frames are not accepted, and a stop is not to
+wait for them, nor to be lost with them. What a frame says between two looks is kept for the next.
+"""
+
+from typing import Final, NamedTuple
+
+from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver
+from utank_hil.canbus.endpoints import MAX_LOST
+from utank_hil.retuning.adaptive import RetuningOrder
+
+NEVER_HEARD_NS: Final = -(1 << 62)
+
+
+class Wishes(NamedTuple):
+    """What was ordered since the last look.
+
+    Attributes
+    ----------
+    armed : bool
+        The arm bit is set, and no frame since the last look disarmed.
+    stop : bool
+        The stop bit is set, or was in a frame since the last look.
+    arm_edge, reset_edge : bool
+        Rising edges since the last look.
+    """
+
+    armed: bool
+    stop: bool
+    arm_edge: bool
+    reset_edge: bool
+
+
+_NOTHING: Final = RetuningOrder()
+
+
+class Orders:
+    """The orders of one panel.
+
+    A bit that is set in the first frame, or in the first after a gap longer than the counter
+    bridges, is no edge: nobody knows when it was pressed.
+
+    Parameters
+    ----------
+    receiver : Receiver of OperatorCommand
+
+    Attributes
+    ----------
+    requested_mode : Mode
+        Mode the operator wants; STANDBY as long as none was asked for.
+    last : OperatorCommand or None
+        Latest accepted frame.
+    heard_ns : int
+        When it came.
+    """
+
+    def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
+        self.can_id = receiver.can_id
+        self._receiver = receiver
+        self._gap_ns = (MAX_LOST + 1) * receiver.cycle_ns
+        self.requested_mode = Mode.STANDBY
+        self.last: OperatorCommand | None = None
+        self.heard_ns = NEVER_HEARD_NS
+        self._stop_heard = self._disarm_heard = False
+        self._arm_edge = self._reset_edge = False
+        self._retuning = _NOTHING
+
+    def accept(self, frame: Frame) -> OperatorCommand | None:
+        """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
+        order = self._receiver.accept(frame)
+        heard = order or self._receiver.intact(frame)
+        if heard is not None:
+            self._stop_heard |= heard.stop
+            self._disarm_heard |= not heard.arm
+        return order
+
+    def obey(self, order: OperatorCommand, now_ns: int) -> None:
+        """Take an accepted message."""
+        before = self.last
+        if before is None or now_ns - self.heard_ns > self._gap_ns:
+            before = order
+        self._arm_edge |= order.arm and not before.arm
+        self._reset_edge |= order.reset and not before.reset
+        retune, undo, forbidden = self._retuning
+        self._retuning = RetuningOrder(
+            retune or (order.retune and not before.retune),
+            undo or (order.undo and not before.undo),
+            forbidden or order.forbid_retuning,
+        )
+        self.last, self.heard_ns = order, now_ns
+        asked = order.mode_request
+        self.requested_mode = Mode.STANDBY if asked is None else asked
+
+    def take(self) -> Wishes:
+        """Return what was ordered since the last call."""
+        last = self.last
+        wishes = Wishes(
+            last is not None and last.arm and not self._disarm_heard,
+            self._stop_heard or (last is not None and last.stop),
+            self._arm_edge,
+            self._reset_edge,
+        )
+        self._stop_heard = self._disarm_heard = self._arm_edge = self._reset_edge = False
+        return wishes
+
+    def take_retuning(self) -> RetuningOrder:
+        """Return what was ordered of the retuning since the last call, a sample of the law ago."""
+        order, last = self._retuning, self.last
+        self._retuning = _NOTHING
+        if last is not None and last.forbid_retuning:
+            return order._replace(forbidden=True)
+        return order
