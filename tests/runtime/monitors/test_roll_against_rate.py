@@ -1,0 +1,103 @@
+import math
+
+import pytest
+from moving_ship import THRESHOLDS, MovingShip
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.motion import RollAgainstRate
+
+STEP_S = 0.05
+FAULT_S = 120.0
+
+
+def found_after(fault, until_s: float = 60.0, roll_deg: float = 0.5) -> dict[Finding, float]:
+    """When each finding came first, after a fault that changes (roll, rate, turned) in place."""
+    ship, monitor = MovingShip(math.radians(roll_deg)), RollAgainstRate(THRESHOLDS)
+    first: dict[Finding, float] = {}
+    for k in range(round((FAULT_S + until_s) / STEP_S)):
+        t = k * STEP_S
+        sample = [ship.roll_rad(t), ship.rate_rad_s(t), ship.turned_rad(t, STEP_S)]
+        if t >= FAULT_S:
+            sample = fault(t - FAULT_S, *sample)
+        found = monitor.update(*sample, STEP_S)
+        for finding in Finding:
+            if found & finding:
+                first.setdefault(finding, t - FAULT_S)
+    return first
+
+
+def test_a_ship_that_rolls_in_health_is_left_alone() -> None:
+    for roll_deg in (0.0, 0.5, 8.0):
+        assert not found_after(lambda _, *sample: sample, 600.0, roll_deg)
+
+
+def test_constant_bias_of_the_gyroscope_is_learned() -> None:
+    monitor, ship = RollAgainstRate(THRESHOLDS), MovingShip()
+    late = 0
+    for k in range(12_000):
+        t = k * STEP_S
+        turned = ship.turned_rad(t, STEP_S) + 2e-4 * STEP_S  # 0.7 degrees a minute
+        found = monitor.update(ship.roll_rad(t), ship.rate_rad_s(t), turned, STEP_S)
+        assert not found & (Finding.DRIFT_LASTS | Finding.MOTION_SIGN)
+        late |= found if t > 120 else 0
+    assert not late
+
+
+@pytest.mark.parametrize("flipped", ["roll", "rate"])
+@pytest.mark.parametrize("shift_s", [0.0, 1.3, 2.6, 3.9])
+def test_sign_of_roll_or_rate_alone_is_found_within_a_second(flipped: str, shift_s: float) -> None:
+    def flip(t, roll, rate, turned):
+        if t < shift_s:
+            return [roll, rate, turned]
+        return [-roll, rate, turned] if flipped == "roll" else [roll, -rate, -turned]
+
+    assert found_after(flip, roll_deg=1.0)[Finding.MOTION_SIGN] - shift_s <= 1.1
+
+
+def test_sign_of_both_is_not_told_here() -> None:
+    def flip(_, *sample):
+        return [-value for value in sample]
+
+    assert Finding.MOTION_SIGN not in found_after(flip)
+
+
+def test_stuck_roll_is_found_within_three_seconds() -> None:
+    at = MovingShip(noise=False).roll_rad(FAULT_S)
+    found = found_after(lambda _, roll, rate, turned: [at, rate, turned])
+    assert found[Finding.ROLL_STUCK] <= 3.0
+
+
+def test_stuck_rate_is_found_within_a_second_of_a_large_roll_and_two_of_a_small_one() -> None:
+    for roll_deg, limit_s in ((2.0, 1.0), (0.5, 2.0)):
+        at = MovingShip(math.radians(roll_deg), noise=False).rate_rad_s(FAULT_S)
+        found = found_after(lambda _, roll, *__, a=at: [roll, a, a * STEP_S], roll_deg=roll_deg)
+        assert found[Finding.RATE_STUCK] <= limit_s
+
+
+@pytest.mark.parametrize(("rad_min", "drift_s", "lasts_s"), [(0.1, 5.0, 30.0), (0.01, 30.0, 60.0)])
+def test_drift_degrades_then_ends(rad_min: float, drift_s: float, lasts_s: float) -> None:
+    found = found_after(lambda t, roll, *rest: [roll + rad_min / 60 * t, *rest])
+    assert found[Finding.DRIFT] <= drift_s
+    assert found[Finding.DRIFT_LASTS] <= lasts_s
+    assert Finding.MOTION_SIGN not in found
+
+
+def test_what_has_gone_is_forgotten_in_half_a_minute() -> None:
+    monitor, ship = RollAgainstRate(THRESHOLDS), MovingShip()
+    found = []
+    for k in range(2400):
+        t = k * STEP_S
+        sign = -1 if 60 <= t < 70 else 1
+        found.append(
+            monitor.update(sign * ship.roll_rad(t), 0.01, ship.turned_rad(t, STEP_S), STEP_S)
+        )
+    assert found[1210]
+    assert not any(found[round(102 / STEP_S) :])
+
+
+def test_restart_takes_no_gap_for_a_move() -> None:
+    monitor = RollAgainstRate(THRESHOLDS)
+    monitor.update(0.0, 0.0, 0.0, STEP_S)
+    monitor.restart()
+    assert not monitor.update(0.3, 0.0, 0.0, STEP_S)
+    assert not monitor.update(0.3, 0.0, 0.0, STEP_S)

@@ -1,0 +1,74 @@
+from dataclasses import dataclass
+
+import pytest
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.senders import Senders, Stream
+
+STEP_S = 0.1
+
+
+@dataclass
+class Counted:
+    cycle_ns: int = 10_000_000
+    heard: int = 0
+    lost: int = 0
+
+
+def first_found(heard: int, lost: int, cycle_ms: int = 10, seconds: float = 5.0) -> float | None:
+    """When a stream is found that hears and loses so many frames every ten cycles."""
+    counted = Counted(cycle_ms * 1_000_000)
+    senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
+    for k in range(1, round(seconds / STEP_S) + 1):
+        share = k * STEP_S / (10 * cycle_ms * 1e-3)
+        counted.heard, counted.lost = int(heard * share), int(lost * share)
+        if senders.update(0, STEP_S):
+            return k * STEP_S
+    return None
+
+
+def test_message_at_its_cycle_is_left_alone_lost_frames_or_not() -> None:
+    for heard in (10, 7, 5):
+        assert first_found(heard, 10 - heard) is None
+
+
+@pytest.mark.parametrize(("cycle_ms", "within_s"), [(10, 0.21), (20, 0.31), (100, 1.5)])
+def test_second_sender_doubles_the_pace(cycle_ms: int, within_s: float) -> None:
+    found_s = first_found(20, 0, cycle_ms)
+    assert found_s is not None
+    assert found_s <= within_s
+
+
+def test_counter_that_skips_runs_ahead_of_the_cycle() -> None:
+    found_s = first_found(10, 30)
+    assert found_s is not None
+    assert found_s <= 0.1
+
+
+def test_frames_that_waited_while_the_controller_did_are_no_second_sender() -> None:
+    counted = Counted()
+    senders = Senders([Stream(counted)], 1700.0)
+    counted.heard = 10
+    senders.update(0, STEP_S)
+    counted.heard += 200
+    assert not senders.update(0, 2.0)
+
+
+def test_frames_before_the_first_look_do_not_count() -> None:
+    counted = Counted(heard=280)
+    assert not Senders([Stream(counted)], 1700.0).update(0, STEP_S)
+
+
+def test_silent_node_is_found_after_a_second() -> None:
+    counted = Counted(100_000_000, heard=5)
+    senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
+    found = [senders.update(0, STEP_S) for _ in range(12)]
+    assert found.index(Finding.NODE_SILENT) == 10
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.05, False), (0.3, True), (0.8, True)])
+def test_frames_of_nobody_are_a_flood(share: float, expected: bool) -> None:
+    senders, found = Senders([], 1700.0), 0
+    for k in range(1, 13):
+        found |= senders.update(int(share * 1700.0 * k * STEP_S), STEP_S)
+    assert bool(found & Finding.FLOOD) is expected

@@ -1,0 +1,169 @@
+"""Spikes, noise, volume, drive and saturation."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from moving_ship import CONFIG, THRESHOLDS
+
+from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.noise import Noise, SecondDifference
+from utank_hil.runtime.monitors.spikes import STEP_SAMPLES, SpikeCount, SpikeGate
+from utank_hil.runtime.monitors.volume import Volume
+
+MS = 1_000_000
+
+
+def test_one_spike_is_discarded_and_the_next_sample_is_taken() -> None:
+    gate = SpikeGate(0.01, 0.5)
+    assert gate.passes(0.1, 0)
+    assert not gate.passes(0.6, 10 * MS)
+    assert gate.passes(0.1, 20 * MS)
+    assert gate.discarded == 1
+
+
+def test_first_sample_passes_wherever_it_is() -> None:
+    assert SpikeGate(0.01, 0.5).passes(3.0, 0)
+
+
+def test_step_that_stays_is_taken_in_the_end() -> None:
+    gate = SpikeGate(0.01, 0.5)
+    assert gate.passes(0.0, 0)
+    passed = [gate.passes(0.5, k * 10 * MS) for k in range(1, 8)]
+    assert passed == [k >= STEP_SAMPLES - 1 for k in range(7)]
+
+
+@given(st.floats(-1, 1), st.integers(1, 1000), st.floats(0, 1))
+def test_what_moves_no_faster_than_it_can_always_passes(
+    start: float, elapsed_ms: int, share: float
+) -> None:
+    gate = SpikeGate(0.01, 0.5)
+    gate.passes(start, 0)
+    move = share * (0.01 + 0.5 * elapsed_ms * 1e-3) * 0.999
+    assert gate.passes(start + move, elapsed_ms * MS)
+
+
+def test_five_spikes_are_too_many_unless_seconds_lie_between_them() -> None:
+    close, far = SpikeCount(), SpikeCount()
+    assert [close.update(n, 0.1) for n in range(1, 8)].index(True) in (4, 5)
+    assert not any(far.update(n, 1.0) for n in range(100))
+
+
+@pytest.mark.parametrize(("times", "expected"), [(1, False), (2, False), (10, True), (100, True)])
+def test_noise_ten_times_the_figure_is_found_within_two_seconds(
+    times: float, expected: bool
+) -> None:
+    random = np.random.default_rng(1)
+    noise, smooth = Noise(math.sqrt(6) * THRESHOLDS.rate_noise_rad_s), SecondDifference()
+    found = False
+    for k in range(40):
+        rate = 0.06 * math.sin(0.6 * 0.05 * k) + times * 5e-4 * random.standard_normal()
+        found |= noise.update(smooth.update(rate) if k > 2 else 0.0, 0.05)
+    assert found is expected
+
+
+def volume_findings(port_error_m: float, seconds: float, noise_m: float = 0.005) -> list[int]:
+    random, volume = np.random.default_rng(1), Volume(THRESHOLDS)
+    found = []
+    for k in range(round(seconds / 0.1)):
+        level = 2.0 * math.sin(0.06 * k)
+        port, starboard = noise_m * random.standard_normal(2)
+        found.append(volume.update(port_error_m - level + port, level + starboard, 0.1))
+    return found
+
+
+def test_levels_that_mirror_one_another_are_left_alone() -> None:
+    assert not any(volume_findings(0.0, 600))
+    assert not any(volume_findings(0.8 * THRESHOLDS.volume_m, 60)[30:])
+
+
+def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off() -> None:
+    little = volume_findings(1.5 * THRESHOLDS.volume_m, 60)
+    assert little[50] & Finding.VOLUME
+    assert not little[50] & Finding.VOLUME_LASTS
+    assert little[-1] & Finding.VOLUME_LASTS
+    assert volume_findings(8 * THRESHOLDS.volume_m, 5)[-1] & Finding.VOLUME_LASTS
+
+
+def test_noise_of_the_gauges_is_seen_in_their_sum() -> None:
+    assert volume_findings(0.0, 2.0, noise_m=0.05)[-1] & Finding.NOISE
+
+
+STEP_S = 0.05
+LAG_S = CONFIG.vessel.pump.lag_s
+
+
+def drive_findings(actual, seconds: float = 30.0, limited: bool = False) -> dict[Finding, float]:
+    """When a drive that makes `actual(time, pressure)` of the right pressure is found out."""
+    monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
+    right = 0.0
+    first: dict[Finding, float] = {}
+    for k in range(round(seconds / STEP_S)):
+        t = k * STEP_S
+        command = 30e3 * math.sin(0.6 * t)
+        for j in range(5):  # a drive of its own: 20 ms late, in steps of 10 ms
+            late = 30e3 * math.sin(0.6 * (t - STEP_S + 0.01 * (j + 1) - 0.02))
+            right += (late - right) * (1 - math.exp(-0.01 / LAG_S))
+        found = monitor.update(command, actual(t, right), enabled=True, limited=limited)
+        for finding in Finding:
+            if found & finding:
+                first.setdefault(finding, t)
+    return first
+
+
+def test_drive_that_follows_is_left_alone() -> None:
+    assert not drive_findings(lambda _, right: right)
+
+
+@pytest.mark.parametrize("begin_s", [2.0, 2.6, 4.0])
+def test_stalled_drive_is_found_by_300_ms_and_lost_by_500(begin_s: float) -> None:
+    """Counted from where the command is 15 % of the limit off."""
+    found = drive_findings(lambda t, right: 0.0 if t >= begin_s else right)
+    off_s = next(
+        t
+        for t in np.arange(begin_s, 30, 0.01)
+        if abs(30e3 * math.sin(0.6 * (t - 0.12))) > THRESHOLDS.pressure_error_pa
+    )
+    assert found[Finding.DRIVE_LAGS] - off_s <= 0.3 + STEP_S
+    assert found[Finding.DRIVE_LOST] - off_s <= 0.5 + STEP_S
+    assert Finding.PUMP_SIGN not in found
+
+
+def test_reversed_pump_is_found_within_200_ms_limited_or_not() -> None:
+    for limited in (False, True):
+        found = drive_findings(lambda t, right: -right if t >= 2.0 else right, limited=limited)
+        assert found[Finding.PUMP_SIGN] <= 2.2
+
+
+def test_drive_at_its_own_limit_may_stay_behind() -> None:
+    def weak(_, right):
+        return min(max(right, -10e3), 10e3)
+
+    assert Finding.DRIVE_LOST in drive_findings(weak)
+    assert not drive_findings(weak, limited=True)
+
+
+def test_drive_that_is_off_is_not_judged() -> None:
+    monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
+    assert not any(monitor.update(30e3, 0.0, enabled=False, limited=False) for _ in range(100))
+
+
+def test_command_held_at_its_limit_for_ten_seconds_is_saturated_until_it_leaves() -> None:
+    limit_pa = THRESHOLDS.pressure_limit_pa
+    saturation = Saturation(THRESHOLDS)
+    held = [saturation.update(limit_pa, drive_limited=False, elapsed_s=0.1) for _ in range(110)]
+    assert held.index(Finding.SATURATED) in range(100, 103)
+    # half the pressure is what it is left with
+    assert saturation.update(limit_pa / 2, drive_limited=False, elapsed_s=0.1)
+    assert not saturation.update(limit_pa / 4, drive_limited=False, elapsed_s=0.1)
+
+
+def test_command_that_goes_from_limit_to_limit_is_not_saturated() -> None:
+    saturation = Saturation(THRESHOLDS)
+    for k in range(1000):
+        side = 1 if k // 60 % 2 else -1
+        pressure_pa = side * THRESHOLDS.pressure_limit_pa
+        assert not saturation.update(pressure_pa, drive_limited=True, elapsed_s=0.1)

@@ -1,0 +1,110 @@
+import math
+
+import pytest
+from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.level_stuck import LevelStuck
+from utank_hil.runtime.monitors.tank_equation import TankEquation
+
+STEP_S = 0.1
+FAULT_S = 60.0
+T = THRESHOLDS.roll_period_s
+
+
+def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding, float]:
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
+    first: dict[Finding, float] = {}
+    for k in range(round((FAULT_S + until_s) / STEP_S)):
+        t = k * STEP_S
+        sample = [ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t)]
+        if t >= FAULT_S:
+            sample = fault(t, *sample)
+        found = equation.update(*sample) | stuck.update(*sample)
+        for finding in Finding:
+            if found & finding:
+                first.setdefault(finding, t - FAULT_S)
+    return first
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3, 35e3])
+@pytest.mark.parametrize("frequency_rad_s", [0.45, 0.6, 1.0])
+def test_water_that_obeys_its_equation_is_left_alone(
+    roll_deg: float, pressure_pa: float, frequency_rad_s: float
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
+    assert not found_after(ship, lambda _, *sample: sample, 120.0)
+
+
+def test_gains_are_one_and_the_delay_is_the_delay() -> None:
+    ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    late_s = 0.4
+    for k in range(1000):
+        t = k * STEP_S
+        equation.update(ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+    assert equation.roll_gain == pytest.approx(1, abs=0.1)
+    assert equation.pump_gain == pytest.approx(1, abs=0.02)
+    assert equation.level_gain == pytest.approx(1, abs=0.02)
+    assert equation.late_s == pytest.approx(0, abs=0.1)
+    for k in range(1000, 2000):
+        t = k * STEP_S
+        equation.update(ship.roll_rad(t - late_s), ship.level_m(t), ship.pressure_pa(t))
+    assert equation.late_s == pytest.approx(late_s, abs=0.1)
+
+
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+def test_sign_of_the_motion_sensor_is_found_in_one_roll_period_of_half_a_degree(
+    pressure_pa: float,
+) -> None:
+    ship = MovingShip(math.radians(0.5), pressure_pa)
+    found = found_after(ship, lambda _, roll, level, pressure: (-roll, level, pressure))
+    assert found[Finding.WATER_SIGN] <= T
+
+
+def test_too_little_roll_tells_nothing_and_says_nothing() -> None:
+    ship = MovingShip(math.radians(0.1), 0.0)
+    assert not found_after(ship, lambda _, roll, *rest: (-roll, *rest))
+
+
+def test_swapped_gauges_are_found_within_a_period() -> None:
+    found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, -level, pressure))
+    assert found[Finding.WATER_SIGN] <= T
+
+
+def test_pressure_of_the_wrong_sign_is_found_within_a_period() -> None:
+    found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, level, -pressure))
+    assert found[Finding.PUMP_SIGN] <= T
+
+
+def test_levels_that_stand_still_are_found_within_five_seconds() -> None:
+    ship = MovingShip()
+    for shift_s in (0.0, 1.0, 2.0, 3.0, 4.0):
+        at = MovingShip(noise=False).level_m(FAULT_S + shift_s)
+
+        def stick(t, roll, level, pressure, at=at, shift_s=shift_s):
+            return roll, at if t >= FAULT_S + shift_s else level, pressure
+
+        assert found_after(ship, stick)[Finding.LEVEL_STUCK] - shift_s <= 5.0
+
+
+def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
+    ship = MovingShip(math.radians(2.0), 5e3)
+
+    def late(delay_s):
+        return lambda t, roll, level, pressure: (ship.roll_rad(t - delay_s), level, pressure)
+
+    assert found_after(ship, late(2.0))[Finding.MOTION_LATE] <= 2 * T
+    assert not found_after(ship, late(0.1))
+
+
+def test_restart_forgets() -> None:
+    ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    for k in range(600):
+        t = k * STEP_S
+        found = equation.update(-ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+    assert found
+    equation.restart()
+    assert math.isnan(equation.roll_gain)
+    assert not equation.update(ship.roll_rad(0.0), ship.level_m(0.0), ship.pressure_pa(0.0))

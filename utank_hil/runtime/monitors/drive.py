@@ -1,0 +1,120 @@
+"""The drive: whether the pressure follows the command, and how long it is held at a limit."""
+
+import math
+from typing import Final
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+
+LAGS_S: Final = 0.25
+LOST_S: Final = 0.45
+REVERSED_S: Final = 0.15
+"""A step less than 300, 500 and 200 ms: what is found is told in the step after."""
+REVERSED_SHARE: Final = 1 / 3
+"""Of the threshold: so much the other way is reversed."""
+ENABLED_S: Final = 0.5
+"""The drive is not judged before it has been enabled for so long."""
+FULL_SHARE: Final = 0.98
+HELD_S: Final = 10.0
+DEGRADED_SHARE: Final = 0.45
+"""Once found, less than half the pressure ends it: half is all that is left then."""
+
+_LAGS: Final = int(Finding.DRIVE_LAGS)
+_LOST: Final = int(Finding.DRIVE_LOST)
+_PUMP_SIGN: Final = int(Finding.PUMP_SIGN)
+_SATURATED: Final = int(Finding.SATURATED)
+
+
+class DriveFollowing:
+    """The pressure against a model of the drive: the command, later by a step, through its lag.
+
+    A drive that says it is limited in power or speed may stay behind the command, not oppose it.
+
+    Parameters
+    ----------
+    lag_s : float
+        Time constant of the pump's pressure.
+    thresholds : MonitorThresholds
+    period_s : float
+        Time between two updates.
+
+    Attributes
+    ----------
+    expected_pa : float
+        Pressure by the model.
+    """
+
+    def __init__(self, lag_s: float, thresholds: MonitorThresholds, period_s: float) -> None:
+        self._share = 1 - math.exp(-period_s / lag_s) if lag_s > 0 else 1.0
+        self._limit_pa = thresholds.pressure_error_pa
+        self._period_s = period_s
+        self._command_pa = 0.0
+        self.expected_pa = 0.0
+        self._enabled_s = self._behind_s = self._reversed_s = 0.0
+
+    def update(self, command_pa: float, pressure_pa: float, *, enabled: bool, limited: bool) -> int:
+        """Take the command that leaves now and the newest pressure; return what was found.
+
+        Parameters
+        ----------
+        command_pa, pressure_pa : float
+        enabled : bool
+            Whether the drive is in operation enabled.
+        limited : bool
+            Whether it says that its power or its speed is at the limit.
+        """
+        if not enabled:
+            self.expected_pa = self._command_pa = 0.0
+            self._enabled_s = self._behind_s = self._reversed_s = 0.0
+            return 0
+        self.expected_pa = expected_pa = self.expected_pa + self._share * (
+            self._command_pa - self.expected_pa
+        )
+        self._command_pa = command_pa
+        self._enabled_s += self._period_s
+        if self._enabled_s < ENABLED_S:
+            return 0
+        limit_pa = self._limit_pa
+        along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
+        if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa:
+            self._reversed_s += self._period_s
+        else:
+            self._reversed_s = 0.0
+        excused = limited and -limit_pa < along_pa < abs(expected_pa) + limit_pa
+        if abs(pressure_pa - expected_pa) > limit_pa and not excused:
+            self._behind_s += self._period_s
+        else:
+            self._behind_s = 0.0
+            return 0
+        found = _PUMP_SIGN if self._reversed_s > REVERSED_S else 0
+        if self._behind_s > LOST_S:
+            return found | _LAGS | _LOST
+        return found | _LAGS if self._behind_s > LAGS_S else found
+
+
+class Saturation:
+    """How long the command is held at its limit on one side, or the drive at one of its own.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        self._limit_pa = thresholds.pressure_limit_pa
+        self._side = 0.0
+        self._held_s = 0.0
+        self._found = False
+
+    def update(self, command_pa: float, *, drive_limited: bool, elapsed_s: float) -> int:
+        """Take the command; return what was found."""
+        share = DEGRADED_SHARE if self._found else FULL_SHARE
+        held = drive_limited or abs(command_pa) >= share * self._limit_pa
+        side = math.copysign(1.0, command_pa)
+        if held and side == self._side:
+            self._held_s += elapsed_s
+        else:
+            self._held_s = 0.0
+        self._side = side
+        self._found = self._held_s > HELD_S
+        return _SATURATED if self._found else 0

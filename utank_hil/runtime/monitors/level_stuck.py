@@ -1,0 +1,56 @@
+"""A level that stands still although it is pushed.
+
+While the measured level stays within a band, the water is computed from where it began, at rest, by
+the tank's equation. Water that does move may cross the band to its turning point and back; in that
+time the computed level moves four bands, and some more by the noise. Sixteen are a level that is
+stuck.
+"""
+
+from typing import Final
+
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.tank_equation import roll_push_at_natural_frequency
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+
+BANDS: Final = 16.0
+
+_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
+
+
+class LevelStuck:
+    """The measured level against water that is free to move.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    thresholds : MonitorThresholds
+    period_s : float
+        Time between two updates.
+    """
+
+    def __init__(
+        self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
+    ) -> None:
+        self._push = roll_push_at_natural_frequency(ship, tank)
+        self._density = tank.density_kg_m3
+        self._band_m = thresholds.level_still_m
+        self._period_s = period_s
+        self._inertia = tank.effective_length_m
+        self._loss = tank.loss_pa_per_m_s / tank.density_kg_m3
+        self._level_m = self._moved_m = self._rate_m_s = 0.0
+
+    def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
+        """Take what is measured; return what was found."""
+        if abs(level_m - self._level_m) > self._band_m:
+            self._level_m = level_m
+            self._moved_m = self._rate_m_s = 0.0
+            return 0
+        level_m = self._level_m + self._moved_m
+        pushed = self._push * roll_rad + pressure_pa / self._density
+        pushed -= self._loss * self._rate_m_s + 2 * GRAVITY_M_S2 * level_m
+        self._rate_m_s += pushed / self._inertia * self._period_s
+        self._moved_m += self._rate_m_s * self._period_s
+        return _LEVEL_STUCK if abs(self._moved_m) > BANDS * self._band_m else 0

@@ -1,0 +1,142 @@
+"""Roll against its integrated rate: drift, stuck signals, and the sign of one of the two.
+
+Over a step the roll moves by m, and the integrated rate says that it turned by t. What is left,
+m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it. A gyroscope's
+constant bias is learned over five minutes and taken off.
+
+The sum tells *that* the two disagree. What disagrees is told by the sums over the time in which one
+of them has not moved, and by
+the sign of sum(m t) / sum(t t) over half a second, which is 1 in health and -1 with one sign wrong.
+"""
+
+import math
+from typing import Final
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+
+LEAK_S: Final = 15.0
+BIAS_S: Final = 300.0
+FIRST_BIAS_S: Final = 30.0
+"""The bias is zero at the start as if it had been learned for so long."""
+SIGN_S: Final = 0.5
+SIGN_GAIN: Final = -0.25
+LEARN: Final = 3.0
+"""Up to so many times the threshold what is left is taken for a bias."""
+LARGE_DRIFT: Final = 4.0
+"""So many times the threshold: no longer a drift to live with."""
+DRIFT_LASTS_S: Final = 30.0
+MOST_DRIFT: Final = 6.0
+"""The sum is kept within so many thresholds: a fault that has gone is forgotten in time."""
+
+_DRIFT: Final = int(Finding.DRIFT)
+_DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
+_SIGN: Final = int(Finding.MOTION_SIGN)
+_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
+_RATE_STUCK: Final = int(Finding.RATE_STUCK)
+
+
+class Stuck:
+    """Sums what a signal leaves unexplained while it stays within a band about a value.
+
+    Parameters
+    ----------
+    band : float
+        Of the signal.
+    limit_rad : float
+        Sum, with the same leak, at which the signal is stuck.
+    """
+
+    def __init__(self, band: float, limit_rad: float) -> None:
+        self._band = band
+        self._limit_rad = limit_rad
+        self._value = math.inf
+        self._sum_rad = 0.0
+
+    def update(self, value: float, left_rad: float, keep: float) -> bool:
+        """Take a value and what the step left unexplained; return whether the signal is stuck."""
+        if abs(value - self._value) > self._band:
+            self._value = value
+            self._sum_rad = 0.0
+            return False
+        self._sum_rad = keep * (self._sum_rad + left_rad)
+        return abs(self._sum_rad) > self._limit_rad
+
+
+class RollAgainstRate:
+    """Compares the roll with its integrated rate.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+
+    Attributes
+    ----------
+    unexplained_rad : float
+        Leaky sum of the roll's moves that the rate does not account for.
+    residual_rad : float
+        The last step's part of it.
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        self._limit_rad = thresholds.drift_rad
+        self._roll_stuck = Stuck(thresholds.roll_still_rad, thresholds.drift_rad)
+        self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
+        self._bias_rad_s = 0.0
+        self._learned_s = FIRST_BIAS_S
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap, with the bias that was learned."""
+        self._roll_rad = math.nan
+        self.unexplained_rad = self.residual_rad = 0.0
+        self._over_s = 0.0
+        self._moved_turned = self._turned_turned = 0.0
+
+    def update(
+        self, roll_rad: float, rate_rad_s: float, turned_rad: float, elapsed_s: float
+    ) -> int:
+        """Take a sample; return what was found.
+
+        Parameters
+        ----------
+        roll_rad, rate_rad_s : float
+            Measured now.
+        turned_rad : float
+            Integral of the rate since the last sample.
+        elapsed_s : float
+            Time since then.
+        """
+        moved_rad = roll_rad - self._roll_rad
+        self._roll_rad = roll_rad
+        if moved_rad != moved_rad:  # the first sample
+            return 0
+        limit_rad = self._limit_rad
+        self.residual_rad = left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
+        if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
+            self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
+            self._bias_rad_s += min(max(left_rad, -limit_rad), limit_rad) / self._learned_s
+        most_rad = MOST_DRIFT * limit_rad
+        keep = 1 - elapsed_s / LEAK_S
+        summed_rad = keep * (self.unexplained_rad + left_rad)
+        self.unexplained_rad = summed_rad = min(max(summed_rad, -most_rad), most_rad)
+        roll_stuck = self._roll_stuck.update(roll_rad, left_rad, keep)
+        rate_stuck = self._rate_stuck.update(rate_rad_s, left_rad, keep)
+        keep = 1 - elapsed_s / SIGN_S
+        self._moved_turned = keep * self._moved_turned + moved_rad * turned_rad
+        self._turned_turned = keep * self._turned_turned + turned_rad * turned_rad
+        if abs(summed_rad) <= limit_rad:
+            if abs(summed_rad) < 0.5 * limit_rad:
+                self._over_s = 0.0
+            return 0
+        self._over_s += elapsed_s
+        found = _DRIFT
+        if self._over_s > DRIFT_LASTS_S or abs(summed_rad) > LARGE_DRIFT * limit_rad:
+            found |= _DRIFT_LASTS
+        if self._moved_turned < SIGN_GAIN * self._turned_turned:
+            found |= _SIGN
+        if roll_stuck:
+            found |= _ROLL_STUCK
+        if rate_stuck:
+            found |= _RATE_STUCK
+        return found

@@ -1,0 +1,48 @@
+"""Noise of a signal: the power of what can't be its motion."""
+
+from typing import Final
+
+NOISE_S: Final = 0.7
+
+
+class Noise:
+    """Power of a residual, averaged over 0.7 s, against a limit.
+
+    Parameters
+    ----------
+    limit : float
+        Standard deviation of the residual that counts as too much.
+
+    Attributes
+    ----------
+    found : bool
+    power : float
+        Averaged square of the residual.
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit_power = limit * limit
+        self.power = 0.0
+        self.found = False
+
+    def update(self, residual: float, elapsed_s: float) -> bool:
+        """Take a residual; return whether there is too much noise."""
+        self.power += (residual * residual - self.power) * (elapsed_s / NOISE_S)
+        self.found = self.power > self._limit_power
+        return self.found
+
+
+class SecondDifference:
+    """What three samples in a row leave of a signal that is smooth.
+
+    White noise of deviation s leaves sqrt(6) s.
+    """
+
+    def __init__(self) -> None:
+        self._last = self._before = 0.0
+
+    def update(self, value: float) -> float:
+        """Take the next sample; return the second difference."""
+        difference = value - 2 * self._last + self._before
+        self._before, self._last = self._last, value
+        return difference

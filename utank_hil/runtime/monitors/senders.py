@@ -1,0 +1,92 @@
+"""Who sends: messages faster than their cycle, nodes that went silent, and frames of nobody.
+
+A message's counter and its cycle tell the same time. Frames that were heard, good or bad, and
+frames that its counter says were lost add up to one a cycle. With a second sender of the same
+identifier it is twice as many, with a counter that skips more. What is above 1.25 a cycle is
+summed; eight frames are too many.
+"""
+
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+from utank_hil.runtime.monitors.finding import Finding
+
+MOST_PER_CYCLE: Final = 1.25
+MOST_FRAMES: Final = 8.0
+SILENT_S: Final = 1.0
+FOREIGN_SHARE: Final = 0.1
+"""Of the bus: so much of it may be used by frames that are not in the catalogue."""
+FOREIGN_FRAMES: Final = 40.0
+
+_SECOND: Final = int(Finding.SECOND_SENDER)
+_SILENT: Final = int(Finding.NODE_SILENT)
+_FLOOD: Final = int(Finding.FLOOD)
+
+
+class Heard(Protocol):
+    """What a receiver counts."""
+
+    cycle_ns: int
+    heard: int
+    lost: int
+
+
+class Stream:
+    """Pace of one message.
+
+    Parameters
+    ----------
+    receiver : Heard
+        With a cycle.
+    silent_s : float
+        A silence of so long is found; infinite where others judge it.
+    """
+
+    def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
+        self._receiver = receiver
+        self._cycles_per_s = 1e9 / receiver.cycle_ns
+        self._silent_limit_s = silent_s
+        self._heard, self._lost = receiver.heard, receiver.lost
+        self.excess = 0.0
+        self._silent_s = 0.0
+
+    def update(self, elapsed_s: float) -> int:
+        """Judge what came since the last call; return what was found."""
+        receiver = self._receiver
+        heard = receiver.heard - self._heard
+        came = heard + receiver.lost - self._lost
+        self._heard += heard
+        self._lost = receiver.lost
+        excess = self.excess + came - MOST_PER_CYCLE * self._cycles_per_s * elapsed_s
+        # twice what is too many: it is forgotten soon after
+        self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
+        self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
+        found = _SECOND if excess > MOST_FRAMES else 0
+        return found | _SILENT if self._silent_s > self._silent_limit_s else found
+
+
+class Senders:
+    """All messages that the controller hears, and the frames that are none of them.
+
+    Parameters
+    ----------
+    streams : sequence of Stream
+    frames_per_s : float
+        Frames that fill the bus.
+    """
+
+    def __init__(self, streams: Sequence[Stream], frames_per_s: float) -> None:
+        self._streams = tuple(streams)
+        self._foreign_per_s = FOREIGN_SHARE * frames_per_s
+        self._foreign = 0
+        self._excess = 0.0
+
+    def update(self, foreign: int, elapsed_s: float) -> int:
+        """Take the foreign frames so far; return what was found."""
+        found = 0
+        for stream in self._streams:
+            found |= stream.update(elapsed_s)
+        excess = self._excess + foreign - self._foreign - self._foreign_per_s * elapsed_s
+        self._foreign = foreign
+        self._excess = excess = min(max(excess, 0.0), 2 * FOREIGN_FRAMES)
+        return found | _FLOOD if excess > FOREIGN_FRAMES else found

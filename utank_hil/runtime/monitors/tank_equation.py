@@ -1,0 +1,206 @@
+"""The tank's own equation: whether the water moves as roll and pressure push it.
+
+With the level h, the roll phi and the pump's pressure P, thesis (2.19) per mass of water is ::
+
+    Le h'' + (c + q |h'|) h' + 2 g h  =  P / rho  +  g L phi + L (H + Lz) phi''
+              y, what the water shows      p                 x
+
+All three are low-pass filtered alike, with both poles at 2 w0, which gives the derivatives without
+differentiating. Sums with a memory of 0.4 roll periods tell the gains::
+
+    roll   sum((y - p) x) / sum(x x)               1; -1 with the motion sensor's sign wrong
+    pump   sum((y - x) p) / sum(p p)               1; -1 with the pump's sensor wrong
+    level  sum(y (p + x)) / sum((p + x) (p + x))   1; -1 with the gauges swapped, 0 if stuck
+
+and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
+The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
+push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
+sixteen times as large is half of it.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.sampling import transition_and_step
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+
+SIGN_GAIN: Final = -0.25
+SETTLED: Final = 10.0
+"""Time constants of the filters after which their start is forgotten."""
+STUCK_GAIN: Final = 0.3
+MEMORY_PERIODS: Final = 0.4
+LATE_PERIODS: Final = 1.5
+LEAST_SHARE: Final = 0.06
+"""Of a push beside the other one."""
+FULL_SHARE: Final = 0.9
+"""Of the tank's height: beyond, roof and bottom push too."""
+
+_WATER_SIGN: Final = int(Finding.WATER_SIGN)
+_PUMP_SIGN: Final = int(Finding.PUMP_SIGN)
+_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
+_LATE: Final = int(Finding.MOTION_LATE)
+
+
+def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
+    """Push on the water per roll that swings at w0, in m^2/(s^2 rad): x / phi."""
+    mass, _, stiffness = coupled_matrices(ship, tank)
+    push = mass[1, 0] * tank.natural_frequency_rad_s**2 - stiffness[1, 0]
+    return float(push / (tank.density_kg_m3 * tank.reservoir_area_m2))
+
+
+class _Filter:
+    """1 / (s / w + 1)^2 with its first and second derivative, for inputs that run straight."""
+
+    __slots__ = (
+        "_a11", "_a12", "_a21", "_a22", "_b1", "_b2", "_c1", "_c2", "_last", "_w", "rate", "value",
+    )  # fmt: skip
+
+    def __init__(self, frequency_rad_s: float, period_s: float) -> None:
+        w = frequency_rad_s
+        # states: value, rate, input; the input's slope is constant over a period
+        states = np.array([[0.0, 1.0, 0.0], [-w * w, -2 * w, w * w], [0.0, 0.0, 0.0]])
+        transition, ramp = transition_and_step(states, np.array([[0.0], [0.0], [1.0]]), period_s)
+        (self._a11, self._a12, _), (self._a21, self._a22, _) = transition[:2].tolist()
+        self._b1, self._b2 = (ramp[:2, 0] / period_s).tolist()
+        self._c1, self._c2 = (transition[:2, 2] - ramp[:2, 0] / period_s).tolist()
+        self._w = w
+        self.start(0.0)
+
+    def start(self, value: float) -> None:
+        self._last = self.value = value
+        self.rate = 0.0
+
+    def update(self, value: float) -> float:
+        """Take the next value; return the second derivative."""
+        last, old, rate, w = self._last, self.value, self.rate, self._w
+        self._last = value
+        self.value = new = self._a11 * old + self._a12 * rate + self._b1 * value + self._c1 * last
+        self.rate = rate = self._a21 * old + self._a22 * rate + self._b2 * value + self._c2 * last
+        bend: float = w * (w * (value - new) - 2 * rate)
+        return bend
+
+
+class TankEquation:
+    """Gains of roll, pump and level in the tank's equation.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    thresholds : MonitorThresholds
+    period_s : float
+        Time between two updates.
+
+    Attributes
+    ----------
+    roll_gain, pump_gain, level_gain : float
+        See the module; NaN as long as the push is too small to tell.
+    late_s : float
+        Delay of the motion sensor; NaN as long as the roll is too small to tell.
+    """
+
+    def __init__(
+        self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
+    ) -> None:
+        mass, _, stiffness = coupled_matrices(ship, tank)
+        density = tank.density_kg_m3
+        water_kg_m = density * tank.reservoir_area_m2
+        self._density = density
+        self._inertia = float(mass[1, 1] / water_kg_m)
+        self._loss = tank.loss_pa_per_m_s / density
+        self._quadratic_loss = tank.quadratic_loss_pa_per_m2_s2 / density
+        self._stiffness = float(stiffness[1, 1] / water_kg_m)
+        self._push = float(-stiffness[1, 0] / water_kg_m)
+        self._push_inertia = float(-mass[1, 0] / water_kg_m)
+        frequency_rad_s = tank.natural_frequency_rad_s
+        self._push_at_w0 = roll_push_at_natural_frequency(ship, tank)
+        self._most_m = FULL_SHARE * tank.level_limit_m
+        self._level = _Filter(2 * frequency_rad_s, period_s)
+        self._roll = _Filter(2 * frequency_rad_s, period_s)
+        self._pump = _Filter(2 * frequency_rad_s, period_s)
+        self._settle = math.ceil(SETTLED / (2 * frequency_rad_s * period_s))
+        self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.roll_period_s))
+        self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.roll_period_s))
+        # sums of so many squares of the least push
+        self._least_xx = thresholds.least_roll_push_m2_s2**2 / (1 - self._keep)
+        self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
+        late_share = thresholds.least_roll_push_m2_s2 * frequency_rad_s
+        self._least_dd = late_share**2 / (1 - self._late_keep)
+        self._late_limit_s = thresholds.motion_late_s
+        self._late_samples = round(thresholds.roll_period_s / period_s)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._wait = -1
+        self._xx = self._pp = self._rest_x = self._rest_p = self._both = self._level_both = 0.0
+        self._lead = self._dd = 0.0
+        self._samples = 0
+        self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
+
+    def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
+        """Take a sample of all three; return what was found."""
+        if self._wait < 0:
+            self._roll.start(roll_rad)
+            self._level.start(level_m)
+            self._pump.start(pressure_pa / self._density)
+            self._wait = self._settle
+            return 0
+        level, roll = self._level, self._roll
+        level_m_s2 = level.update(level_m)
+        roll_rad_s2 = roll.update(roll_rad)
+        self._pump.update(pressure_pa / self._density)
+        if self._wait > 0:
+            self._wait -= 1
+            return 0
+        if abs(level_m) > self._most_m:
+            self._wait = self._settle
+            return 0
+        rate_m_s = level.rate
+        loss = self._loss + self._quadratic_loss * abs(rate_m_s)
+        y = self._inertia * level_m_s2 + loss * rate_m_s + self._stiffness * level.value
+        p = self._pump.value
+        x = self._push * roll.value + self._push_inertia * roll_rad_s2
+        push = p + x
+        keep = self._keep
+        self._xx = xx = keep * self._xx + x * x
+        self._pp = pp = keep * self._pp + p * p
+        self._rest_x = keep * self._rest_x + (y - p) * x
+        self._rest_p = keep * self._rest_p + (y - x) * p
+        self._both = both = keep * self._both + push * push
+        self._level_both = keep * self._level_both + y * push
+        d = self._push_at_w0 * roll.rate
+        self._lead = self._late_keep * self._lead + (y - push) * d
+        self._dd = dd = self._late_keep * self._dd + d * d
+        self._samples += 1
+        return self._judge(xx, pp, both, dd)
+
+    def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
+        found = 0
+        share = LEAST_SHARE * LEAST_SHARE
+        self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
+        if xx > self._least_xx and xx > share * pp:
+            self.roll_gain = gain = self._rest_x / xx
+            if gain < SIGN_GAIN:
+                found = _WATER_SIGN
+        if pp > self._least_pp and pp > share * xx:
+            self.pump_gain = gain = self._rest_p / pp
+            if gain < SIGN_GAIN:
+                found |= _PUMP_SIGN
+        if both > self._least_xx + self._least_pp:
+            self.level_gain = gain = self._level_both / both
+            if gain < SIGN_GAIN:
+                found |= _WATER_SIGN
+            elif gain < STUCK_GAIN:
+                found |= _LEVEL_STUCK
+        if dd > self._least_dd and self._samples > self._late_samples:
+            self.late_s = late_s = self._lead / dd
+            if late_s > self._late_limit_s:
+                found |= _LATE
+        return found

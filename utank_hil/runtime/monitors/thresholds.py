@@ -1,0 +1,141 @@
+"""The thresholds of the monitors: all of them follow from ship, tank, pump and sensors, here.
+
+Symbols: w0 is the water's natural frequency, T its period, to which the tank was tuned and at which
+the ship rolls; s a sensor's noise. The smallest roll at which each fault can be told is in
+`docs/monitors.md`.
+"""
+
+import math
+from dataclasses import dataclass
+
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.parameters import Positive, range_problems, refuse
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFigures:
+    """Noise of the sensors as their makers state it, standard deviations of one sample.
+
+    Attributes
+    ----------
+    roll_noise_rad, roll_rate_noise_rad_s : float
+        Of the motion sensor.
+    level_noise_m : float
+        Of each level gauge.
+
+    Raises
+    ------
+    ValueError
+        If a figure is not positive.
+    """
+
+    roll_noise_rad: Positive = 2e-4
+    roll_rate_noise_rad_s: Positive = 5e-4
+    level_noise_m: Positive = 0.005
+
+    def __post_init__(self) -> None:
+        refuse("sensors", range_problems(self))
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorThresholds:
+    """Thresholds of the monitors.
+
+    Attributes
+    ----------
+    roll_period_s : float
+        T, in which the tank's equation is judged.
+    roll_spike_rad, roll_most_rad_s, rate_spike_rad_s, rate_most_rad_s2 : float
+        A sample further than the first from the last one, and than the second a second more, is
+        discarded; of roll and of its rate.
+    level_spike_m, level_most_m_s : float
+        The same of the levels.
+    roll_noise_rad, rate_noise_rad_s, level_noise_m : float
+        Noise at which the signals count as degraded.
+    drift_rad : float
+        Roll that the integrated rate does not account for.
+    roll_still_rad, rate_still_rad_s : float
+        A signal that stays within this of a value does not move.
+    level_still_m : float
+        The same of the level.
+    volume_m : float
+        Sum of both levels.
+    least_roll_push_m2_s2, least_pump_push_m2_s2 : float
+        Root mean square of the push on the water, as pressure over density, below which the tank's
+        equation says nothing.
+    motion_late_s : float
+        Delay of the motion sensor.
+    pressure_error_pa : float
+        Error of the pump's pressure against the model of the drive.
+    pressure_limit_pa : float
+        Greatest command.
+    amplified_roll_rad : float
+        Root mean square of the roll below which it is not compared with the twin's.
+    """
+
+    roll_period_s: float
+    roll_spike_rad: float
+    roll_most_rad_s: float
+    rate_spike_rad_s: float
+    rate_most_rad_s2: float
+    level_spike_m: float
+    level_most_m_s: float
+    roll_noise_rad: float
+    rate_noise_rad_s: float
+    level_noise_m: float
+    drift_rad: float
+    roll_still_rad: float
+    rate_still_rad_s: float
+    level_still_m: float
+    volume_m: float
+    least_roll_push_m2_s2: float
+    least_pump_push_m2_s2: float
+    motion_late_s: float
+    pressure_error_pa: float
+    pressure_limit_pa: float
+    amplified_roll_rad: float
+
+
+def thresholds_of(
+    plant: DesignPlant, roll_limit_rad: float, sensors: SensorFigures
+) -> MonitorThresholds:
+    """The thresholds for a ship.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+    roll_limit_rad : float
+        Largest roll under control: nothing moves faster than a roll of this amplitude at 2 w0.
+    sensors : SensorFigures
+    """
+    tank, limits = plant.tank, plant.limits
+    frequency_rad_s = tank.natural_frequency_rad_s
+    fastest_rad_s = 2 * frequency_rad_s
+    roll_s, rate_s = sensors.roll_noise_rad, sensors.roll_rate_noise_rad_s
+    # push of a roll of 0.2 degrees RMS, a little less at the water's own frequency
+    roll_push_m2_s2 = 0.2 * math.pi / 180 * 0.6 * 9.81 * tank.width_m
+    # the noise of 15 s of integrated rate, and of the roll itself
+    drift_s = math.hypot(roll_s, rate_s * math.sqrt(0.01 * 7.5))
+    return MonitorThresholds(
+        roll_period_s=2 * math.pi / frequency_rad_s,
+        roll_spike_rad=30 * roll_s,
+        roll_most_rad_s=roll_limit_rad * fastest_rad_s,
+        rate_spike_rad_s=30 * rate_s,
+        rate_most_rad_s2=roll_limit_rad * fastest_rad_s**2,
+        level_spike_m=10 * sensors.level_noise_m,
+        level_most_m_s=tank.level_limit_m * fastest_rad_s,
+        roll_noise_rad=5 * roll_s,
+        rate_noise_rad_s=5 * rate_s,
+        level_noise_m=5 * sensors.level_noise_m,
+        drift_rad=6 * drift_s,
+        roll_still_rad=5 * roll_s,
+        rate_still_rad_s=5 * rate_s,
+        level_still_m=3 * sensors.level_noise_m,
+        volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
+        least_roll_push_m2_s2=roll_push_m2_s2,
+        least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
+        motion_late_s=0.3 / frequency_rad_s,
+        pressure_error_pa=0.15 * limits.pressure_pa,
+        pressure_limit_pa=limits.pressure_pa,
+        amplified_roll_rad=math.radians(0.5),
+    )
