@@ -1,0 +1,52 @@
+"""What of the source's statements holds: a change of the physics that turns one shows here."""
+
+import pytest
+
+from utank_hil.thesis.figure import Figure, Verdict, as_json
+from utank_hil.thesis.registry import ENTRIES, UnknownFigureError, chosen
+
+SIGNS = {Verdict.HOLDS: "+", Verdict.PARTLY: "~", Verdict.FAILS: "-", Verdict.OPEN: "?"}
+# of each figure its statements, in their order
+FAST = {
+    "2.3": "+~~~",
+    "2.4": "+~",
+    "2.5": "++",
+    "2.6": "~~",
+    "2.7": "~++",
+    "2.8": "++-+++?",
+}
+
+
+def made(key: str) -> Figure:
+    (entry,) = chosen([key])
+    assert entry.make is not None
+    return entry.make()
+
+
+def signs(figure: Figure) -> str:
+    return "".join(SIGNS[check.verdict] for check in figure.checks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", FAST)
+def test_a_figure_has_its_verdicts_and_its_reasons_each_time(key: str) -> None:
+    figure = made(key)
+    assert figure.key == key
+    assert signs(figure) == FAST[key]
+    assert all(check.statement and check.measured for check in figure.checks)
+    deviating = [row for row in figure.rows if row.deviation is None or abs(row.deviation) > 0.005]
+    assert [row.quantity for row in deviating if not row.reason] == []
+    assert as_json(made(key)) == as_json(figure)
+
+
+def test_keys_are_unique_and_what_has_nothing_to_compute_is_named() -> None:
+    assert len({entry.key for entry in ENTRIES}) == len(ENTRIES)
+    assert all((entry.make is None) == bool(entry.word) for entry in ENTRIES)
+    assert all(entry.title for entry in ENTRIES)
+
+
+def test_chosen_figures_come_in_the_source_s_order() -> None:
+    assert [entry.key for entry in chosen(["2.7", "2.3"])] == ["2.3", "2.7"]
+    assert chosen([]) == ENTRIES
+    with pytest.raises(UnknownFigureError, match=r"'9\.9'.*--list.*2\.1"):
+        chosen(["9.9"])

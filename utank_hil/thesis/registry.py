@@ -1,0 +1,65 @@
+"""Every figure and group of printed numbers of chapters 2 to 4 of the source, in its order."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from utank_hil.thesis.figure import Figure
+from utank_hil.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
+from utank_hil.thesis.pump_power import figure_2_7
+from utank_hil.thesis.still_water import figure_2_8
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One figure or group of numbers.
+
+    Attributes
+    ----------
+    key : str
+        Number of the figure, or name of the group.
+    title : str
+    make : callable or None
+        What makes it anew; None for a sketch, of which there is nothing to compute.
+    word : str
+        What a sketch shows.
+    """
+
+    key: str
+    title: str
+    make: Callable[[], Figure] | None = None
+    word: str = ""
+
+
+ENTRIES: Final = (
+    Entry("2.1", "Active U-tube tank", word="sketch of ship and tank"),
+    Entry("2.2", "Inner pressure loop", word="block diagram"),
+    Entry("2.3", "Roll by pump pressure: magnitude", figure_2_3),
+    Entry("2.4", "Roll by pump pressure: phase", figure_2_4),
+    Entry("2.5", "Water by pump pressure: magnitude", figure_2_5),
+    Entry("2.6", "Water by pump pressure: phase", figure_2_6),
+    Entry("2.7", "Stimulator moment per pump power", figure_2_7),
+    Entry("2.8", "Roll on still water", figure_2_8),
+)
+
+
+class UnknownFigureError(ValueError):
+    """A key that is not in the registry."""
+
+
+def chosen(keys: Sequence[str]) -> tuple[Entry, ...]:
+    """Entries of some keys, in the order of the source; all of them for no key.
+
+    Raises
+    ------
+    UnknownFigureError
+        If there is no such figure.
+    """
+    known = {entry.key for entry in ENTRIES}
+    for key in keys:
+        if key not in known:
+            raise UnknownFigureError(
+                f"no figure {key!r}; --list shows all of them: "
+                + ", ".join(entry.key for entry in ENTRIES)
+            )
+    return tuple(entry for entry in ENTRIES if not keys or entry.key in keys)
