@@ -6,8 +6,11 @@ from typing import Final
 
 from utank_hil.thesis.figure import Figure
 from utank_hil.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
+from utank_hil.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
 from utank_hil.thesis.pump_power import figure_2_7
 from utank_hil.thesis.still_water import figure_2_8
+from utank_hil.thesis.tank_place import figure_tank_place
+from utank_hil.thesis.wave_phases import figure_3_1
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,12 @@ ENTRIES: Final = (
     Entry("2.6", "Water by pump pressure: phase", figure_2_6),
     Entry("2.7", "Stimulator moment per pump power", figure_2_7),
     Entry("2.8", "Roll on still water", figure_2_8),
+    Entry("3.1", "Phases of roll and water by waves", figure_3_1),
+    Entry("tank-height", "Effect of the tank's height Lz (3.2)", figure_tank_place),
+    Entry("3.2", "Optimal frequency and damping ratio of the water", figure_3_2),
+    Entry("3.3", "Roll at the optimal frequency ratio", figure_3_3),
+    Entry("3.4", "Roll at the optimal damping ratio", figure_3_4),
+    Entry("3.5", "Predictive control with identification", word="block diagram"),
 )
 
 
