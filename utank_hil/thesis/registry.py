@@ -6,6 +6,14 @@ from typing import Final
 
 from utank_hil.thesis.figure import Figure
 from utank_hil.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
+from utank_hil.thesis.gains import figure_first_ship, figure_gains
+from utank_hil.thesis.law_figures import (
+    figure_3_6,
+    figure_3_7,
+    figure_3_8,
+    figure_3_9,
+    figure_3_10,
+)
 from utank_hil.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
 from utank_hil.thesis.pump_power import figure_2_7
 from utank_hil.thesis.still_water import figure_2_8
@@ -49,6 +57,13 @@ ENTRIES: Final = (
     Entry("3.3", "Roll at the optimal frequency ratio", figure_3_3),
     Entry("3.4", "Roll at the optimal damping ratio", figure_3_4),
     Entry("3.5", "Predictive control with identification", word="block diagram"),
+    Entry("first-ship", "Numbers of the first ship (3.7, 3.8)", figure_first_ship),
+    Entry("gains", "Printed gains of DPC and GPC (3.8)", figure_gains),
+    Entry("3.6", "Roll over frequency with PD, LQR, GPC and DPC", figure_3_6),
+    Entry("3.7", "Roll over time with PD, LQR, GPC and DPC", figure_3_7),
+    Entry("3.8", "Pump pressure over time with LQR, GPC and DPC", figure_3_8),
+    Entry("3.9", "Control horizon of DPC (roll, level)", figure_3_9),
+    Entry("3.10", "Roll reduced per pressure", figure_3_10),
 )
 
 

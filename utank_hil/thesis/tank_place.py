@@ -67,8 +67,8 @@ def figure_tank_place() -> Figure:
                 higher,
                 f"with the water at its optimum the greatest roll is {best[0]:.2f} at "
                 f"{_ALONG_M[0]:g} m and {best[-1]:.2f} at {_ALONG_M[-1]:g} m; one tank moved up "
-                f"has its least, {min(top):.2f}, at {_ALONG_M[int(np.argmin(top))]:g} m: beyond that "
-                "its frequency and friction no longer fit",
+                f"has its least, {min(top):.2f}, at {_ALONG_M[int(np.argmin(top))]:g} m: beyond "
+                "that its frequency and friction no longer fit",
             ),
             Check(
                 "a higher tank reduces the ship's stability",
