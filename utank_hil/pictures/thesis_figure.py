@@ -20,7 +20,7 @@ _STROKES: Final[tuple[dict[str, Any], ...]] = (
 )
 """Told apart in grey too: by their strokes."""
 _DENSE: Final = 6
-"""Turns of a curve from which on its strokes are not broken."""
+"""Swings of a curve from which on its panel has whole strokes."""
 
 
 def draw_figure(figure: Figure, path: Path) -> Path:
@@ -41,7 +41,8 @@ def draw_figure(figure: Figure, path: Path) -> Path:
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)
     size_in = (5.8 * columns, 0.5 + 3.9 * rows) if columns > 1 else (8.0, 0.5 + 3.3 * rows)
-    with picture(path, f"{figure.key}  {figure.title}", size_in) as canvas:
+    number = f"{figure.key}  " if figure.key[0].isdigit() else ""
+    with picture(path, number + figure.title, size_in) as canvas:
         axes = canvas.subplots(rows, columns, squeeze=False).ravel()
         for axis, panel in zip(axes, figure.panels, strict=False):
             _draw_panel(axis, panel)
@@ -53,8 +54,9 @@ def draw_figure(figure: Figure, path: Path) -> Path:
 def _draw_panel(axis: "Axes", panel: Panel) -> None:
     if panel.span is not None:
         axis.axvspan(*panel.span, color=HIGHLIGHT, alpha=0.35, linewidth=0, label=panel.span_label)
+    dense = any(_dense(curve) for curve in panel.curves)
     for curve, stroke in zip(panel.curves, _STROKES, strict=False):
-        _draw_curve(axis, curve, stroke)
+        _draw_curve(axis, curve, stroke, dense=dense)
     for log, set_scale, ticks in (
         (panel.log_x, axis.set_xscale, axis.xaxis),
         (panel.log_y, axis.set_yscale, axis.yaxis),
@@ -81,18 +83,18 @@ def _draw_panel(axis: "Axes", panel: Panel) -> None:
     legend.get_title().set_fontweight("bold")
 
 
-def _draw_curve(axis: "Axes", curve: Curve, stroke: dict[str, Any]) -> None:
-    x, y = np.asarray(curve.x), np.asarray(curve.y)
+def _dense(curve: Curve) -> bool:
+    """Whether a curve swings so often that broken strokes would hide it."""
+    y = np.asarray(curve.y)
+    swings = np.count_nonzero(np.diff(np.sign(y - y.mean()))) > 2 * _DENSE
+    return bool(not curve.marks and swings and np.ptp(y) > 1e-9 * np.abs(y).max())
+
+
+def _draw_curve(axis: "Axes", curve: Curve, stroke: dict[str, Any], *, dense: bool) -> None:
     if curve.marks:
-        axis.plot(x, y, color=stroke["color"], marker=stroke["marker"], linestyle="none",
-                  markersize=5, label=curve.label)  # fmt: skip
-        return
-    dense = np.count_nonzero(np.diff(np.sign(y - y.mean()))) > 2 * _DENSE and np.ptp(y) > 0
-    axis.plot(
-        x,
-        y,
-        color=stroke["color"],
-        linestyle="-" if dense else stroke["linestyle"],
-        linewidth=0.9 if dense else 1.7,
-        label=curve.label,
-    )
+        style = {"marker": stroke["marker"], "linestyle": "none", "markersize": 5}
+    elif dense:
+        style = {"linestyle": "-", "linewidth": 1.0}
+    else:
+        style = {"linestyle": stroke["linestyle"], "linewidth": 1.7}
+    axis.plot(curve.x, curve.y, color=stroke["color"], label=curve.label, **style)

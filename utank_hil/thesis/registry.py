@@ -4,8 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from utank_hil.thesis.capsize_amplitudes import figure_capsize
+from utank_hil.thesis.damping import figure_damping
 from utank_hil.thesis.figure import Figure
 from utank_hil.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
+from utank_hil.thesis.fuzzy_parameters import figure_4_12, figure_4_13, figure_4_16
 from utank_hil.thesis.gains import figure_first_ship, figure_gains
 from utank_hil.thesis.law_figures import (
     figure_3_6,
@@ -14,9 +17,21 @@ from utank_hil.thesis.law_figures import (
     figure_3_9,
     figure_3_10,
 )
+from utank_hil.thesis.membership import figure_4_5
 from utank_hil.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
+from utank_hil.thesis.phase_plane import figure_4_1, table_4_1
 from utank_hil.thesis.pump_power import figure_2_7
 from utank_hil.thesis.still_water import figure_2_8
+from utank_hil.thesis.survival_figures import (
+    figure_4_6,
+    figure_4_7,
+    figure_4_8,
+    figure_4_9,
+    figure_4_10,
+    figure_4_11,
+    figure_4_14,
+    figure_4_15,
+)
 from utank_hil.thesis.tank_place import figure_tank_place
 from utank_hil.thesis.wave_phases import figure_3_1
 
@@ -64,6 +79,25 @@ ENTRIES: Final = (
     Entry("3.8", "Pump pressure over time with LQR, GPC and DPC", figure_3_8),
     Entry("3.9", "Control horizon of DPC (roll, level)", figure_3_9),
     Entry("3.10", "Roll reduced per pressure", figure_3_10),
+    Entry("4.1", "Phase plane without damping", figure_4_1),
+    Entry("4.2", "Feedback linearization", word="block diagram"),
+    Entry("4.3", "Fuzzy system", word="block diagram"),
+    Entry("4.4", "Feedback connection of two systems", word="block diagram"),
+    Entry("table-4.1", "Parameters of Patti-B (Table 4.1)", table_4_1),
+    Entry("4.5", "Membership functions", figure_4_5),
+    Entry("4.6", "Roll over time, wave moment 50.9 kN m", figure_4_6),
+    Entry("4.7", "Roll rate over roll, wave moment 50.9 kN m", figure_4_7),
+    Entry("4.8", "Roll over time, wave moment 78.6 kN m", figure_4_8),
+    Entry("4.9", "Roll rate over roll, wave moment 78.6 kN m", figure_4_9),
+    Entry("4.10", "Roll over time, the greatest waves", figure_4_10),
+    Entry("4.11", "Roll rate over roll, the greatest waves", figure_4_11),
+    Entry("capsize", "Wave moments that capsize Patti-B (4.5)", figure_capsize),
+    Entry("4.12", "Parameter λ of (4.23)", figure_4_12),
+    Entry("4.13", "Parameter θ of (4.23)", figure_4_13),
+    Entry("4.14", "Roll over time with (4.20)", figure_4_14),
+    Entry("4.15", "Roll rate over roll with (4.20)", figure_4_15),
+    Entry("4.16", "Parameter λ of (4.20)", figure_4_16),
+    Entry("damping", "Gains of roll damping (4.5, 5.1)", figure_damping),
 )
 
 
