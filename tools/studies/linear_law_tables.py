@@ -55,6 +55,7 @@ from utank_hil.control.optimal_tank import (
 )
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, coupled_model
+from utank_hil.thesis.ships import AS_PRINTED, FITTED, GREATER
 
 Rows = dict[str, dict[str, float]]
 # how each column is written
@@ -87,27 +88,6 @@ SHIPPED = {
 }
 MASS_RATIOS = (0.02, 0.05, 0.10)  # beside the first ship's own
 WAVE_RATIOS = np.geomspace(0.05, 5.0, 8000)
-
-
-def printed_ship(
-    damping_nms_rad: float, tank_damping: float, reservoir_area_m2: float = 17.11
-) -> tuple[RollShip, Tank]:
-    """The first ship with what the source leaves open."""
-    vessel = shipped("gpc").vessel
-    tank = Tank(
-        vessel.tank.width_m,
-        vessel.tank.height_m,
-        reservoir_area_m2,
-        vessel.tank.duct_area_m2,
-        lz_m=vessel.tank.lz_m,
-        damping_ratio=tank_damping,
-    )
-    return RollShip(1.9275e9, 1.9275e9 * 0.25, damping_nms_rad), tank
-
-
-AS_PRINTED = printed_ship(5.8e7, 0.080)
-GREATER = printed_ship(1.04e8, 0.153, 25.2)
-FITTED = printed_ship(7.9885e7, 0.15836, 24.416)
 
 
 def margin_rows() -> Rows:

@@ -78,7 +78,7 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
         If there is no such law.
     """
     model = without_tank(PATTI_B) if law == "no tank" else PATTI_B
-    build = _builder(law, unlimited=math.isinf(pump_pa))
+    build = law_factory(law, unlimited=math.isinf(pump_pa))
     pumped = math.isfinite(pump_pa) and law != "no tank"
 
     def run(amplitude_nm: float) -> Survival:
@@ -93,8 +93,21 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
     return Contest(tuple(run(amplitude) for amplitude in PRINTED_NM), largest)
 
 
-def _builder(law: str, *, unlimited: bool) -> Callable[[], Controller]:
-    """Factory of new controllers of a law, at rest."""
+def law_factory(law: str, *, unlimited: bool) -> Callable[[], Controller]:
+    """Factory of new controllers of a law, at rest.
+
+    Parameters
+    ----------
+    law : str
+        One of `LAWS`.
+    unlimited : bool
+        Whether the pump has no limits; the fuzzy laws have other parameters then.
+
+    Raises
+    ------
+    ValueError
+        If there is no such law.
+    """
     c = PATTI_B.coefficients
     gain = -c.coupling * c.area / (c.inertia * c.level_inertia - c.coupling**2)
     brake, stiffness = level_brake(PATTI_B, 0.5), PATTI_B.ship.stiffness_nm_rad

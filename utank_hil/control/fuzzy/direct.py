@@ -158,12 +158,13 @@ class DirectFuzzyController(FuzzyController):
 
     Attributes
     ----------
+    law : SmallGainFuzzy or RobustFuzzy
     parameters : tuple of float
         What is adapted: (lambda,) or (lambda, theta).
     """
 
     def __init__(self, law: SmallGainFuzzy | RobustFuzzy) -> None:
-        self._law = law
+        self.law = law
         self._leak = [
             (sigma, math.exp(-adaptation * sigma * law.sample_time_s))
             for adaptation, sigma in law.rates
@@ -171,16 +172,16 @@ class DirectFuzzyController(FuzzyController):
         super().__init__(law)
 
     def _forget(self) -> None:
-        self.parameters = self._law.start
+        self.parameters = self.law.start
 
     def _answer(self, now: FuzzyInputs) -> float:
         square = self._basis.square(now.x)
         psi = 1.0 + float(now.x.dot(now.x)) + math.sqrt(square)
-        u, drives = self._law.answer(self.parameters, now.s, square, psi)
+        u, drives = self.law.answer(self.parameters, now.s, square, psi)
         self.parameters = tuple(
             self._adapted(value, start, drive if now.learning else 0.0, leak)
             for value, start, drive, leak in zip(
-                self.parameters, self._law.start, drives, self._leak, strict=True
+                self.parameters, self.law.start, drives, self._leak, strict=True
             )
         )
         return u

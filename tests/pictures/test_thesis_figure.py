@@ -1,0 +1,53 @@
+"""Figures of the source as drawn: legends off the data, nothing cut."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure as Canvas
+
+from utank_hil.pictures.thesis_figure import draw_figure
+from utank_hil.thesis.figure import Curve, Figure, Panel
+
+X = np.linspace(0, 100, 2001)
+LONG = tuple(Curve(f"a law with a name of {n} words", X, np.sin(X / (n + 1))) for n in range(4))
+
+
+@pytest.fixture
+def canvas(monkeypatch: pytest.MonkeyPatch) -> list[Canvas]:
+    """The figures that were saved."""
+    saved: list[Canvas] = []
+    save = Canvas.savefig
+
+    def keep(self: Canvas, *arguments, **options) -> None:
+        saved.append(self)
+        save(self, *arguments, **options)
+
+    monkeypatch.setattr(Canvas, "savefig", keep)
+    return saved
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("panels", [1, 2, 3])
+def test_legends_stand_off_the_data_and_no_text_is_cut(
+    columns: int, panels: int, canvas: list[Canvas], tmp_path: Path
+) -> None:
+    panel = Panel("A title", "Time (s)", "Roll (°)", LONG, span=(0.0, 9.0), span_label="before")
+    path = draw_figure(
+        Figure("9.9", "A figure", "", "", (panel,) * panels, columns=columns), tmp_path / "x.png"
+    )
+    assert path.stat().st_size > 10_000
+    (drawn,) = canvas
+    shown = [axis for axis in drawn.axes if axis.get_visible()]
+    assert len(shown) == panels
+    whole = drawn.bbox
+    for axis in shown:
+        legend = axis.get_legend().get_window_extent()
+        inside = axis.get_window_extent()
+        assert legend.y0 >= inside.y1 - 1
+        for text in (legend, axis.xaxis.label.get_window_extent(),
+                     axis.yaxis.label.get_window_extent()):  # fmt: skip
+            assert whole.x0 <= text.x0
+            assert text.x1 <= whole.x1
+            assert whole.y0 <= text.y0
+            assert text.y1 <= whole.y1

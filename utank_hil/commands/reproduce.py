@@ -1,0 +1,137 @@
+"""``utank-hil reproduce``: the source thesis shown again, figure by figure."""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, shown
+from utank_hil.commands.tables import print_table
+from utank_hil.thesis.figure import Figure, Verdict, as_json
+from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
+
+PAGE: Final = "gallery.html"
+NUMBERS: Final = "figures.json"
+
+
+def reproduce(
+    figures: Annotated[
+        list[str] | None,
+        typer.Argument(help="Numbers of figures, or names of groups; all of them without any."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for pictures and page.")] = OUT / "thesis",
+    list_: Annotated[bool, typer.Option("--list", help="Show what there is and end.")] = False,
+    json_: Json = False,
+) -> None:
+    """Make figures and printed numbers of the source thesis anew, and judge what its text says.
+
+    Printed numbers stand beside ours with the deviation and its reason. All of it is on one page,
+    gallery.html, which needs nothing else. All figures take some minutes.
+
+    [bold]Example:[/bold] utank-hil reproduce 2.7 3.9 4.12 --out out/thesis
+    """
+    try:
+        entries = chosen(figures or [])
+    except UnknownFigureError as error:
+        fail(error)
+    if list_:
+        _list(entries, json_)
+        return
+    made_here = [entry for entry in entries if entry.make is not None]
+    prepare_out(out, (PAGE, NUMBERS, *(f"{entry.key}.png" for entry in made_here)))
+    made, seconds = _make(made_here, out)
+    from utank_hil.pictures.gallery import write_gallery
+
+    files = {"page": write_gallery(entries, made, out, out / PAGE), "numbers": out / NUMBERS}
+    result = {
+        "figures": [as_json(figure) for figure in made.values()],
+        "sketches": [
+            {"key": entry.key, "title": entry.title, "word": entry.word}
+            for entry in entries
+            if entry.make is None
+        ],
+    }
+    files["numbers"].write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    if json_:
+        sys.stdout.write(json.dumps(result) + "\n")
+        return
+    console = Console(highlight=False)
+    print_table(console, _summary(entries, made, seconds))
+    for name, path in files.items():
+        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+
+
+def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str, float]]:
+    """Make and draw each figure; how long each took."""
+    from utank_hil.pictures.thesis_figure import draw_figure
+
+    made: dict[str, Figure] = {}
+    seconds: dict[str, float] = {}
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:g} of {task.total:g}"),
+        TimeElapsedColumn(),
+        console=notes,
+        disable=not notes.is_terminal,
+    ) as bar:
+        task = bar.add_task("", total=len(entries))
+        for entry in entries:
+            assert entry.make is not None
+            bar.update(task, description=f"{entry.key} {entry.title}")
+            begin = time.monotonic()
+            figure = entry.make()
+            if figure.panels:
+                draw_figure(figure, out / f"{figure.key}.png")
+            made[entry.key] = figure
+            seconds[entry.key] = time.monotonic() - begin
+            bar.advance(task)
+    return made, seconds
+
+
+def _list(entries: tuple[Entry, ...], as_object: bool) -> None:
+    """Print keys and titles."""
+    if as_object:
+        listed = [
+            {"key": entry.key, "title": entry.title, "word": entry.word or None}
+            for entry in entries
+        ]
+        sys.stdout.write(json.dumps({"figures": listed}) + "\n")
+        return
+    console = Console(highlight=False)
+    for entry in entries:
+        word = f" ({entry.word}: nothing to compute)" if entry.word else ""
+        console.print(f"{entry.key:>12}  {entry.title}{word}", soft_wrap=True)
+
+
+def _summary(
+    entries: tuple[Entry, ...], made: dict[str, Figure], seconds: dict[str, float]
+) -> Table:
+    """One line a figure."""
+    table = Table(title=f"{len(made)} of {len(ENTRIES)} figures and groups of numbers")
+    for heading in ("", "figure", "greatest\ndeviation", "holds", "in part", "does\nnot", "s"):
+        table.add_column(heading, justify="left" if heading in ("", "figure") else "right")
+    for entry in entries:
+        figure = made.get(entry.key)
+        if figure is None:
+            table.add_row(entry.key, f"{entry.title} ({entry.word})", "", "", "", "", "")
+            continue
+        known = [row.deviation for row in figure.rows if row.deviation is not None]
+        verdicts = [check.verdict for check in figure.checks]
+        table.add_row(
+            entry.key,
+            entry.title,
+            f"{max(known, key=abs):+.1%}" if known else "",
+            *(
+                str(verdicts.count(verdict) or "")
+                for verdict in (Verdict.HOLDS, Verdict.PARTLY, Verdict.FAILS)
+            ),
+            f"{seconds[entry.key]:.0f}",
+        )
+    return table

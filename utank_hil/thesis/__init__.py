@@ -1,0 +1,1 @@
+"""The figures and printed numbers of the source thesis, made anew from this project's models."""

@@ -1,0 +1,209 @@
+"""A figure of the source: curves, printed numbers beside ours, and its text's statements judged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+MOST_CURVES: Final = 4
+"""Curves of one panel that can still be told apart."""
+
+
+class Verdict(StrEnum):
+    """Whether a statement of the text holds."""
+
+    HOLDS = "holds"
+    PARTLY = "holds in part"
+    FAILS = "does not hold"
+    OPEN = "can't be judged"
+
+    @classmethod
+    def of(cls, holds: bool) -> "Verdict":
+        """`HOLDS` or `FAILS`."""
+        return cls.HOLDS if holds else cls.FAILS
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve of a panel.
+
+    Attributes
+    ----------
+    label : str
+        Text in the legend.
+    x, y : array_like, shape (n,)
+        In the units of the panel's labels.
+    marks : bool
+        Single points instead of a line.
+    """
+
+    label: str
+    x: npt.ArrayLike
+    y: npt.ArrayLike
+    marks: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One coordinate system of a figure.
+
+    Attributes
+    ----------
+    title : str
+    x_label, y_label : str
+        Units included.
+    curves : tuple of Curve
+        One to `MOST_CURVES`.
+    log_x, log_y : bool
+    span : tuple of float, optional
+        Abscissae to highlight.
+    span_label : str
+        What the highlight means.
+    y_limits : tuple of float, optional
+
+    Raises
+    ------
+    ValueError
+        If there are no curves, or too many.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    log_x: bool = False
+    log_y: bool = False
+    span: tuple[float, float] | None = None
+    span_label: str = ""
+    y_limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.curves) <= MOST_CURVES:
+            raise ValueError(
+                f"panel {self.title!r} must have 1 to {MOST_CURVES} curves, got {len(self.curves)}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A printed number beside ours.
+
+    Attributes
+    ----------
+    quantity : str
+    unit : str
+    printed : float or tuple of float
+        A number, or the ends of a range.
+    ours : float or None
+        None where the source gives too little to make it.
+    reason : str
+        Why ours deviates, or why there is none.
+    """
+
+    quantity: str
+    unit: str
+    printed: float | tuple[float, float]
+    ours: float | None
+    reason: str
+
+    @property
+    def deviation(self) -> float | None:
+        """Relative deviation; 0 within a printed range, from its nearer end outside."""
+        if self.ours is None:
+            return None
+        ends = self.printed if isinstance(self.printed, tuple) else (self.printed, self.printed)
+        nearest = min(max(self.ours, ends[0]), ends[1])
+        return 0.0 if self.ours == nearest else self.ours / nearest - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A statement of the text about a figure, judged.
+
+    Attributes
+    ----------
+    statement : str
+    verdict : Verdict
+    measured : str
+        What it was judged by.
+    """
+
+    statement: str
+    verdict: Verdict
+    measured: str
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure, or a group of printed numbers, made anew.
+
+    Attributes
+    ----------
+    key : str
+        Number of the figure, or name of the group.
+    title : str
+    method : str
+        How ours was made.
+    open_points : str
+        What the source leaves open, and what was assumed or varied.
+    panels : tuple of Panel
+    rows : tuple of Row
+    checks : tuple of Check
+    columns : int
+        Panels side by side.
+    """
+
+    key: str
+    title: str
+    method: str
+    open_points: str
+    panels: tuple[Panel, ...] = ()
+    rows: tuple[Row, ...] = ()
+    checks: tuple[Check, ...] = ()
+    columns: int = 2
+
+
+def as_json(figure: Figure) -> dict[str, Any]:
+    """Numbers and judgements of a figure, without its curves."""
+    return {
+        "key": figure.key,
+        "title": figure.title,
+        "method": figure.method,
+        "open_points": figure.open_points,
+        "rows": [
+            {
+                "quantity": row.quantity,
+                "unit": row.unit,
+                "printed": row.printed,
+                "ours": row.ours,
+                "deviation": row.deviation,
+                "reason": row.reason,
+            }
+            for row in figure.rows
+        ],
+        "checks": [
+            {
+                "statement": check.statement,
+                "verdict": check.verdict.value,
+                "measured": check.measured,
+            }
+            for check in figure.checks
+        ],
+    }
+
+
+def printed_text(row: Mapping[str, Any] | Row) -> str:
+    """The printed number of a row, or of its JSON, as text."""
+    printed = row.printed if isinstance(row, Row) else row["printed"]
+    if isinstance(printed, (tuple, list)):
+        return f"{printed[0]:.5g} to {printed[1]:.5g}"
+    return f"{printed:.5g}"
+
+
+def peaks(y: npt.ArrayLike) -> int:
+    """Number of inner maxima of a curve."""
+    slope = np.diff(np.asarray(y))
+    return int(np.count_nonzero((slope[:-1] > 0) & (slope[1:] <= 0)))
