@@ -31,6 +31,8 @@ from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea
 
 Bearing = Annotated[float, Range(least=-360, most=360)]
+Speed = Annotated[float, Range(least=0, most=40)]
+"""Of a ship, in m/s; the fastest ferries make 30."""
 _FAST_M_S: Final = 20.0
 _STEEPEST: Final = 1 / 7
 """Height per length at which a regular wave breaks in deep water (Michell 1893)."""
@@ -48,8 +50,7 @@ class _AnySea(Section):
 
     heading_deg: Bearing = 90.0
     """Where the waves go relative to the ship: 0 following, 180 head, 90 from port to starboard."""
-    speed_m_s: Annotated[float, Range(least=0, most=40)] = 0.0
-    """The ship's speed; the fastest ferries make 30."""
+    speed_m_s: Speed = 0.0
     effective_slope: EffectiveSlope = EffectiveSlope()
     roll_moment_table: Path | None = None
     """Roll moment against frequency and heading (`MomentTable`), instead of the effective slope."""

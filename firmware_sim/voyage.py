@@ -4,15 +4,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
+from firmware_sim.scenario_sea import Bearing, Speed
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import AnySpectrum
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import Problem
+from utank_hil.parameters import Finite, Positive, Problem
 
 
 class Waypoint(Section):
@@ -22,15 +23,15 @@ class Waypoint(Section):
     not name is as at the one before.
     """
 
-    time_s: Annotated[float, Field(gt=0)]
-    heading_deg: float | None = None
+    time_s: Positive
+    heading_deg: Bearing | None = None
     """Where the waves go relative to the ship."""
-    course_deg: float | None = None
+    course_deg: Bearing | None = None
     """Instead of the heading, where the sea has directions: clockwise from true north."""
-    speed_m_s: Annotated[float, Field(ge=0, le=40)] | None = None
+    speed_m_s: Speed | None = None
     sea: AnySpectrum | None = None
     """Spectrum of the sea, met as the scenario's is."""
-    ship: dict[str, float] = Field(default_factory=dict)
+    ship: dict[str, Finite] = Field(default_factory=dict)
     """Keys of the ship, as in ``actual_ship``."""
 
 

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from firmware_sim.scenario_sea import ScenarioSea
+from firmware_sim.voyage import Waypoint
 from utank_hil.configuration import ConfigError, Section, load_config
 from utank_hil.sea import Sea, ittc, jonswap, load_ndbc, pierson_moskowitz
 
@@ -151,8 +152,14 @@ def test_the_document_s_sections_are_valid(tmp_path: Path) -> None:
     (tmp_path / "scenarios").mkdir()
     for example in examples:
         path = tmp_path / "scenarios" / "example.yaml"
+        if not example.startswith("sea:"):
+            continue  # a part of another section
         path.write_text(example, encoding="utf-8")
         sea = load_config(path, Holder).sea
         assert sea.sea(1).amplitude_m.size
         kinds.add(sea.kind)
     assert {"measured", "jonswap"} <= kinds
+    (voyage,) = (yaml.safe_load(each)["voyage"] for each in examples if "voyage:" in each)
+    assert [Waypoint.model_validate(point).time_s for point in voyage] == [
+        1800, 3600, 3660, 4200, 6600
+    ]  # fmt: skip

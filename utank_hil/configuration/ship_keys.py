@@ -81,7 +81,7 @@ class WrittenShip(RollShip):
     inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
-    displacement_n: float = NOT_GIVEN
+    displacement_n: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
     displacement_t: Annotated[float, Range(above=0, most=1e9)] = NOT_GIVEN
     gm_m: Annotated[float, Range(above=0, most=1e3)] = NOT_GIVEN
     roll_period_s: Annotated[float, Range(above=0, most=1e4)] = NOT_GIVEN

@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any, Final
 
 from pydantic import ValidationInfo, field_validator, model_validator
@@ -13,6 +13,7 @@ from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile
 from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import Problem, refuse
 
@@ -39,7 +40,7 @@ class Vessel(Section):
     def version(self) -> int:
         """Hash of everything but the name, for the nodes to compare before arming."""
         parts = (self.ship, self.tank, self.pump)
-        content = [None if part is None else asdict(part) for part in parts]
+        content = [None if part is None else _not_by_default(part) for part in parts]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -100,3 +101,9 @@ class Vessel(Section):
     def warnings(self) -> list[Problem]:
         """What is unusual in the vessel."""
         return vessel_warnings(self.ship, self.tank, self.pump)
+
+
+def _not_by_default(part: RollShip | Tank | Pump) -> dict[str, Any]:
+    """The parameters that differ from their default, so that a new one changes no version."""
+    defaults = {field.name: field.default for field in fields(part)}
+    return {name: value for name, value in asdict(part).items() if value != defaults[name]}
