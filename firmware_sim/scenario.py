@@ -121,7 +121,9 @@ class Scenario(Section):
             problems.append(("settle_s", reason))
         if self.vessel.pump is not None:
             if not self.controllers:
-                problems.append(("controllers", "must name at least 1 for the vessel's pump"))
+                problems.append(
+                    ("controllers", "must have 1 or more, got 0, as the vessel has a pump")
+                )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
         if PASSIVE in self.controllers:

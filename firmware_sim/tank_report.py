@@ -7,10 +7,19 @@ from typing import Any
 
 from rich.table import Table
 
-from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction
+from utank_hil.analysis.tank_design import TankFigures
+from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
 from utank_hil.analysis.tank_sizing import TankCost
+from utank_hil.dynamics.water import water_moments
 
 Rows = list[tuple[str, str]]
+
+_ACTIVE = "  active tank, less than passive"
+_NEEDS = (
+    "level it needs, significant",
+    "pressure it needs, significant",
+    "shaft power it needs, mean",
+)
 
 
 def cost_rows(cost: TankCost) -> Rows:
@@ -30,6 +39,17 @@ def cost_rows(cost: TankCost) -> Rows:
     ]
 
 
+def figure_rows(figures: TankFigures) -> Rows:
+    """What the tank's response depends on."""
+    return [
+        ("duct area", f"{figures.duct_area_m2:.2f} m²"),
+        ("frequency per roll frequency", f"{figures.frequency_ratio:.3f}"),
+        ("mass ratio", f"{figures.mass_ratio:.4f}"),
+        ("coupling ratio", f"{figures.coupling_ratio:.3f}"),
+        ("greatest roll per static roll", f"{figures.peak:.2f}"),
+    ]
+
+
 def roll_rows(found: RollPrediction) -> Rows:
     """Expected roll, and what the pump does for it."""
     active = found.active
@@ -41,16 +61,22 @@ def roll_rows(found: RollPrediction) -> Rows:
         ),
     ]
     if active is None or found.mean_power_w is None:
-        return [*rows, ("  active tank", "none"), *3 * [("", "")]]
+        return [*rows, (_ACTIVE, "none"), *((text, "") for text in _NEEDS)]
     return [
         *rows,
         (
-            "  active tank",
-            f"{_degrees(active.roll_rms_rad)}, {found.active_below_passive:.0%} less than passive",
+            _ACTIVE,
+            f"{_degrees(active.roll_rms_rad)}, {found.active_below_passive:.0%} less",
         ),
-        ("level it needs, significant", f"{2 * active.level_rms_m:.2f} m"),
-        ("pressure it needs, significant", f"{2e-3 * active.pressure_rms_pa:.1f} kPa"),
-        ("shaft power it needs, mean", power(found.mean_power_w)),
+        *zip(
+            _NEEDS,
+            (
+                f"{2 * active.level_rms_m:.2f} m",
+                f"{2e-3 * active.pressure_rms_pa:.1f} kPa",
+                power(found.mean_power_w),
+            ),
+            strict=True,
+        ),
     ]
 
 
@@ -64,6 +90,55 @@ def loading_table(points: Sequence[LoadingPoint]) -> Table:
         cells = ("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls)
         table.add_row(f"×{point.period_scale:g}", *cells)
     return table
+
+
+def loading_json(points: Sequence[LoadingPoint]) -> list[dict[str, Any]]:
+    """Roll at other loadings, in SI units."""
+    return [asdict(point) for point in points]
+
+
+def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
+    """Roll of other tanks, passive and active: by share of stability and by frequency."""
+    tables = []
+    for name in ("passive", "active"):
+        table = Table(
+            title=f"Other tanks, {name}: roll RMS in °",
+            caption="by stability taken, and by the water's frequency per roll frequency",
+        )
+        table.add_column("")
+        ratios = sorted({point.frequency_ratio for point in points})
+        for ratio in ratios:
+            table.add_column(f"{ratio:g}", justify="right", no_wrap=True)
+        for share in sorted({point.stability_share for point in points}):
+            row = {p.frequency_ratio: p for p in points if p.stability_share == share}
+            water_t = [water_moments(point.tank, 0.0).mass_kg / 1e3 for point in row.values()]
+            cells = (_sweep_cell(row.get(ratio), name) for ratio in ratios)
+            heading = f"{share:.0%}, {min(water_t):.3g} to {max(water_t):.3g} t"
+            table.add_row(heading, *cells)
+        tables.append(table)
+    return tables
+
+
+def _sweep_cell(point: SweepPoint | None, name: str) -> str:
+    motion = None if point is None else getattr(point.prediction, name)
+    return "" if motion is None else f"{math.degrees(motion.roll_rms_rad):.2f}"
+
+
+def sweep_json(points: Sequence[SweepPoint]) -> list[dict[str, Any]]:
+    """Other tanks in SI units."""
+    return [
+        {
+            "stability_share": point.stability_share,
+            "frequency_ratio": point.frequency_ratio,
+            "mass_ratio": point.mass_ratio,
+            "tank": {
+                name: value if math.isfinite(value) else None
+                for name, value in asdict(point.tank).items()
+            },
+            "prediction": prediction_json(point.prediction),
+        }
+        for point in points
+    ]
 
 
 def prediction_json(found: RollPrediction) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """``utank-hil design``: one JSON object, a picture, a table, and errors that name their place."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from utank_hil.analysis import tank_prediction
 from utank_hil.analysis.loop import trade
 from utank_hil.cli import app
 
@@ -54,13 +56,68 @@ def test_a_law_without_weights_is_refused_by_name(tmp_path: Path):
     assert "a passive law has no weight to trade" in result.stderr
 
 
-def test_tank_command_says_how_far_the_tank_is_from_the_best():
-    result = run("tank", CONFIGS / "ships" / "thesis_first.yaml", "--json")
-    found = json.loads(result.stdout)
+def test_tank_command_says_how_far_the_tank_is_from_the_best(tmp_path: Path):
+    first = CONFIGS / "ships" / "thesis_first.yaml"
+    found = json.loads(run("tank", first, "--out", tmp_path, "--json").stdout)
     assert found["best"]["peak"] < found["present"]["peak"]
     assert found["best"]["frequency_ratio"] == pytest.approx(1.0, abs=0.01)
-    table = run("tank", CONFIGS / "ships" / "thesis_first.yaml").stdout
+    table = run("tank", first, "--out", tmp_path).stdout
     assert f"{found['best']['duct_area_m2']:.2f}" in table
+
+
+def test_tank_command_expects_the_roll_that_the_storm_gives(tmp_path: Path):
+    first = CONFIGS / "ships" / "thesis_first.yaml"
+    found = json.loads(run("tank", first, "--out", tmp_path, "--json").stdout)
+    assert found["scenario"] == "Storm of 10 February 2019"
+    expected = found["present"]["prediction"]
+    # docs/design.md: by `compare`, another way to the same figures
+    assert math.degrees(expected["without_tank_rad"]) == pytest.approx(2.73, abs=0.01)
+    assert math.degrees(expected["passive"]["roll_rms_rad"]) == pytest.approx(2.21, abs=0.01)
+    assert 0.1 < expected["active_below_passive"] < 0.4
+    assert [point["period_scale"] for point in found["loading"]] == [0.7, 0.85, 1.0, 1.15, 1.3]
+    assert found["sweep"] == []
+    assert found == json.loads((tmp_path / "tank.json").read_text())
+    assert Path(found["files"]["picture"]).stat().st_size > 20_000
+
+
+def test_tank_command_sweeps(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(tank_prediction, "STABILITY_SHARES", (0.05, 0.1))
+    monkeypatch.setattr(tank_prediction, "FREQUENCY_RATIOS", (1.0,))
+    naval = CONFIGS / "ships" / "naval_vessel.yaml"
+    result = run("tank", naval, "--sweep", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert "Other tanks, active" in result.stdout
+    found = json.loads((tmp_path / "tank.json").read_text())
+    assert {point["stability_share"] for point in found["sweep"]} == {0.05, 0.1}
+    assert (tmp_path / "tank_sweep.png").stat().st_size > 20_000
+
+
+def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Path):
+    vessel = tmp_path / "own.yaml"
+    vessel.write_text(
+        "name: own\n"
+        "ship: {displacement_t: 1900, gm_m: 0.9, roll_period_s: 9.5, damping_ratio: 0.05}\n"
+        "tank: {width_m: 7, height_m: 1.7, reservoir_area_m2: 8, duct_area_m2: 1.3}\n"
+    )
+    unnamed = run("tank", vessel, "--out", tmp_path)
+    assert unnamed.exit_code == 0
+    assert "Name a sea with --scenario" in unnamed.stdout
+    assert "36.3 t, 1.9%" in unnamed.stdout  # 2 x 8 x 1.7 + 7 x 1.3
+    assert run("tank", vessel, "--sweep").exit_code == 2
+    sea = CONFIGS / "scenarios" / "naval_vessel.yaml"
+    named = run("tank", vessel, "--scenario", sea, "--out", tmp_path, "--json")
+    assert named.exit_code == 0, named.output
+    expected = json.loads(named.stdout)["present"]["prediction"]
+    assert (expected["active"], expected["no_law"]) == (None, "there is no pump")
+    assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
+
+
+def test_tank_command_refuses_a_calm_sea(tmp_path: Path):
+    still = CONFIGS / "scenarios" / "still_water.yaml"
+    first = CONFIGS / "ships" / "thesis_first.yaml"
+    result = run("tank", first, "--scenario", still, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "does not roll the ship" in result.stderr
 
 
 def test_a_calm_sea_is_refused_with_the_scenario_s_name(two_factors, tmp_path: Path):

@@ -23,6 +23,7 @@ from utank_hil.analysis.loop.sea_response import (
     roll_response_without_tank,
 )
 from utank_hil.analysis.tank_sizing import EFFICIENCY, MOST_STABILITY_SHARE, stability_taken
+from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.optimal_tank import ship_ratios
@@ -154,6 +155,60 @@ class SweepPoint:
     prediction: RollPrediction
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RollCurves:
+    """Roll per static roll in regular waves, and where the sea's energy lies.
+
+    Attributes
+    ----------
+    period_s : ndarray, shape (N,)
+        Of the waves.
+    without_tank, passive : ndarray, shape (N,)
+    active : ndarray, shape (N,), or None
+    sea_period_s, sea : ndarray, shape (M,)
+        Share of the moment's energy in each band, of the greatest band's.
+    """
+
+    period_s: FloatArray
+    without_tank: FloatArray
+    passive: FloatArray
+    active: FloatArray | None
+    sea_period_s: FloatArray
+    sea: FloatArray
+
+
+def roll_curves(plant: DesignPlant, sea: SeaState, law: FirstLaw | None) -> RollCurves:
+    """Roll in regular waves of half to twice the roll period, per moment over stiffness."""
+    ship, system = plant.ship, coupled_model(plant.ship, plant.tank)
+    own = ship.natural_frequency_rad_s
+    w = own * np.geomspace(0.5, 2.0, 300)
+    roll = system.output_labels.index("roll_rad")
+
+    def magnified(response: ComplexArray) -> FloatArray:
+        size: FloatArray = np.abs(response) * ship.stiffness_nm_rad
+        return size
+
+    active = None
+    if law is not None:
+        measured = law.design.predictor.measured
+        motions, _ = closed_loop_response(
+            law.design.law(plant), system, measured, w, plant.delay_s, plant.lag_s
+        )
+        active = magnified(motions[:, roll])
+    passive, _ = closed_loop_response(None, system, (), w)
+    waves, edges = sea.wave_moment, own * np.geomspace(0.5, 2.0, _BANDS + 1)
+    energy, _ = np.histogram(waves.frequency_rad_s, edges, weights=np.square(waves.amplitude))
+    density = energy / np.diff(edges)
+    return RollCurves(
+        period_s=2 * np.pi / w,
+        without_tank=magnified(roll_response_without_tank(ship, w)),
+        passive=magnified(passive[:, roll]),
+        active=active,
+        sea_period_s=2 * np.pi / np.sqrt(edges[1:] * edges[:-1]),
+        sea=density / max(density.max(), 1e-300),
+    )
+
+
 def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> RollPrediction:
     """Predict the roll of a ship without, with a passive and with an active tank.
 
@@ -219,17 +274,18 @@ def sweep_tank(
     sea: SeaState,
     *,
     pump: bool = True,
-    shares: Sequence[float] = STABILITY_SHARES,
-    ratios: Sequence[float] = FREQUENCY_RATIOS,
+    shares: Sequence[float] | None = None,
+    ratios: Sequence[float] | None = None,
 ) -> tuple[SweepPoint, ...]:
     """Tanks of other mass and frequency in the same place, with the same losses and pump limits.
 
     The reservoirs' area gives the share of stability, the duct's the frequency. Tanks that no duct
-    can make fast enough are left out.
+    can make fast enough are left out. The shares are `STABILITY_SHARES` and the ratios
+    `FREQUENCY_RATIOS` where none are given.
     """
     points = []
-    for share in shares:
-        for ratio in ratios:
+    for share in shares or STABILITY_SHARES:
+        for ratio in ratios or FREQUENCY_RATIOS:
             tank = _varied(plant.ship, plant.tank, share, ratio)
             if tank is None:
                 continue

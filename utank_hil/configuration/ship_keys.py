@@ -13,7 +13,7 @@ draught d, length L at the waterline)::
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +33,14 @@ _PAIRS = (
     ("damping_ratio", "damping_nms_rad"),
 )
 """A naval architect's key and that of `RollShip` for the same quantity."""
+
+_UNITS = {
+    "displacement_t": "it is in tonnes",
+    "gm_m": "it is in metres, and the roll period in seconds",
+    "roll_period_s": "it is in seconds, of a whole swing to both sides",
+    "damping_ratio": "it is a share of critical damping, 10 % is 0.10",
+    "beam_m": "it is in metres; give roll_period_s if it is known",
+}
 
 _MOST = 1e30  # as for `RollShip`; the keys below keep what is computed from them within it
 _Length = Annotated[float, Range(above=0, most=1e4)]
@@ -186,6 +194,32 @@ class WrittenShip(RollShip):
                     reason = "is required with beam_m but missing, or else roll_period_s"
                     problems.append(("displacement_t", reason))
         return problems
+
+
+def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[Problem]:
+    """Problems of a vessel's ship at the keys that the file has, with the units of those.
+
+    Parameters
+    ----------
+    problems : list of Problem
+        Named by the keys of the vessel.
+    written : collection of str
+        Keys of the ship in its file.
+    """
+    return [_in_written_key(name, reason, written) for name, reason in problems]
+
+
+def _in_written_key(name: str, reason: str, written: Collection[str]) -> Problem:
+    section, _, key = name.partition(".")
+    if section != "ship" or key in written:
+        return name, reason
+    if key == "displacement_n" and "gm_m" in written:
+        key = "stiffness_nm_rad"  # the radius of gyration is that of GM and period, at any weight
+    by_formula = "beam_m" if key == "inertia_kg_m2" else key
+    own = next((own for own, other in _PAIRS if other == key and own in written), by_formula)
+    if own not in _UNITS:
+        return name, reason
+    return f"ship.{own}", f"{reason.partition(': ')[0]}: {_UNITS[own]}"
 
 
 def _as_ship(value: Any, written: Callable[[Any], WrittenShip]) -> RollShip:

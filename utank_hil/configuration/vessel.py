@@ -11,7 +11,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
-from utank_hil.configuration.ship_keys import ShipFromFile
+from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -34,7 +34,7 @@ class Vessel(Section):
     tank: Tank
     pump: Pump | None = None
     """None leaves the tank passive."""
-    _assumptions: tuple[str, ...] = ()
+    _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property
     def version(self) -> int:
@@ -59,11 +59,6 @@ class Vessel(Section):
             **level,
         }
 
-    @property
-    def assumptions(self) -> tuple[str, ...]:
-        """What was taken for granted because the file does not say it, in words."""
-        return self._assumptions
-
     @field_validator("pump", mode="before")
     @classmethod
     def _by_similarity(cls, pump: Any, info: ValidationInfo) -> Any:
@@ -81,26 +76,29 @@ class Vessel(Section):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _say_what_is_assumed(cls, content: Any, validated: Callable[[Any], "Vessel"]) -> "Vessel":
+    def _plausible(cls, content: Any, validated: Callable[[Any], "Vessel"]) -> "Vessel":
         vessel = validated(content)
-        if isinstance(content, dict) and isinstance(content["ship"], dict):
-            given = content["ship"].keys()
-            if not given & {"roll_period_s", "inertia_kg_m2"}:
-                period_s = 2 * math.pi / vessel.ship.natural_frequency_rad_s
-                vessel._assumptions = (
-                    f"ship: roll period {period_s:.1f} s by the weather criterion's formula (IS "
-                    "Code 2008, part A, 2.3.4); give roll_period_s if it is known",
-                )
+        written = content.get("ship") if isinstance(content, dict) else None
+        if isinstance(written, dict):
+            vessel._written = frozenset(written)
+        problems = vessel_problems(vessel.ship, vessel.tank, vessel.pump)
+        refuse("", in_written_keys(problems, vessel._written))
         return vessel
 
-    @model_validator(mode="after")
-    def _plausible(self) -> "Vessel":
-        refuse("", vessel_problems(self.ship, self.tank, self.pump))
-        return self
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What was taken for granted because the file does not say it, in words."""
+        if not self._written or self._written & {"roll_period_s", "inertia_kg_m2"}:
+            return ()
+        period_s = 2 * math.pi / self.ship.natural_frequency_rad_s
+        return (
+            f"ship: roll period {period_s:.1f} s by the weather criterion's formula (IS Code 2008, "
+            "part A, 2.3.4); give roll_period_s if it is known",
+        )
 
     def warnings(self) -> list[Problem]:
         """What is unusual in the vessel."""
-        return vessel_warnings(self.ship, self.tank, self.pump)
+        return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
 
 
 def _not_by_default(part: RollShip | Tank | Pump) -> dict[str, Any]:

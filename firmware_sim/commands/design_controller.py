@@ -1,0 +1,163 @@
+"""``utank-hil design controller``: what a law could be, and what it would cost."""
+
+import json
+import math
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+from firmware_sim.commands.shipped_scenarios import shipped_scenario
+from firmware_sim.pooled_waves import pooled_wave_moment
+from firmware_sim.scenario import Scenario
+from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, shown
+from utank_hil.commands.tables import print_table
+from utank_hil.configuration import ControllerConfig
+
+if TYPE_CHECKING:
+    from utank_hil.analysis.loop.trade import Trade, TradePoint
+
+PICTURE, FIGURES = "design.png", "design.json"
+
+
+def controller(
+    config: Annotated[Path, typer.Argument(help="Controller configuration.")],
+    scenario: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scenario whose sea counts.",
+            show_default="the shipped one of the controller's vessel",
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for picture and figures.")] = OUT,
+    json_: Json = False,
+) -> None:
+    """Trade roll against robustness and pressure: scale the design's effort over decades.
+
+    Roll, level and pressure are linear predictions for the scenario's sea, without any limit of
+    pump or tank. Laws that miss a required margin are marked as refused.
+
+    [bold]Example:[/bold] utank-hil design controller configs/controllers/gpc.yaml
+    """
+    from utank_hil.analysis.loop.sea_response import CalmSeaError
+    from utank_hil.analysis.loop.trade import Design, trade
+    from utank_hil.pictures.trade import draw_trade
+
+    loaded = load(config, ControllerConfig)
+    law = loaded.law
+    if not isinstance(law, Design):
+        fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
+    vessel = loaded.vessel
+    path = scenario or shipped_scenario(vessel)
+    if path is None:
+        fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
+    sea = load(path, Scenario)
+    prepare_out(out, (PICTURE, FIGURES))
+    bar = Progress(
+        TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal
+    )
+    try:
+        with bar:
+            task = bar.add_task("", total=1.0)
+            result = trade(
+                law,
+                loaded.plant,
+                pooled_wave_moment(sea, vessel.ship),
+                progress=lambda done: bar.update(task, completed=done),
+            )
+    except CalmSeaError as error:
+        fail(f"{path}: sea: {error}; name another scenario with --scenario")
+    files = {"picture": out / PICTURE, "figures": out / FIGURES}
+    title = f"{loaded.name}: {vessel.name} in {sea.name}"
+    limits = loaded.limits
+    draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m)
+    figures = {
+        "name": loaded.name,
+        "vessel": vessel.name,
+        "scenario": sea.name,
+        **_as_json(result),
+        "files": {name: str(path) for name, path in files.items()},
+    }
+    files["figures"].write_text(json.dumps(figures, indent=2) + "\n")
+    if json_:
+        sys.stdout.write(json.dumps(figures) + "\n")
+        return
+    console = Console(highlight=False)
+    print_table(console, _trade_table(result, title))
+    for point in result.points:
+        if point.factor == 1:
+            for failure in point.robustness.failures():
+                console.print(f"[red]missed by the design:[/red] {failure}")
+    for name, path in files.items():
+        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+
+
+def _trade_table(result: "Trade", title: str) -> Table:
+    table = Table(title=title, caption="RMS by linear prediction, without limits of pump and tank")
+    for heading in (
+        result.varied.replace(" ", "\n"),
+        "roll\n°",
+        "below\npassive",
+        "pressure\nkPa",
+        "level\nm",
+        "sensi-\ntivity",
+        "eigen-\nvalue",
+        "",
+    ):
+        table.add_column(heading, justify="right", no_wrap=True)
+    passive = result.passive
+    table.add_row(
+        "passive",
+        f"{math.degrees(passive.roll_rms_rad):.2f}",
+        "",
+        "",
+        f"{passive.level_rms_m:.2f}",
+        end_section=True,
+    )
+    for point in result.points:
+        table.add_row(*_trade_cells(point), style="bold" if point.factor == 1 else None)
+    return table
+
+
+def _trade_cells(point: "TradePoint") -> tuple[str, ...]:
+    motion, less, judged = point.motion, point.roll_below_passive, point.robustness
+    verdict = "[red]refused[/red]" if point.refused else "[green]ok[/green]"
+    predicted = ("unstable", "", "", "")
+    if motion is not None and less is not None:
+        predicted = (
+            f"{math.degrees(motion.roll_rms_rad):.2f}",
+            f"{less:.1%}",
+            f"{motion.pressure_rms_pa / 1e3:.1f}",
+            f"{motion.level_rms_m:.2f}",
+        )
+    return (
+        "design" if point.factor == 1 else f"×{point.factor:.3g}",
+        *predicted,
+        f"{judged.nominal.peak_sensitivity:.2f}",
+        f"{judged.worst_radius:.4f}",
+        verdict,
+    )
+
+
+def _as_json(result: "Trade") -> dict[str, Any]:
+    return {
+        "varied": result.varied,
+        "passive": asdict(result.passive),
+        "points": [
+            {
+                "factor": point.factor,
+                "motion": None if point.motion is None else asdict(point.motion),
+                "roll_below_passive": point.roll_below_passive,
+                "peak_sensitivity": point.robustness.nominal.peak_sensitivity,
+                "worst_radius": point.robustness.worst_radius,
+                "failures": list(point.robustness.failures()),
+                "refused": point.refused,
+            }
+            for point in result.points
+        ],
+    }

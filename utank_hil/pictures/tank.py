@@ -1,0 +1,110 @@
+"""Pictures of a tank for a ship: roll in waves, other loadings, other tanks."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves, SweepPoint
+from utank_hil.pictures.style import COLORS, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_NAMES = ("without tank", "passive tank", "active tank")
+
+
+def draw_tank(curves: RollCurves, loadings: Sequence[LoadingPoint], path: Path, title: str) -> Path:
+    """Draw roll over wave period, and roll in the sea over the ship's loading.
+
+    Parameters
+    ----------
+    curves : RollCurves
+    loadings : sequence of LoadingPoint
+    path : Path
+        The `.png` file; overwritten.
+    title : str
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    with picture(path, title, (12.0, 5.0)) as figure:
+        waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
+        waves.fill_between(
+            curves.sea_period_s,
+            curves.sea * 0.5 * curves.without_tank.max(),
+            color="#DDDDDD",
+            step="mid",
+            label="energy of the wave moment",
+        )
+        rolls = (curves.without_tank, curves.passive, curves.active)
+        for roll, name, color in zip(rolls, _NAMES, COLORS, strict=False):
+            if roll is not None:
+                waves.plot(curves.period_s, roll, color=color, label=name)
+        waves.set_xlabel("Wave period (s)")
+        waves.set_ylabel("Roll per effective wave slope")
+        waves.legend(frameon=False)
+        scales = [point.period_scale for point in loadings]
+        series: tuple[Sequence[float | None], ...] = (
+            [point.without_tank_rad for point in loadings],
+            [point.passive_rad for point in loadings],
+            [point.active_rad for point in loadings],
+        )
+        for values, name, color in zip(series, _NAMES, COLORS, strict=False):
+            known = [np.nan if value is None else np.degrees(value) for value in values]
+            if not np.isnan(known).all():
+                loading.plot(scales, known, "o-", color=color, label=name)
+        loading.set_ylim(bottom=0)
+        loading.set_xlabel("Roll period, times the ship's: tank and law as they are")
+        loading.set_ylabel("Roll RMS in the sea (°)")
+    return path
+
+
+def draw_sweep(points: Sequence[SweepPoint], path: Path, title: str) -> Path:
+    """Draw roll in the sea over the water's frequency, a line for each share of stability.
+
+    Parameters
+    ----------
+    points : sequence of SweepPoint
+    path : Path
+        The `.png` file; overwritten.
+    title : str
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    with picture(path, title, (12.0, 5.0)) as figure:
+        passive = figure.add_subplot(1, 2, 1)
+        active = figure.add_subplot(1, 2, 2, sharey=passive)
+        _draw_shares(passive, points, [p.prediction.passive.roll_rms_rad for p in points])
+        found = [p.prediction.active for p in points]
+        _draw_shares(active, points, [np.nan if p is None else p.roll_rms_rad for p in found])
+        passive.axhline(
+            np.degrees(points[0].prediction.without_tank_rad), color=COLORS[0], linestyle="--"
+        )
+        passive.set_title("Passive tank; dashed: none", loc="left", fontsize=10)
+        active.set_title(
+            "Active tank, within the limits of pump and level", loc="left", fontsize=10
+        )
+        passive.set_ylabel("Roll RMS in the sea (°)")
+        passive.set_ylim(bottom=0)
+        passive.legend(frameon=False, title="Stability taken", fontsize=9)
+    return path
+
+
+def _draw_shares(axes: "Axes", points: Sequence[SweepPoint], roll_rad: Sequence[float]) -> None:
+    for number, share in enumerate(sorted({point.stability_share for point in points})):
+        of = [index for index, point in enumerate(points) if point.stability_share == share]
+        axes.plot(
+            [points[index].frequency_ratio for index in of],
+            np.degrees([roll_rad[index] for index in of]),
+            "o-",
+            color=COLORS[(number + 1) % len(COLORS)],
+            label=f"{share:.0%}",
+        )
+    axes.set_xlabel("Frequency of the water per roll frequency")
