@@ -14,6 +14,7 @@ from typing import Annotated, Final, Literal, Protocol, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from firmware_sim.voyage import Bearing
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (
@@ -30,7 +31,6 @@ from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea
 
-Bearing = Annotated[float, Range(least=-360, most=360)]
 _FAST_M_S: Final = 20.0
 _STEEPEST: Final = 1 / 7
 """Height per length at which a regular wave breaks in deep water (Michell 1893)."""

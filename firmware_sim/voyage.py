@@ -12,7 +12,10 @@ from pydantic import Field
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import AnySpectrum
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import Problem
+from utank_hil.parameters import Finite, Positive, Problem, Range
+
+Bearing = Annotated[float, Range(least=-360, most=360)]
+"""Of waves to a ship, or of a ship, in degrees."""
 
 
 class Waypoint(Section):
@@ -22,15 +25,15 @@ class Waypoint(Section):
     not name is as at the one before.
     """
 
-    time_s: Annotated[float, Field(gt=0)]
-    heading_deg: float | None = None
+    time_s: Positive
+    heading_deg: Bearing | None = None
     """Where the waves go relative to the ship."""
-    course_deg: float | None = None
+    course_deg: Bearing | None = None
     """Instead of the heading, where the sea has directions: clockwise from true north."""
-    speed_m_s: Annotated[float, Field(ge=0, le=40)] | None = None
+    speed_m_s: Annotated[float, Range(least=0, most=40)] | None = None
     sea: AnySpectrum | None = None
     """Spectrum of the sea, met as the scenario's is."""
-    ship: dict[str, float] = Field(default_factory=dict)
+    ship: dict[str, Finite] = Field(default_factory=dict)
     """Keys of the ship, as in ``actual_ship``."""
 
 

@@ -21,7 +21,7 @@ from pydantic import WrapValidator
 
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import ParameterError, Problem, Range, refuse
+from utank_hil.parameters import Finite, ParameterError, Problem, Range, refuse
 
 NOT_GIVEN = math.nan
 """No key of a file can have this value."""
@@ -81,7 +81,7 @@ class WrittenShip(RollShip):
     inertia_kg_m2: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     stiffness_nm_rad: Annotated[float, Range(above=0, most=_MOST)] = NOT_GIVEN
     damping_nms_rad: Annotated[float, Range(least=0, most=_MOST)] = NOT_GIVEN
-    displacement_n: float = NOT_GIVEN
+    displacement_n: Finite = NOT_GIVEN
     displacement_t: Annotated[float, Range(above=0, most=1e9)] = NOT_GIVEN
     gm_m: Annotated[float, Range(above=0, most=1e3)] = NOT_GIVEN
     roll_period_s: Annotated[float, Range(above=0, most=1e4)] = NOT_GIVEN
