@@ -49,6 +49,7 @@ SAILED: Final = (
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
 
+_TINY: Final = 1e-30
 _NO_MOMENT: Final = 1e-9
 """Share of the waves' slope below which the ship feels nothing of it."""
 
@@ -143,6 +144,28 @@ class Scenario(Section):
             ],
         )
         return self
+
+    def figures(self) -> dict[str, float]:
+        """What the sea's numbers mean to the ship."""
+        elevation, moment = self.sea.sea(self.seed).elevation, self.wave_moment(self.seed)
+        moment_nm = math.sqrt(moment.variance)
+        energy = elevation.amplitude**2 + _TINY  # still water has a frequency, too
+        return {
+            "hs_m": 4 * math.sqrt(elevation.variance),
+            "encounter_rad_s": float(np.average(elevation.frequency_rad_s, weights=energy)),
+            "speed_kn": self.sea.speed_m_s * 3600 / 1852,
+            "wave_moment_rms_nm": moment_nm,
+            "static_roll_rms_rad": moment_nm / self.vessel.ship.stiffness_nm_rad,
+        }
+
+    def meaning(self) -> list[str]:
+        """`figures` in words."""
+        figures = self.figures()
+        return [
+            f"Waves of {figures['hs_m']:.2f} m significant height, met at "
+            f"{figures['encounter_rad_s']:.3g} rad/s and {figures['speed_kn']:.3g} knots; standing "
+            f"still they would heel her {math.degrees(figures['static_roll_rms_rad']):.2g}° RMS."
+        ]
 
     @property
     def place_on_board(self) -> Place:

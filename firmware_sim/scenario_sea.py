@@ -14,6 +14,7 @@ from typing import Annotated, Final, Literal, Protocol, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from firmware_sim.voyage import Bearing
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (

@@ -160,6 +160,9 @@ def test_numbers_are_decimal(tmp_path: Path) -> None:
     assert parse_yaml(text) == (values, [])
 
 
+PD = SHIPPED[CONFIGS / "controllers" / "pd.yaml"]
+
+
 def scenario(**changes: Any) -> str:
     """The storm with keys changed."""
     path = CONFIGS / "scenarios" / "storm.yaml"
@@ -181,6 +184,8 @@ def scenario(**changes: Any) -> str:
         ({"name": True}, "name", "must be text, got true or yes: put it in quotes"),
         ({"seed": 1.5}, "seed", "must be a whole number, got 1.5"),
         ({"controllers": {}}, "controllers", "must name at least 1"),
+        ({"controllers": {f"c{n}": PD for n in range(8)}}, "controllers",
+         "must have 7 at most, got 8"),
         ({"durations": 5}, "durations", "is not a known key; did you mean duration_s?"),
     ],
 )  # fmt: skip

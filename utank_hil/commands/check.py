@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import BaseModel
 
-from utank_hil.commands.common import Json, fail, load
+from utank_hil.commands.common import Json, fail, load, warnings_of
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
 from utank_hil.configuration.controller import ControllerConfig
@@ -16,7 +17,8 @@ from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
 
 GROUP = "utank_hil.collections"
-"""Entry points of further kinds of file: models with a name, vessel and mapping `controllers`."""
+"""Entry points of further kinds of file: models with a name, a vessel, a mapping `controllers`, and
+`figures` and `meaning` of whatever else they hold."""
 
 
 def check(
@@ -32,31 +34,34 @@ def check(
     """
     from utank_hil.commands import check_report as report
 
+    loaded: BaseModel
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
     try:
         kind = kind_of(config, {"controller": ControllerConfig, "ship": Vessel, **collections})
     except ConfigError as error:
         fail(error)
     if kind == "ship":
-        vessel = load(config, Vessel)
-        content = report.ship_json(vessel)
+        loaded = load(config, Vessel)
+        content = report.ship_json(loaded)
         if not json_:
-            report.print_ship(vessel)
+            report.print_ship(loaded)
     elif kind in collections:
         collection = load(config, collections[kind])
         judged = {
             name: judge(each, config, f"controllers.{name}")
             for name, each in collection.controllers.items()
         }
-        content = report.collection_json(collection.name, collection.vessel, judged)
+        loaded, content = collection, report.collection_json(collection, judged)
         if not json_:
-            report.print_collection(kind, collection.name, collection.vessel, judged)
+            report.print_collection(kind, collection, judged)
     else:
-        controller = judge(load(config, ControllerConfig), config)
+        loaded = load(config, ControllerConfig)
+        controller = judge(loaded, config)
         content = report.controller_json(controller)
         if not json_:
             report.print_controller(controller)
     if json_:
-        sys.stdout.write(json.dumps({"kind": kind, **content}) + "\n")
+        unusual = [str(warning) for warning in warnings_of(loaded, config)]
+        sys.stdout.write(json.dumps({"kind": kind, **content, "warnings": unusual}) + "\n")
     if not content.get("accepted", True):
         raise typer.Exit(ExitCode.REFUSED)

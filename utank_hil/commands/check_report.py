@@ -12,11 +12,15 @@ from rich.table import Table
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.loop.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
+from utank_hil.arrays import FloatArray
 from utank_hil.commands.gate import JudgedLaw
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import Vessel
+from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.control import BuiltLaw
-from utank_hil.dynamics.linear import STATES, coupled_matrices, state_matrices
+from utank_hil.dynamics.linear import coupled_matrices, state_matrices
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.water import water_moments
 
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
 
@@ -32,6 +36,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
     return {
         "name": config.name,
         "vessel": config.vessel.name,
+        "ship": ship_figures(config.vessel),
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
@@ -43,12 +48,15 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
     }
 
 
-def collection_json(name: str, vessel: Vessel, judged: Judged) -> dict[str, Any]:
+def collection_json(collection: Any, judged: Judged) -> dict[str, Any]:
     """A file of several controllers, a scenario for one, as one JSON object."""
+    vessel: Vessel = collection.vessel
     controllers = {name: controller_json(each) for name, each in judged.items()}
     return {
-        "name": name,
+        "name": collection.name,
         "vessel": vessel.name,
+        "ship": ship_figures(vessel),
+        "figures": collection.figures(),
         "configuration_version": vessel.version,
         "controllers": controllers,
         "accepted": all(each["accepted"] for each in controllers.values()),
@@ -75,37 +83,78 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         Frequencies in rad/s of the ship without water and of the water in a ship held still; the
         two motions that they make together (`modes`, from slow to fast); ratios as in
         `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
-        reservoir is full or empty; heel that the pump's greatest pressure holds, None without a
-        pump.
+        reservoir is full or empty. Metacentric height and the water's share of the displacement
+        are None where that is not given, what is of the pump without one: heel and head that its
+        greatest pressure holds; power that holds it in still water; flow that moves the level from
+        limit to limit at the roll period, and power of pressure and flow, without losses.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
     _, _, stiffness = coupled_matrices(ship, tank)
     free = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = ship.natural_frequency_rad_s
-    pump_heel_rad = None
-    if vessel.pump is not None:
-        push = [0.0, tank.reservoir_area_m2 * vessel.pump.max_pressure_pa]
-        heel_rad = np.linalg.solve(stiffness, push)[STATES.index("roll_rad")]
-        pump_heel_rad = float(abs(heel_rad))
-    free_surface_nm_rad = stiffness[0, 1] ** 2 / stiffness[1, 1]
+    water_kg = float(water_moments(tank, 0.0).mass_kg)
+    weight_n = ship.displacement_n or None
     return {
+        "roll_period_s": 2 * math.pi / frequency,
+        "tank_period_s": 2 * math.pi / tank.natural_frequency_rad_s,
+        "gm_m": None if weight_n is None else ship.stiffness_nm_rad / weight_n,
+        "water_kg": water_kg,
+        "water_share": None if weight_n is None else water_kg * GRAVITY_M_S2 / weight_n,
         "roll_frequency_rad_s": frequency,
         "roll_damping_ratio": ship.damping_nms_rad / (2 * ship.inertia_kg_m2 * frequency),
         "tank_frequency_rad_s": tank.natural_frequency_rad_s,
         "tank_damping_ratio": tank.damping_ratio,
         "modes": [
-            {"frequency_rad_s": abs(mode), "damping_ratio": -mode.real / abs(mode)}
+            {
+                "frequency_rad_s": abs(mode),
+                "period_s": 2 * math.pi / abs(mode),
+                "damping_ratio": -mode.real / abs(mode),
+            }
             for mode in sorted(free.astype(complex), key=abs)
             if mode.imag >= 0
         ],
         "frequency_ratio": figures.frequency_ratio,
         "mass_ratio": figures.mass_ratio,
         "coupling_ratio": figures.coupling_ratio,
-        "stability_taken": float(free_surface_nm_rad / ship.stiffness_nm_rad),
+        "stability_taken": free_surface_nm_rad(ship, tank) / ship.stiffness_nm_rad,
         "level_limit_m": tank.level_limit_m,
-        "pump_heel_rad": pump_heel_rad,
+        **_pump_figures(vessel, stiffness),
     }
+
+
+def _pump_figures(vessel: Vessel, stiffness: FloatArray) -> dict[str, float | None]:
+    """What the pump can do with this tank and ship."""
+    pump, tank = vessel.pump, vessel.tank
+    names = ("heel_rad", "head_m", "flow_m3_s", "power_asked_w", "power_held_w", "power_w")
+    if pump is None:
+        return {f"pump_{name}": None for name in names}
+    pressure_pa = pump.max_pressure_pa
+    heel_rad, _ = np.linalg.solve(stiffness, [0.0, tank.reservoir_area_m2 * pressure_pa])
+    flow_m3_s = tank.reservoir_area_m2 * tank.level_limit_m * vessel.ship.natural_frequency_rad_s
+    figures = (
+        float(abs(heel_rad)),
+        pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2),
+        flow_m3_s,
+        pressure_pa * flow_m3_s,
+        holding(pump)[2],
+        pump.max_power_w,
+    )
+    return {f"pump_{name}": value for name, value in zip(names, figures, strict=True)}
+
+
+def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:
+    if vessel.pump is None:
+        return [("pump", "none")]
+    return [
+        ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
+        ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
+        ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
+        ("flow from full to empty at the roll period", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
+        ("power of pressure and flow, without losses", _power(figures["pump_power_asked_w"])),
+        ("power to hold the pressure in still water", _power(figures["pump_power_held_w"])),
+        ("power of the motor", _power(figures["pump_power_w"])),
+    ]
 
 
 def print_controller(judged: JudgedLaw) -> None:
@@ -113,6 +162,7 @@ def print_controller(judged: JudgedLaw) -> None:
     config, report = judged.config, judged.robustness
     console = Console(highlight=False)
     console.print(f"{config.name} for {config.vessel.name}: the configuration is valid.")
+    console.print(ship_line(config.vessel), soft_wrap=True)
     if report is None:
         if judged.law.unjudged:
             _print_verdict(console, judged)
@@ -152,10 +202,13 @@ def _print_verdict(console: Console, judged: JudgedLaw) -> None:
         console.print(_met(judged.law))
 
 
-def print_collection(kind: str, name: str, vessel: Vessel, judged: Judged) -> None:
+def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     """Print the margins of all controllers of a file."""
     console = Console(highlight=False)
-    console.print(f"{name}, {vessel.name}: the {kind} is valid.")
+    console.print(f"{collection.name}, {collection.vessel.name}: the {kind} is valid.")
+    console.print(ship_line(collection.vessel), soft_wrap=True)
+    for line in collection.meaning():
+        console.print(line, soft_wrap=True)
     table = Table(title="Margins, delay and pump lag included")
     table.add_column("", no_wrap=True)
     for heading in (
@@ -223,24 +276,51 @@ def print_ship(vessel: Vessel) -> None:
     rest = Table(show_header=False)
     rest.add_column()
     rest.add_column(justify="right", no_wrap=True)
-    figures_of_pump = [("pump", "none")]
-    if vessel.pump is not None:
-        figures_of_pump = [
-            ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
-            ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
-        ]
+    share = figures["water_share"]
+    gm_m = figures["gm_m"]
+    taken = figures["stability_taken"]
     for text, value in (
+        ("metacentric height GM", "no displacement" if gm_m is None else f"{gm_m:.2f} m"),
+        ("water in the tank", _tonnes(figures["water_kg"])),
+        ("  of the displacement", "" if share is None else f"{share:.2%}"),
         ("water's frequency per roll frequency", f"{figures['frequency_ratio']:.3f}"),
         ("mass ratio", f"{figures['mass_ratio']:.4f}"),
         ("coupling ratio", f"{figures['coupling_ratio']:.3f}"),
-        ("stability taken by the free surface", f"{figures['stability_taken']:.1%}"),
+        ("stability taken by the free surface", f"{taken:.1%}"),
+        ("  of GM", "" if gm_m is None else f"{taken * gm_m:.3f} m"),
         ("level at which a reservoir is full or empty", f"{figures['level_limit_m']:.2f} m"),
-        *figures_of_pump,
+        *_pump_rows(vessel, figures),
     ):
-        rest.add_row(text, value)
+        if value:
+            rest.add_row(text, value)
     print_table(console, rest)
     for assumption in vessel.assumptions:
         console.print(f"Assumed: {assumption}.", soft_wrap=True)
+
+
+def ship_line(vessel: Vessel) -> str:
+    """What the ship's numbers mean, in a line: a wrong unit shows."""
+    figures = ship_figures(vessel)
+    pump = "there is no pump"
+    if vessel.pump is not None:
+        pump = (
+            f"the pump presses {figures['pump_head_m']:.2g} m of water, moves up to "
+            f"{figures['pump_flow_m3_s']:.3g} m³/s and has {_power(figures['pump_power_w'])}"
+        )
+    periods = " and ".join(f"{mode['period_s']:.3g}" for mode in figures["modes"])
+    return (
+        f"She rolls in {figures['roll_period_s']:.3g} s, with the water in {periods} s; "
+        f"{_tonnes(figures['water_kg'])} of water take {figures['stability_taken']:.1%} of her "
+        f"stability; {pump}."
+    )
+
+
+def _tonnes(mass_kg: float) -> str:
+    return f"{mass_kg / 1e3:.3g} t"
+
+
+def _power(power_w: float) -> str:
+    return f"{power_w / 1e6:.2f} MW" if power_w >= 1e6 else f"{power_w / 1e3:.3g} kW"
 
 
 def _motion(frequency_rad_s: float, damping_ratio: float) -> tuple[str, str, str]:

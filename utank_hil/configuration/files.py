@@ -221,8 +221,8 @@ class _Reader:
             own = [name for name in part if name not in ("name", "kind")]
             strange = [name for name in own if name not in known and not nearest(name, known)]
             above = any(key[: len(upper)] == upper for upper in self.unread)
-            partial = not key and model.model_config.get("extra") != "forbid"
-            if partial or above or not known or len(strange) <= len(own) - len(strange):
+            open_ended = not key and model.model_config.get("extra") != "forbid"
+            if above or open_ended or not known or len(strange) <= len(own) - len(strange):
                 continue
             why = f"has the keys {', '.join(own)}; a file for this has {', '.join(known)}"
             if key:

@@ -1,0 +1,112 @@
+"""``utank-hil check`` says what the numbers mean, so that a wrong unit is seen."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+from utank_hil.configuration.yaml_text import parse_yaml
+
+CONFIGS = Path("configs").resolve()
+G = 9.80665
+
+
+def invoke(*arguments: object):
+    environment = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
+    return CliRunner(env=environment).invoke(app, [str(each) for each in arguments])
+
+
+def ship(folder: Path, **changes: Any) -> Path:
+    content = parse_yaml((CONFIGS / "ships" / "thesis_first.yaml").read_text())[0]
+    for key, value in changes.items():
+        section, name = key.split("__")
+        content[section][name] = value
+    path = folder / "ship.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_figures_are_those_of_a_hand_calculation(tmp_path: Path) -> None:
+    found = json.loads(invoke("check", ship(tmp_path, ship__displacement_n=4e8), "--json").stdout)
+    assert found["roll_period_s"] == pytest.approx(2 * math.pi / 0.5)
+    assert found["gm_m"] == pytest.approx(4.81875e8 / 4e8)
+    water_kg = 1000 * (2 * 4.88 * 17.11 + 17.1 * 6.22)
+    assert found["water_kg"] == pytest.approx(water_kg)
+    assert found["water_share"] == pytest.approx(water_kg * G / 4e8)
+    length_m = 2 * 4.88 + 17.1 * 17.11 / 6.22
+    assert found["tank_period_s"] == pytest.approx(2 * math.pi * math.sqrt(length_m / (2 * G)))
+    assert found["pump_head_m"] == pytest.approx(50e3 / (1000 * G))
+    flow_m3_s = 17.11 * 4.88 * 0.5  # h = level sin(omega t)
+    assert found["pump_flow_m3_s"] == pytest.approx(flow_m3_s)
+    assert found["pump_power_asked_w"] == pytest.approx(50e3 * flow_m3_s)
+    # in still water dP = rho / 2 lift r p n^2, T n = (p dP + rho / 2 friction r^2 n^2 r) A n
+    speed = math.sqrt(50e3 / (500 * 1.405 * 0.985 * 0.40))
+    torque_nm = 6.22 * (0.40 * 50e3 + 500 * 0.005 * 0.985**3 * speed**2)
+    assert found["pump_power_held_w"] == pytest.approx(speed * torque_nm, rel=1e-6)
+    assert found["pump_power_w"] == 3.6e6
+    periods = [mode["period_s"] for mode in found["modes"]]
+    assert periods[0] > found["roll_period_s"] > found["tank_period_s"] > periods[1]
+
+
+def test_figures_are_printed_for_ship_controller_and_scenario(tmp_path: Path) -> None:
+    text = invoke("check", ship(tmp_path, ship__displacement_n=4e8)).stdout
+    for row in ("GM │ 1.20 m", "in the tank │ 273 t", "displacement │ 0.67%", "in metres of water",
+                "of GM │ 0.061 m", "roll period │ 41.7 m³/s", "losses │ 2.09 MW",
+                "still water │ 1.71 MW", "motor │ 3.60 MW"):  # fmt: skip
+        assert row in " ".join(text.split()), row
+    line = "rolls in 12.6 s, with the water in 13.2 and 10.4 s; 273 t of water take 5.1%"
+    assert line in invoke("check", CONFIGS / "controllers" / "pd.yaml").stdout
+    text = invoke("check", CONFIGS / "scenarios" / "still_water.yaml").stdout
+    assert line in text
+    assert "Waves of 0.00 m significant height" in text
+
+
+def test_scenario_says_what_the_sea_is_to_the_ship() -> None:
+    path = CONFIGS / "scenarios" / "naval_vessel.yaml"
+    report = json.loads(invoke("check", path, "--json").stdout)
+    figures = report["figures"]
+    assert figures["hs_m"] == pytest.approx(0.5, rel=1e-3)
+    assert 2 * math.pi / 5.8 < figures["encounter_rad_s"] < 1.4 * 2 * math.pi / 5.8  # mean, peak
+    assert figures["static_roll_rms_rad"] == pytest.approx(figures["wave_moment_rms_nm"] / 3.9063e6)
+    assert report["ship"]["roll_period_s"] == pytest.approx(5.64, abs=5e-3)
+    assert report["warnings"] == []
+
+
+def test_warnings_are_notes_with_key_and_remedy_and_do_not_fail(tmp_path: Path) -> None:
+    path = ship(tmp_path, pump__max_power_w=225e3)
+    words = f"{path}: pump.max_power_w: is 225 kW, and to hold max_pressure_pa, 50 kPa, takes"
+    result = invoke("check", path)
+    assert result.exit_code == 0
+    assert f"warning: {words}" in result.stderr
+    assert "warning" not in result.stdout
+    (warning,) = json.loads(invoke("check", path, "--json").stdout)["warnings"]
+    assert warning.startswith(words)
+
+
+def test_warning_of_a_scenario_names_the_file_and_key_where_the_value_stands(
+    tmp_path: Path,
+) -> None:
+    path = ship(tmp_path, pump__max_power_w=225e3)
+    content = parse_yaml((CONFIGS / "controllers" / "pd.yaml").read_text())[0]
+    controller = tmp_path / "controller.yaml"
+    controller.write_text(yaml.safe_dump({**content, "vessel": str(path)}))
+    sea = {"kind": "jonswap", "hs_m": 8.0, "tp_s": 9.0}
+    file = tmp_path / "scenario.yaml"
+    file.write_text(
+        yaml.safe_dump(
+            {"name": "s", "vessel": str(path), "sea": sea, "controllers": {"one": str(controller)},
+             "operator": [], "duration_s": 60, "settle_s": 0}
+        )
+    )  # fmt: skip
+    warnings = json.loads(invoke("check", file, "--json").stdout)["warnings"]
+    assert [each.partition(": is")[0].partition(": of")[0] for each in warnings] == [
+        f"{path}: pump.max_power_w",
+        f"{file}: sea.hs_m",
+    ]
+    run = invoke("run", controller, "--bus", "nowhere0")
+    assert f"warning: {path}: pump.max_power_w" in run.stderr
