@@ -15,6 +15,7 @@ from firmware_sim.cli import app as ship_app
 from utank_hil.canbus import Fault, Frame, Quality, load_catalogue
 from utank_hil.canbus.messages import DBC_NAMES
 from utank_hil.cli import app
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import Vessel, load_config
 
 PAGE = Path("docs/how-to/hardware.md")
@@ -42,7 +43,7 @@ def test_a_command_of_the_page_gets_as_far_as_the_bus(command: str) -> None:
         return
     application: typer.Typer = APPS[program]
     result = CliRunner(env={"TERM": "dumb", "COLUMNS": "200"}).invoke(application, words)
-    assert result.exit_code == 2
+    assert result.exit_code == ExitCode.NO_BUS
     assert "nowhere0: not found" in result.stderr
 
 

@@ -23,6 +23,7 @@ from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.provenance import describe
 from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
@@ -36,6 +37,7 @@ from utank_hil.telemetry import event_text, open_viewer
 
 
 def run(
+    context: typer.Context,
     config: Annotated[Path, typer.Argument(help="Controller configuration.")],
     bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
     duration: Duration = None,
@@ -82,7 +84,10 @@ def run(
         recording = None
         if folder is not None:
             recording = RunRecording(
-                folder, live=view, events=None if announcer is None else announcer.ring
+                folder,
+                live=view,
+                events=None if announcer is None else announcer.ring,
+                about=describe("run", loaded, folder, options=context.params),
             )
             stack.callback(recording.stop)
             if recording.summary.error is not None:

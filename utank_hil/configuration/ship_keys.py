@@ -14,10 +14,10 @@ draught d, length L at the waterline)::
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import WrapValidator
+from pydantic import PlainSerializer, WrapValidator
 
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -195,4 +195,4 @@ def _as_ship(value: Any, written: Callable[[Any], WrittenShip]) -> RollShip:
 if TYPE_CHECKING:
     ShipFromFile = RollShip
 else:
-    ShipFromFile = Annotated[WrittenShip, WrapValidator(_as_ship)]
+    ShipFromFile = Annotated[WrittenShip, WrapValidator(_as_ship), PlainSerializer(asdict)]
