@@ -26,7 +26,15 @@ with quietly_interruptible():
     )
     from utank_hil.arrays import FloatArray
     from utank_hil.canbus import SocketCanPort
-    from utank_hil.commands.common import Duration, Json, fail, load, new_app, notes
+    from utank_hil.commands.common import (
+        Duration,
+        Json,
+        Version,
+        fail,
+        load,
+        new_app,
+        notes,
+    )
     from utank_hil.commands.exit_codes import ExitCode
     from utank_hil.commands.tables import print_table
     from utank_hil.commands.timing import timing_table
@@ -60,6 +68,7 @@ def firmware_sim(
         ),
     ] = "",
     json_: Json = False,
+    version: Version = False,  # noqa: ARG001, ends the command when it is read
 ) -> None:
     """Emulate ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
 

@@ -11,13 +11,12 @@ from typing import Final
 import numpy as np
 
 from firmware_sim.bench import BenchResult
-from utank_hil.arrays import FloatArray
+from firmware_sim.voyage import spectra_on_the_way
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.sea import Spectrum
 
 MOST_ROLL_RAD: Final = math.radians(40.0)
 MOST_LINEAR_ROLL_RAD: Final = math.radians(10.0)
-MOST_REGULAR_STEEPNESS: Final = 0.142
-"""Height over length at which a regular wave in deep water breaks (Michell)."""
 OVERSPEED: Final = 1.02
 """Share of the pump's speed limit up to which the speed loop lets the rotor pass it."""
 
@@ -38,22 +37,15 @@ class ModelLimit:
     passed: Callable[[BenchResult], Iterator[str]]
 
 
-def steepness(amplitude_m: FloatArray, omega_rad_s: FloatArray) -> tuple[float, float]:
-    """Steepness of a sea of these components, and the most that seas have.
+def steepness(spectrum: Spectrum) -> tuple[float, float]:
+    """Average steepness of a sea, and the most that seas have.
 
-    For one component height over length. For several, significant height over the length of a wave
-    of mean zero-up-crossing period; its limit falls from 1/10 at 6 s to 1/15 at 12 s (DNV-RP-C205,
-    section 3.5.4).
+    Significant height over the length of a wave of mean zero-up-crossing period; its limit falls
+    from 1/10 at 6 s to 1/15 at 12 s (DNV-RP-C205, section 3.5.4).
     """
-    variance = amplitude_m**2 / 2
-    if not variance.any():
-        return 0.0, MOST_REGULAR_STEEPNESS
-    omega = math.sqrt(float(variance @ omega_rad_s**2) / float(variance.sum()))
-    per_length = omega**2 / (2 * math.pi * GRAVITY_M_S2)
-    if len(amplitude_m) == 1:
-        return 2 * float(amplitude_m[0]) * per_length, MOST_REGULAR_STEEPNESS
-    most = float(np.interp(2 * math.pi / omega, [6.0, 12.0], [1 / 10, 1 / 15]))
-    return 4 * math.sqrt(float(variance.sum())) * per_length, most
+    period_s = spectrum.tz_s
+    found = 2 * math.pi * spectrum.hs_m / (GRAVITY_M_S2 * period_s**2)
+    return found, float(np.interp(period_s, [6.0, 12.0], [1 / 10, 1 / 15]))
 
 
 def _roll(result: BenchResult) -> Iterator[str]:
@@ -88,10 +80,11 @@ def _level(result: BenchResult) -> Iterator[str]:
 
 
 def _sea(result: BenchResult) -> Iterator[str]:
-    sea = result.scenario.sea.sea(result.seed)
-    found, most = steepness(sea.amplitude_m, sea.omega_rad_s)
-    if found > most:
-        yield f"the sea's steepness is {found:.3f}, and seas reach {most:.3f}"
+    scenario = result.scenario
+    for time_s, section in spectra_on_the_way(scenario.voyage, scenario.sea.spectra):
+        found, most = steepness(section.spectrum())
+        if time_s <= result.end_s and found > most:
+            yield f"the sea's steepness is {found:.3f} at {time_s:g} s, and seas reach {most:.3f}"
 
 
 def _pump(result: BenchResult) -> Iterator[str]:

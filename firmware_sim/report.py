@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -50,8 +51,10 @@ def exit_code(result: BenchResult) -> ExitCode:
     return ExitCode.NOT_RANKED if marked or result.not_run else ExitCode.OK
 
 
-def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
-    """Everything in the tables, in SI units, ready for `json.dumps`.
+def as_json(
+    result: BenchResult, files: Mapping[str, Path], about: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Everything in the tables, in SI units, ready for `json.dumps`, and where it comes from.
 
     A run that is not compared has no figures, but the rest.
     """
@@ -59,6 +62,7 @@ def as_json(result: BenchResult, files: dict[str, Path]) -> dict[str, Any]:
     by_name = {run.name: asdict(run) for run in compared}
     marks = {run.name: mark_of(result, run) for run in result.runs}
     return {
+        **about,
         "scenario": result.scenario.name,
         "mode": result.mode,
         "seed": result.seed,
@@ -110,8 +114,10 @@ def _retuning_json(result: BenchResult, run: Run) -> dict[str, Any] | None:
     return None if found is None else found.as_json()
 
 
-def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], list[str]]:
-    """Write picture, recording and figures of a bench.
+def write_report(
+    result: BenchResult, folder: Path, about: Mapping[str, Any]
+) -> tuple[dict[str, Path], list[str]]:
+    """Write picture, recording and figures of a bench, each with where it comes from (`about`).
 
     Returns
     -------
@@ -123,8 +129,8 @@ def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], li
     files: dict[str, Path] = {}
     failures = []
 
-    def write_figures(result: BenchResult, path: Path) -> None:
-        found = as_json(result, files | {"figures": path})
+    def write_figures(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
+        found = as_json(result, files | {"figures": path}, about)
         path.write_text(json.dumps(found, indent=2) + "\n")
 
     for name, file, write in (
@@ -133,7 +139,7 @@ def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], li
         ("figures", FIGURES, write_figures),  # last, because they name the others
     ):
         try:
-            write(result, folder / file)
+            write(result, folder / file, about)
         except (OSError, RuntimeError) as error:
             failures.append(f"the {name} could not be written: {error}")
         else:
@@ -141,7 +147,7 @@ def write_report(result: BenchResult, folder: Path) -> tuple[dict[str, Path], li
     return files, failures
 
 
-def _draw(result: BenchResult, path: Path) -> None:
+def _draw(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
     found = {run.name: run for run in figures(result)[1]}
     draw_bench(
         [
@@ -157,6 +163,7 @@ def _draw(result: BenchResult, path: Path) -> None:
         ],
         path,
         title=f"{result.scenario.name}, seed {result.seed}, {result.mode}",
+        about=about,
     )
 
 
@@ -171,10 +178,11 @@ def _legend(result: BenchResult, run: Run, found: dict[str, RunFigures]) -> str:
     return f"{run.name}: roll {math.degrees(told.roll.rms_rad):.2f}° RMS{change}"
 
 
-def _record(result: BenchResult, path: Path) -> None:
+def _record(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
     write_recording(
         path,
         COLUMNS,
         {run.name: run.rows for run in result.runs},
         {run.name: events_on_ships_time(run) for run in result.runs if run.retuning},
+        about,
     )

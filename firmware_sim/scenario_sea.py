@@ -10,11 +10,17 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final, Literal, Protocol, Self
+from typing import Annotated, Any, Final, Literal, Protocol, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
-from firmware_sim.voyage import Bearing
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (
@@ -216,6 +222,13 @@ class MeasuredSea(MeasuredSpectrum, _IrregularSea):
         except ValueError as error:  # energy without a direction
             refuse("sea", [("direction_file", str(error))])
         return self
+
+    @model_serializer(mode="wrap")
+    def _as_it_can_be_read(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = handler(self)
+        if self.direction_file is not None:
+            del content["heading_deg"]
+        return content
 
     def spectrum(self) -> Spectrum:
         """The hour's spectrum, with the directions where there are any."""

@@ -15,7 +15,7 @@ with quietly_interruptible():
     from typer.core import TyperGroup
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.commands.common import new_app
+    from utank_hil.commands.common import Version, new_app
 
 GROUP = "utank_hil.commands"
 
@@ -50,7 +50,7 @@ app = new_app(
 
 
 @app.callback()
-def _utank_hil() -> None:
+def _utank_hil(version: Version = False) -> None:
     pass
 
 

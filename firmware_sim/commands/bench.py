@@ -2,8 +2,9 @@
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -26,12 +27,18 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
+from utank_hil.provenance import describe
+
+if TYPE_CHECKING:
+    from firmware_sim.bench import BenchOptions
+    from firmware_sim.scenario import Scenario
 
 STORM = CONFIGS / "scenarios" / "storm.yaml"
 REAL_TIME_S = 120.0
 
 
 def bench(
+    context: typer.Context,
     scenario: Annotated[
         Path, typer.Argument(help="Scenario file.", show_default="the measured storm")
     ] = STORM,
@@ -83,6 +90,7 @@ def bench(
         duration = min(loaded.duration_s, REAL_TIME_S)
     options = BenchOptions(real_time, bus, seed, duration)
     length_s = loaded.duration_s if duration is None else duration
+    about = _about(loaded, options, out, context.params)
     bar = Progress(
         TextColumn("{task.description:>10}"),
         BarColumn(),
@@ -104,9 +112,9 @@ def bench(
             fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
             fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
-    files, failures = write_report(result, out)
+    files, failures = write_report(result, out, about)
     if json_:
-        sys.stdout.write(json.dumps(as_json(result, files)) + "\n")
+        sys.stdout.write(json.dumps(as_json(result, files, about)) + "\n")
     else:
         console = Console()
         print_table(console, motion_table(result))
@@ -136,6 +144,23 @@ def bench(
     if view:
         show(files["recording"])
     raise typer.Exit(exit_code(result))
+
+
+def _about(
+    scenario: "Scenario", options: "BenchOptions", out: Path, given: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Where the results come from; their configuration is the scenario with the options in it."""
+    changes: dict[str, float] = {}
+    if options.seed is not None:
+        changes["seed"] = options.seed
+    if options.duration_s is not None:
+        settle_s = min(scenario.settle_s, options.duration_s / 2)
+        changes |= {"duration_s": options.duration_s, "settle_s": settle_s}
+    ran = scenario.model_copy(update=changes)
+    try:
+        return describe("bench", ran, out, options=given, seed=ran.seed)
+    except OSError as error:
+        fail(error)
 
 
 def show(source: Path | str) -> None:

@@ -18,6 +18,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, shown
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import ControllerConfig
+from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint
@@ -26,6 +27,7 @@ PICTURE, FIGURES = "design.png", "design.json"
 
 
 def controller(
+    context: typer.Context,
     config: Annotated[Path, typer.Argument(help="Controller configuration.")],
     scenario: Annotated[
         Path | None,
@@ -75,8 +77,11 @@ def controller(
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
     title = f"{loaded.name}: {vessel.name} in {sea.name}"
     limits = loaded.limits
-    draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m)
+    about = describe("design controller", loaded, out, options=context.params)
+    about["scenario_configuration"] = describe("", sea, out, options={})["configuration"]
+    draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m, about)
     figures = {
+        **about,
         "name": loaded.name,
         "vessel": vessel.name,
         "scenario": sea.name,

@@ -5,9 +5,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from ports import DeadBus
 from typer.testing import CliRunner
 
-from utank_hil.canbus import Fault, Frame, Mode, PortError
+from utank_hil.canbus import Fault, Mode
 from utank_hil.cli import app
 from utank_hil.commands import run as module
 from utank_hil.commands.exit_codes import ExitCode
@@ -32,22 +33,6 @@ def test_run_ends_with_a_code_of_its_own_for_a_fault_and_for_a_lost_bus(
 ) -> None:
     node = SimpleNamespace(mode=mode, fault=fault, seen=SimpleNamespace(link_lost=link_lost))
     assert module._code(node) is code
-
-
-class DeadBus:
-    """An interface that opens, and then takes and gives nothing."""
-
-    def __init__(self, channel: str) -> None:
-        pass
-
-    def send(self, frame: Frame) -> None:
-        raise PortError("down")
-
-    def receive(self) -> tuple[Frame, ...]:
-        raise PortError("down")
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.mark.slow

@@ -3,7 +3,9 @@
 import os
 import re
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +45,12 @@ class Instant:
     url = None
 
     def __init__(
-        self, ring: str, file: Path, live: bool = False, events: str | None = None
+        self,
+        ring: str,
+        file: Path,
+        live: bool = False,
+        events: str | None = None,
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         file.write_text(ring)
 

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from pydantic import BaseModel, Field
 
 from utank_hil.configuration import ConfigError, Section, load_config
 from utank_hil.configuration.files import kind_of
+from utank_hil.configuration.yaml_text import parse_yaml
 
 
 class Ship(Section):
@@ -160,3 +162,18 @@ def test_path_of_a_data_file_is_relative_to_the_file_that_names_it(tmp_path: Pat
     write(tmp_path, "ships/a.yaml", "length_m: 20\nname: ./data.txt\n")
     top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: 10\n")
     assert load_config(top, Scenario).ship.name == str(tmp_path / "ships" / "data.txt")
+
+
+@pytest.mark.parametrize("text", ["1e-05", "2e3", "-1E+2", "3.e4", "1.5e-7"])
+def test_numbers_as_json_writes_them_are_numbers(text: str) -> None:
+    assert parse_yaml(f"{{x: {text}}}")[0] == {"x": float(text)}
+
+
+@given(value=st.floats(allow_nan=False, allow_infinity=False))
+def test_any_number_comes_back_from_json(value: float) -> None:
+    assert parse_yaml(json.dumps({"x": value}))[0] == {"x": value}
+
+
+@pytest.mark.parametrize("text", ["1e", "e5", "1e5m", "0x1e5"])
+def test_words_that_look_like_numbers_are_no_floats(text: str) -> None:
+    assert not isinstance(parse_yaml(f"x: {text}")[0]["x"], float)

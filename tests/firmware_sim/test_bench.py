@@ -61,7 +61,7 @@ def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(stor
 
 def test_people_on_board_are_judged_over_the_window_and_stand_in_the_json(storm) -> None:
     result, _ = storm
-    told = as_json(result, {})["on_board"]
+    told = as_json(result, {}, {})["on_board"]
     assert list(told["runs"]) == ["no tank", *(run.name for run in result.runs)]
     assert told["place"] == {"height_m": 4.88 + 4.88 - 1.83, "starboard_m": 8.55}
     roll = result.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
@@ -85,7 +85,7 @@ def test_plans_that_were_not_found_in_time_are_told() -> None:
     assert passive.fallbacks is None
     assert run.fallbacks is not None
     assert run.fallbacks > 0
-    assert [each["fallbacks"] for each in as_json(result, {})["runs"]] == [None, run.fallbacks]
+    assert [each["fallbacks"] for each in as_json(result, {}, {})["runs"]] == [None, run.fallbacks]
     assert f"starved: {run.fallbacks} plans were not found in time" in " ".join(endings(result))
 
 
@@ -149,7 +149,7 @@ def test_figures_follow_from_the_rows(storm) -> None:
 
 def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Path) -> None:
     result, _ = storm
-    files, failures = write_report(result, tmp_path)
+    files, failures = write_report(result, tmp_path, {})
     assert failures == []
     assert files["picture"].read_bytes().startswith(b"\x89PNG")
     recording = read_recording(files["recording"])
@@ -160,7 +160,7 @@ def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Pat
                 recording[run.name][name], run.column(name), rtol=1e-6, atol=1e-6, err_msg=name
             )
     told = json.loads(files["figures"].read_text(), parse_constant=pytest.fail)
-    assert told == json.loads(json.dumps(as_json(result, files), allow_nan=False))
+    assert told == json.loads(json.dumps(as_json(result, files, {}), allow_nan=False))
     assert [run["name"] for run in told["runs"]] == list(recording)
     assert told["files"]["picture"] == str(files["picture"])
     assert all(run["compared"] and run["rows"] == run["expected_rows"] for run in told["runs"])
@@ -170,7 +170,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
     result, _ = storm
     drawn: list[BenchCurve] = []
     monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
-    write_report(result, tmp_path)
+    write_report(result, tmp_path, {})
     cells = [list(column.cells) for column in motion_table(result).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
     for run, curve in zip(result.runs, drawn, strict=True):
@@ -186,7 +186,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
 def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path: Path) -> None:
     result, _ = storm
     (tmp_path / "bench.rrd").mkdir()
-    files, failures = write_report(result, tmp_path)
+    files, failures = write_report(result, tmp_path, {})
     assert set(files) == {"picture", "figures"}
     assert len(failures) == 1
     assert "recording" in failures[0]
@@ -241,7 +241,7 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
     assert endings(shortened) == ["ended at 90 of 120 s", "not run: lqg"]
     assert exit_code(shortened) is ExitCode.INTERRUPTED
     assert "40 s to 90 s" in str(motion_table(shortened).caption)
-    as_told = as_json(shortened, {})
+    as_told = as_json(shortened, {}, {})
     assert (as_told["interrupted"], as_told["not_run"]) == (True, ["lqg"])
     assert (as_told["duration_s"], as_told["end_s"]) == (DURATION_S, pytest.approx(90.0))
 
@@ -266,7 +266,7 @@ def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why:
     assert said[0].startswith(f"{last.name}: not ranked, not compared, ")
     assert why in said[0]
     assert exit_code(some) is ExitCode.NOT_RANKED
-    told = as_json(some, {})["runs"][-1]
+    told = as_json(some, {}, {})["runs"][-1]
     assert (told["name"], told["compared"]) == (last.name, False)
     assert "roll" not in told
     # without the passive run, nothing is said to be below it
@@ -295,7 +295,7 @@ def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
     )
     significant = list(motion_table(short).columns[2].cells)
     assert significant == [""] * (1 + len(result.runs))
-    told = json.loads(json.dumps(as_json(short, {}), allow_nan=False))
+    told = json.loads(json.dumps(as_json(short, {}, {}), allow_nan=False))
     assert told["no_tank"]["significant_rad"] is None
 
 

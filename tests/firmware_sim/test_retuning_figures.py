@@ -159,7 +159,7 @@ def test_table_says_what_was_found_beside_the_truth_and_the_json_the_same() -> N
     with console.capture() as capture:
         console.print(table)
     assert "ordered; peak sensitivity [3] is too high" in capture.get()
-    told = json.loads(json.dumps(as_json(result, {}), allow_nan=False))["runs"]
+    told = json.loads(json.dumps(as_json(result, {}, {}), allow_nan=False))["runs"]
     assert told[0]["retuning"] is None
     retuning = told[1]["retuning"]
     assert retuning["found"]["roll_period_s"] == 7.6

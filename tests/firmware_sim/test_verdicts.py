@@ -24,6 +24,7 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.runtime.faults import fault_text
 from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.sea import Spectrum
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 LENGTH = 2000
@@ -121,7 +122,7 @@ def test_a_marked_run_is_not_ranked_gives_no_reduction_and_the_exit_code_says_so
     rows = list(zip(*(column.cells for column in motion_table(result).columns), strict=True))
     assert [row[0] for row in rows] == ["no tank", "passive", "good", "bad"]
     assert rows[-1][4:6] == (word, "")
-    json_run = json.loads(json.dumps(as_json(result, {}), allow_nan=False))["runs"][1]
+    json_run = json.loads(json.dumps(as_json(result, {}, {}), allow_nan=False))["runs"][1]
     assert json_run["mark"]["word"] == word
     assert json_run["mark"]["why"].startswith(why)
     assert (json_run["ranked"], json_run["rank"], json_run["roll_below_passive"]) == (
@@ -153,7 +154,7 @@ def test_nothing_is_said_to_be_below_a_bare_ship_that_capsized() -> None:
     assert good.roll_below_passive == pytest.approx(0.5)
     assert endings(result) == ["no tank: the ship capsized at 88.0 s"]
     assert exit_code(result) is ExitCode.OK  # that the tank kept her up is what it is for
-    assert as_json(result, {})["no_tank"]["capsized_s"] == 88.0
+    assert as_json(result, {}, {})["no_tank"]["capsized_s"] == 88.0
 
 
 def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> None:
@@ -201,7 +202,7 @@ def test_what_passes_a_limit_of_the_model_is_said_with_its_figure() -> None:
     ):  # fmt: skip
         assert words.startswith("limit of the model passed, ")
         assert expected in words
-    assert as_json(result, {})["limits_passed"] == passed_limits(result)
+    assert as_json(result, {}, {})["limits_passed"] == passed_limits(result)
 
 
 def test_level_beyond_the_tank_without_a_strike_is_said_too() -> None:
@@ -210,18 +211,12 @@ def test_level_beyond_the_tank_without_a_strike_is_said_too() -> None:
     assert "linear: level of 5.50 m with room for 4.88 m" in said
 
 
-def test_steepness_is_that_of_the_textbook() -> None:
-    # 10 s in deep water is 156.1 m long; Michell's wave is 0.142 of that
-    length_m = 9.81 * 100 / (2 * math.pi)
-    found, most = steepness(np.array([5.0]), np.array([2 * math.pi / 10]))
-    assert found == pytest.approx(10 / length_m, rel=1e-3)
-    assert most == 0.142
-    # two components of one frequency: Hs = 4 sqrt(m0) of both
-    amplitude = np.array([1.0, 1.0])
-    found, most = steepness(amplitude, np.full(2, 2 * math.pi / 9))
-    assert found == pytest.approx(4 / (9.81 * 81 / (2 * math.pi)), rel=1e-3)
-    assert most == pytest.approx((1 / 10 + 1 / 15) / 2)
-    assert steepness(np.zeros(3), np.ones(3))[0] == 0.0
+def test_steepness_is_that_of_height_and_zero_crossing_period() -> None:
+    # 9 s in deep water is 126.5 m long
+    narrow = Spectrum(np.array([0.110, 1 / 9, 0.112]), np.array([0.0, 500.0, 0.0]))
+    found, most = steepness(narrow)
+    assert found == pytest.approx(narrow.hs_m / (9.81 * 81 / (2 * math.pi)), rel=2e-3)
+    assert most == pytest.approx((1 / 10 + 1 / 15) / 2, rel=1e-3)
 
 
 @given(st.lists(st.floats(0, 1e8), min_size=1, max_size=8))

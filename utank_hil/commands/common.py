@@ -22,6 +22,7 @@ from utank_hil.configuration.files import (
     located,
 )
 from utank_hil.parameters import ParameterError
+from utank_hil.provenance import headline
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -32,10 +33,23 @@ CONFIGS: Final = (
 """The shipped configurations: of the checkout, or installed with the package."""
 OUT: Final = Path("out")
 
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        sys.stdout.write(headline() + "\n")
+        raise typer.Exit
+
+
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else.")
 ]
 View = Annotated[bool, typer.Option("--view", help="Open the Rerun viewer, or serve it locally.")]
+Version = Annotated[
+    bool,
+    typer.Option(
+        "--version", is_eager=True, callback=_print_version, help="Print the version and end."
+    ),
+]
 Duration = Annotated[
     float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Length of a run.")
 ]

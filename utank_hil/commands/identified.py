@@ -10,6 +10,7 @@ from utank_hil.commands.stamps import claimed_files
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.provenance import headline
 from utank_hil.retuning import ModelSummary
 
 VESSEL: Final = "identified_vessel.yaml"
@@ -99,9 +100,9 @@ def _write(
     content: dict[str, Any],
 ) -> dict[str, Path]:
     found = vessel.model_copy(update={"ship": ship, "tank": tank})
-    vessel_file.write_text(yaml.safe_dump(_vessel_content(found), sort_keys=False))
     controller = content | {"vessel": vessel_file.name}
-    controller_file.write_text(yaml.safe_dump(controller, sort_keys=False))
+    for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):
+        file.write_text(f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}")
     return {"vessel": vessel_file, "config": controller_file}
 
 

@@ -22,6 +22,7 @@ from utank_hil.commands.identify_report import figures, print_report
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
+from utank_hil.provenance import describe
 from utank_hil.retuning import Candidate
 from utank_hil.retuning.redesign import RetuningTask, identify, judge
 
@@ -30,6 +31,7 @@ PICTURE = "identification.png"
 
 
 def identify_log(
+    context: typer.Context,
     log: Annotated[Path, typer.Argument(help="Recording (.rrd) with pulses of the pump in it.")],
     config: Annotated[
         Path, typer.Argument(help="Controller configuration: signals, design, ship to begin with.")
@@ -84,14 +86,14 @@ def identify_log(
             sys.stdout.write(json.dumps({"accepted": False, "reasons": [str(error)]}) + "\n")
         raise typer.Exit(ExitCode.REFUSED) from None
     answer = judge(record, found, task)
-    files = {
-        "picture": draw_identification(record, found, task, out / PICTURE, f"{log.name}, {name}")
-    }
+    about = describe("identify", loaded, out, options=context.params)
+    title = f"{log.name}, {name}"
+    files = {"picture": draw_identification(record, found, task, out / PICTURE, title, about)}
     if isinstance(answer, Candidate):
         fit = found.fit
         files.update(write_identified(out, loaded.vessel, fit.ship, fit.tank, content))
     if json_:
-        sys.stdout.write(json.dumps(figures(found, answer, files)) + "\n")
+        sys.stdout.write(json.dumps(about | figures(found, answer, files)) + "\n")
     else:
         print_report(Console(highlight=False), found, task, answer, files)
     if not isinstance(answer, Candidate):

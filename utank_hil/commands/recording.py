@@ -1,8 +1,9 @@
 """The recording of a run: if it fails, the controller runs on, and the failure is printed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
@@ -46,6 +47,8 @@ class RunRecording:
         Serve viewers too.
     events : str, optional
         Name of the run's ring of events, to be recorded beside the rows.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`).
 
     Attributes
     ----------
@@ -53,7 +56,13 @@ class RunRecording:
         Complete after `stop`.
     """
 
-    def __init__(self, folder: Path, live: bool = False, events: str | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        live: bool = False,
+        events: str | None = None,
+        about: Mapping[str, Any] | None = None,
+    ) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
@@ -68,7 +77,9 @@ class RunRecording:
             return
         try:
             self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
-            self._recorder = RecorderProcess(self._ring.name, file, live=live, events=events)
+            self._recorder = RecorderProcess(
+                self._ring.name, file, live=live, events=events, about=about
+            )
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
             self.stop()

@@ -20,9 +20,11 @@ from utank_hil.commands.fault_lines import FaultLines
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
+from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.provenance import describe
 from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
@@ -36,6 +38,7 @@ from utank_hil.telemetry import event_text, open_viewer
 
 
 def run(
+    context: typer.Context,
     config: Annotated[Path, typer.Argument(help="Controller configuration.")],
     bus: Annotated[str, typer.Option(help="SocketCAN interface, for example can0.")],
     duration: Duration = None,
@@ -66,6 +69,10 @@ def run(
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
+            manager = stack.enter_context(ServiceManager())
+        except OSError as error:
+            fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}")
+        try:
             port = SocketCanPort(bus)
         except OSError as error:
             fail(error, ExitCode.NO_BUS)
@@ -82,7 +89,10 @@ def run(
         recording = None
         if folder is not None:
             recording = RunRecording(
-                folder, live=view, events=None if announcer is None else announcer.ring
+                folder,
+                live=view,
+                events=None if announcer is None else announcer.ring,
+                about=describe("run", loaded, folder, options=context.params),
             )
             stack.callback(recording.stop)
             if recording.summary.error is not None:
@@ -110,6 +120,7 @@ def run(
 
         def ended() -> bool:
             faults.look(node)
+            manager.progress(statistics.ticks)
             return stop()
 
         with suppress(PortError):  # the loop meets it too, and its node reacts
@@ -118,9 +129,11 @@ def run(
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
             notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
+            manager.ready(f"{loaded.name} on {bus}")
             RealTimeLoop([node], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
             )
+        manager.stopping()
         faults.look(node)
     if announcer is not None and announcer.error is not None:
         notes.print(f"[red]retuning was not told:[/red] {escape(announcer.error)}", soft_wrap=True)

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import WrapValidator
+from pydantic import PlainSerializer, WrapValidator
 
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
@@ -229,4 +229,4 @@ def _as_ship(value: Any, written: Callable[[Any], WrittenShip]) -> RollShip:
 if TYPE_CHECKING:
     ShipFromFile = RollShip
 else:
-    ShipFromFile = Annotated[WrittenShip, WrapValidator(_as_ship)]
+    ShipFromFile = Annotated[WrittenShip, WrapValidator(_as_ship), PlainSerializer(asdict)]

@@ -1,9 +1,9 @@
 """Figure of a bench: roll, level and pressure over time, with passive and active tank."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -51,7 +51,9 @@ class BenchCurve:
     retuning: FloatArray | None = None
 
 
-def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
+def draw_bench(
+    curves: Sequence[BenchCurve], path: Path, title: str, about: Mapping[str, Any] | None = None
+) -> Path:
     """Draw roll, level and pressure of all runs: the whole time, and three minutes enlarged.
 
     The enlarged part is around the largest roll, or around the first trial of a new law if a run
@@ -66,6 +68,8 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
         The `.png` file; overwritten.
     title : str
         Title of the figure.
+    about : mapping, optional
+        As in `picture`.
 
     Returns
     -------
@@ -86,7 +90,7 @@ def draw_bench(curves: Sequence[BenchCurve], path: Path, title: str) -> Path:
     retuning = any(curve.retuning is not None for curve in curves)
     lane = 0.25 * sum(curve.retuning is not None for curve in curves)
     size_in = (13.0 if len(spans) > 1 else 9.0, 7.5 + (0.6 + lane if retuning else 0.0))
-    with picture(path, title, size_in) as figure:
+    with picture(path, title, size_in, about) as figure:
         axes = figure.subplots(
             3 + retuning,
             len(spans),

@@ -1,7 +1,9 @@
 """Figure of an identification: validation of the model on data that it was not fitted to."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +26,12 @@ ORDERS = range(2, 21, 2)
 
 
 def draw_identification(
-    record: FloatArray, found: Identification, task: RetuningTask, path: Path, title: str
+    record: FloatArray,
+    found: Identification,
+    task: RetuningTask,
+    path: Path,
+    title: str,
+    about: Mapping[str, Any] | None = None,
 ) -> Path:
     """Draw held-out roll and its prediction, responses, residuals and the stabilization diagram.
 
@@ -37,6 +44,8 @@ def draw_identification(
     path : Path
         The `.png` file; overwritten.
     title : str
+    about : mapping, optional
+        As in `picture`.
 
     Returns
     -------
@@ -62,7 +71,7 @@ def draw_identification(
         "ARX model": np.linalg.solve(left, np.einsum("wi,iab->wab", powers, arx.beta)),
         "identified ship": _ship_response(task, found.plant(task), z),
     }
-    with picture(path, title, (12.0, 8.0)) as figure:
+    with picture(path, title, (12.0, 8.0), about) as figure:
         (above, bode), (residuals, modes) = figure.subplots(2, 2)
         above.plot(time_s, np.rad2deg(measured_roll), color=COLORS[0], label="measured")
         above.plot(time_s, np.rad2deg(predicted), color=COLORS[1], lw=1.0, label="predicted")

@@ -1,9 +1,12 @@
 """Common style and colours of the figures."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+
+from utank_hil.provenance import headline
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,7 +39,9 @@ STYLE: "Final[dict[RcKeyType, Any]]" = {
 
 
 @contextmanager
-def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[Figure]":
+def picture(
+    path: Path, title: str, size_in: tuple[float, float], about: Mapping[str, Any] | None = None
+) -> "Iterator[Figure]":
     """Yield an empty figure; at the end of the block its title is set and it is written.
 
     Parameters
@@ -47,6 +52,8 @@ def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[F
         Title of the figure.
     size_in : tuple of float
         Width and height in inches.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`), kept in the file's text ``Description``.
 
     Yields
     ------
@@ -62,4 +69,5 @@ def picture(path: Path, title: str, size_in: tuple[float, float]) -> "Iterator[F
         FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
         yield figure
         figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
-        figure.savefig(path, dpi=130)
+        metadata = {} if about is None else {"Description": json.dumps(about)}
+        figure.savefig(path, dpi=130, metadata={"Software": headline(), **metadata})

@@ -1,8 +1,9 @@
 """Figure of a trade-off: roll reduction against margins, pressure and level."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +19,12 @@ _ARMED, _REFUSED = COLORS[1], COLORS[2]
 
 
 def draw_trade(
-    trade: Trade, path: Path, title: str, pressure_limit_pa: float, level_limit_m: float
+    trade: Trade,
+    path: Path,
+    title: str,
+    pressure_limit_pa: float,
+    level_limit_m: float,
+    about: Mapping[str, Any] | None = None,
 ) -> Path:
     """Draw roll reduction over peak sensitivity, and the cost of each law.
 
@@ -34,6 +40,8 @@ def draw_trade(
         Title of the figure.
     pressure_limit_pa, level_limit_m : float
         Drawn as lines. The RMS values are those of linear theory, without limits.
+    about : mapping, optional
+        As in `picture`.
 
     Returns
     -------
@@ -48,7 +56,7 @@ def draw_trade(
     points = [point for point in trade.points if point.motion is not None]
     if not points:
         raise ValueError("no law of this trade is stable on its own ship: nothing to draw")
-    with picture(path, title, (13.0, 7.5)) as figure:
+    with picture(path, title, (13.0, 7.5), about) as figure:
         axes = figure.subplot_mosaic(
             [["trade", "radius"], ["trade", "pressure"], ["trade", "level"]],
             width_ratios=(1.45, 1),

@@ -13,7 +13,7 @@ from utank_hil.telemetry.viewer import Viewer, open_viewer
 
 if TYPE_CHECKING:
     from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
-    from utank_hil.telemetry.recording import read_recording, write_recording
+    from utank_hil.telemetry.recording import read_about, read_recording, write_recording
 
 __all__ = [
     "EventReader",
@@ -27,6 +27,7 @@ __all__ = [
     "Viewer",
     "event_text",
     "open_viewer",
+    "read_about",
     "read_recording",
     "write_recording",
 ]
@@ -35,6 +36,7 @@ _LAZY = {
     "RecorderError": "recorder",
     "RecorderProcess": "recorder",
     "RecorderReport": "recorder",
+    "read_about": "recording",
     "read_recording": "recording",
     "write_recording": "recording",
 }

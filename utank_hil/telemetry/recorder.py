@@ -7,6 +7,7 @@ controller never waits for it: rows that it reads too late are overwritten and c
 """
 
 import argparse
+import contextlib
 import json
 import os
 import select
@@ -17,7 +18,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from utank_hil.closing import Closing
 from utank_hil.telemetry.event_ring import EventReader
@@ -59,7 +60,11 @@ class RecorderReport:
 
 
 def record_ring(
-    ring: str, file: Path, live_port: int | None = None, events: str | None = None
+    ring: str,
+    file: Path,
+    live_port: int | None = None,
+    events: str | None = None,
+    about: Mapping[str, Any] | None = None,
 ) -> RecorderReport:
     """Record a ring until it ends, or SIGINT or SIGTERM arrives; main function of the process.
 
@@ -73,6 +78,8 @@ def record_ring(
         Serve viewers on this loopback port as well.
     events : str, optional
         Name of the ring of events (`EventWriter`) that belongs to it.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`).
 
     Raises
     ------
@@ -86,7 +93,7 @@ def record_ring(
     import rerun as rr
 
     from utank_hil.telemetry.blueprint import make_blueprint
-    from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths
+    from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, write_about
 
     stop = _stop_pipe()
     with ExitStack() as stack:
@@ -98,6 +105,8 @@ def record_ring(
             sinks.append(rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY))
         recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
         recording.set_sinks(*sinks, default_blueprint=make_blueprint(reader.columns, [LIVE_RUN]))
+        if about is not None:
+            write_about(recording, about)
         log = RunLog(recording, run_paths([LIVE_RUN])[0], reader.columns)
         _print_json({"ready": 1})
         recorded = reported_rows = reported_events = 0
@@ -146,6 +155,8 @@ class RecorderProcess(Closing):
         Serve viewers on a free loopback port.
     events : str, optional
         Name of the ring of events (`EventWriter`) that belongs to it.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`).
 
     Attributes
     ----------
@@ -159,11 +170,18 @@ class RecorderProcess(Closing):
     """
 
     def __init__(
-        self, ring: str, file: Path, live: bool = False, events: str | None = None
+        self,
+        ring: str,
+        file: Path,
+        live: bool = False,
+        events: str | None = None,
+        about: Mapping[str, Any] | None = None,
     ) -> None:
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
         if events is not None:
             command += ["--events", events]
+        if about is not None:
+            command += ["--about"]
         self.url: str | None = None
         if live:
             port = free_tcp_port()
@@ -172,12 +190,15 @@ class RecorderProcess(Closing):
         self._report: RecorderReport | None = None
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL if about is None else subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=rerun_environment(),
             start_new_session=True,
             text=True,
         )
+        if self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError), self._process.stdin as given:
+                json.dump(about, given)  # where it has ended already, its reason follows
         output = self._process.stdout
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
@@ -229,11 +250,15 @@ def _main() -> None:
     parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
     parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
     parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
+    parser.add_argument("--about", action="store_true", help="its origin is JSON on standard input")
     arguments = parser.parse_args()
+    about = json.load(sys.stdin) if arguments.about else None
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
-        report = record_ring(arguments.ring, arguments.file, arguments.live_port, arguments.events)
+        report = record_ring(
+            arguments.ring, arguments.file, arguments.live_port, arguments.events, about
+        )
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)

@@ -1,11 +1,12 @@
 """Rerun recordings as a whole: written after a lockstep bench, and read back."""
 
+import json
 import subprocess
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -16,6 +17,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.retuning.adaptive import RetuningEvent
 from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.rerun_log import (
+    ABOUT,
     APPLICATION,
     ARCHETYPE,
     COMPONENT,
@@ -25,11 +27,13 @@ from utank_hil.telemetry.rerun_log import (
     run_of,
     run_paths,
     time_index,
+    write_about,
 )
 from utank_hil.telemetry.units import column_of
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
+_TEXT: Final = "TextDocument:text"
 _BLOCK_ROWS: Final = 8192  # rows of a chunk, the unit in which the viewer loads a file
 
 
@@ -38,6 +42,7 @@ def write_recording(
     columns: Sequence[str],
     runs: Mapping[str, FloatArray],
     events: Mapping[str, Sequence[RetuningEvent]] | None = None,
+    about: Mapping[str, Any] | None = None,
 ) -> None:
     """Write runs side by side on one time line into a recording, with its blueprint.
 
@@ -51,6 +56,8 @@ def write_recording(
         Rows of each run by name; the first run is the reference.
     events : mapping of str to sequence of RetuningEvent, optional
         Retuning events by run, `time_ns` on the clock of `time_s`.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`).
 
     Raises
     ------
@@ -71,6 +78,8 @@ def write_recording(
     blueprint = make_blueprint(columns, list(runs), span_s=(time_s.min(), time_s.max()))
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
+    if about is not None:
+        write_about(recording, about)
     for path_of_run, (run, rows) in zip(run_paths(list(runs)), runs.items(), strict=True):
         log = RunLog(recording, path_of_run, columns)
         for start in range(0, len(rows), _BLOCK_ROWS):
@@ -95,7 +104,7 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
         If the file is no recording, or holds no telemetry.
     """
     blocks: dict[str, list[dict[str, FloatArray]]] = {}
-    for chunk in _telemetry_chunks(path):
+    for chunk in _chunks(path, _ROWS):
         batch = chunk.to_record_batch()
         row = batch.column(_ROWS).flatten()
         block = {TIME_COLUMN: batch.column(TIMELINE).to_numpy().astype(np.int64) / 1e9}
@@ -111,10 +120,26 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
     }
 
 
-def _telemetry_chunks(path: Path) -> list[Chunk]:
-    """Return the chunks with rows; a file truncated within a message is repaired first."""
+def read_about(path: Path) -> dict[str, Any]:
+    """Read where a recording comes from (`utank_hil.provenance`).
+
+    Raises
+    ------
+    ValueError
+        If the file is no recording, or does not say.
+    """
+    for chunk in _chunks(path, _TEXT):
+        if chunk.entity_path == f"/__properties/{ABOUT}":
+            (text,) = chunk.to_record_batch().column(_TEXT).flatten().to_pylist()
+            found: dict[str, Any] = json.loads(text)
+            return found
+    raise ValueError(f"{path}: this recording does not say where it comes from")
+
+
+def _chunks(path: Path, component: str) -> list[Chunk]:
+    """Return the chunks with a component; a file truncated within a message is repaired first."""
     try:
-        return _read_chunks(path)
+        return _read_chunks(path, component)
     except RuntimeError as error:
         if "exceeds file size" not in str(error):
             raise ValueError(f"{path}: {error}") from error
@@ -122,14 +147,14 @@ def _telemetry_chunks(path: Path) -> list[Chunk]:
         repaired = Path(folder) / path.name
         command = [rerun_binary(), "rrd", "optimize", str(path), "-o", str(repaired)]
         subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
-        return _read_chunks(repaired)
+        return _read_chunks(repaired, component)
 
 
-def _read_chunks(path: Path) -> list[Chunk]:
+def _read_chunks(path: Path, component: str) -> list[Chunk]:
     with warnings.catch_warnings():
         # left by a killed recorder; the rows are intact
         warnings.filterwarnings("ignore", "RRD file has no footer", RerunWarning)
         reader = RrdReader(path)
     if not reader.recordings():
         return []
-    return reader.stream().filter(components=_ROWS).to_chunks()
+    return reader.stream().filter(components=component).to_chunks()

@@ -6,9 +6,10 @@ size. Mode and fault are also logged by name, on change only, to a state lane an
 text log holds the retuning events as well.
 """
 
+import json
 import re
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,8 @@ from utank_hil.telemetry.units import field_of
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 TIMELINE: Final = "time"
+ABOUT: Final = "about"
+"""Property of a recording that says where it comes from (`utank_hil.provenance`), as JSON."""
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
@@ -147,6 +150,11 @@ class RunLog:
             rr.TextLog.columns(text=texts, level=[str(level) for level in levels]),
             strict=True,
         )
+
+
+def write_about(recording: rr.RecordingStream, about: Mapping[str, Any]) -> None:
+    """Keep in a recording where it comes from; the viewer shows it with the recording."""
+    recording.send_property(ABOUT, rr.TextDocument(json.dumps(about, indent=1)))
 
 
 def time_index(columns: Sequence[str]) -> int:

@@ -1,0 +1,95 @@
+"""What the service manager is told, and when it is not."""
+
+import socket
+from pathlib import Path
+
+import pytest
+from ports import QuietBus
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+from utank_hil.commands import run as module
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.service_manager import ServiceManager
+
+GPC = Path("configs/controllers/gpc.yaml")
+
+
+@pytest.fixture
+def manager(tmp_path: Path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind(str(tmp_path / "notify"))
+        heard.settimeout(10)
+        yield heard
+
+
+def environment(heard: socket.socket, watchdog_us: int = 500_000) -> dict[str, str]:
+    return {"NOTIFY_SOCKET": heard.getsockname(), "WATCHDOG_USEC": str(watchdog_us)}
+
+
+def messages(heard: socket.socket) -> list[str]:
+    heard.setblocking(False)
+    found = []
+    while True:
+        try:
+            found.append(heard.recv(4096).decode())
+        except BlockingIOError:
+            return found
+
+
+def test_watchdog_is_fed_by_the_count_of_ticks_and_several_times_in_its_time(manager) -> None:
+    with ServiceManager(environment(manager)) as service:
+        for tick in range(100):  # a second
+            service.progress(tick)
+        assert messages(manager) == ["WATCHDOG=1"] * 9  # every 120 ms of 500
+        for _ in range(1000):  # the loop's process lives, but nothing goes on
+            service.progress(101)
+        assert messages(manager) == []
+
+
+def test_without_a_watchdog_nothing_is_fed_and_without_a_manager_nothing_is_sent(manager) -> None:
+    with ServiceManager({"NOTIFY_SOCKET": manager.getsockname()}) as service:
+        service.ready("here")
+        service.progress(0)
+        service.stopping()
+    assert messages(manager) == ["READY=1\nSTATUS=here", "STOPPING=1"]
+    with ServiceManager({}) as nobody:
+        nobody.ready("")
+        nobody.progress(0)
+
+
+def test_names_in_the_abstract_namespace_are_reached_too() -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind("\0utank-hil-test")
+        with ServiceManager({"NOTIFY_SOCKET": "@utank-hil-test"}) as service:
+            service.stopping()
+        assert messages(heard) == ["STOPPING=1"]
+
+
+def test_a_manager_that_does_not_listen_or_goes_away_never_holds_the_loop(manager) -> None:
+    with ServiceManager(environment(manager, 10_000)) as service:
+        for tick in range(5000):  # far more than its queue holds
+            service.progress(tick)
+        manager.close()
+        service.progress(0)
+
+
+def test_a_socket_that_is_not_there_is_said(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file"):
+        ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+
+
+@pytest.mark.slow
+def test_run_tells_that_it_is_ready_alive_and_stopping_in_this_order(
+    manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    for name, value in environment(manager).items():
+        monkeypatch.setenv(name, value)
+    words = ["run", str(GPC), "--bus", "any0", "--duration", "0.5", "--json"]
+    assert CliRunner().invoke(app, words).exit_code == ExitCode.OK
+    first, *alive, last = messages(manager)
+    assert first == "READY=1\nSTATUS=GPC, roll on any0"
+    assert len(alive) >= 2
+    assert set(alive) == {"WATCHDOG=1"}
+    assert last == "STOPPING=1"

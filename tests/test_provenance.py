@@ -1,0 +1,163 @@
+"""Results say where they come from, and what they say can be run again."""
+
+import json
+import math
+import platform
+import re
+import socket
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from pydantic import BaseModel
+from typer.testing import CliRunner
+
+from firmware_sim.cli import app as ship_app
+from firmware_sim.scenario import Scenario
+from utank_hil import provenance
+from utank_hil.cli import app
+from utank_hil.commands.recording import RunRecording
+from utank_hil.configuration import ControllerConfig, Vessel, load_config
+from utank_hil.provenance import commit, describe, headline, version
+from utank_hil.telemetry import read_about
+
+CONFIGS = Path("configs")
+PATTI_B = CONFIGS / "scenarios" / "patti_b.yaml"
+SHIPPED = [
+    (path, model)
+    for folder, model in (
+        ("scenarios", Scenario),
+        ("controllers", ControllerConfig),
+        ("ships", Vessel),
+    )
+    for path in sorted((CONFIGS / folder).glob("*.yaml"))
+]
+
+
+def content(model: BaseModel, folder: Path) -> dict[str, object]:
+    return describe("test", model, folder, options={})["configuration"]
+
+
+def loaded_again(described: object, model: type[BaseModel], folder: Path) -> BaseModel:
+    path = folder / "again.yaml"
+    path.write_text(json.dumps(described, allow_nan=False), encoding="utf-8")
+    return load_config(path, model)
+
+
+@pytest.mark.parametrize(("path", "model"), SHIPPED, ids=lambda v: getattr(v, "stem", ""))
+def test_every_shipped_configuration_loads_again_from_what_is_said_of_it(
+    path: Path, model: type[BaseModel], tmp_path: Path
+) -> None:
+    ran = load_config(path, model)
+    again = loaded_again(content(ran, tmp_path), model, tmp_path)
+    assert content(again, tmp_path) == content(ran, tmp_path)
+    if not describe("test", ran, tmp_path, options={})["data"]:  # its path is another
+        assert again == ran
+
+
+def test_measured_directions_load_again_too(tmp_path: Path) -> None:
+    seas = (CONFIGS / "seas").resolve()
+    text = (CONFIGS / "scenarios" / "storm.yaml").read_text()
+    text = text.replace("../seas", str(seas)).replace("../", f"{CONFIGS.resolve()}/")
+    direction = f"direction_file: {seas}/ndbc_41010_2019-02_mean_direction.txt\n  course_deg: 30.0"
+    path = tmp_path / "scenario.yaml"
+    path.write_text(text.replace("  file: ", f"  {direction}\n  file: "), encoding="utf-8")
+    ran = load_config(path, Scenario)
+    assert ran.sea.direction_file is not None
+    again = loaded_again(content(ran, tmp_path), Scenario, tmp_path)
+    assert again.sea.sea(1).heading_rad.tolist() == ran.sea.sea(1).heading_rad.tolist()
+
+
+def test_data_files_are_named_from_the_results_folder_with_their_hash(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    told = describe("x", load_config(CONFIGS / "scenarios" / "storm.yaml", Scenario),
+                    tmp_path / "out", options={})  # fmt: skip
+    ((name, digest),) = told["data"].items()
+    assert told["configuration"]["sea"]["file"] == name
+    assert name.startswith("../")
+    found = (tmp_path / "out" / name).resolve()
+    assert found == (CONFIGS / "seas" / "ndbc_41010_2019-02_spectral_density.txt").resolve()
+    done = subprocess.run(["sha256sum", found], capture_output=True, text=True, check=True)
+    assert digest == done.stdout.split()[0]
+
+
+def test_machine_and_program_are_said_and_nobodys_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = datetime.now(UTC)
+    home = Path("/home/somebody/ships/mine.yaml")
+    options = {"config": home, "out": Path("out"), "seed": None}
+    model = load_config(CONFIGS / "ships" / "patti_b.yaml", Vessel)
+    told = describe("bench", model, Path("out"), options=options, seed=7)
+    assert told["options"] == {"config": "mine.yaml", "out": "out", "seed": None}
+    assert (told["command"], told["seed"], told["version"]) == ("bench", 7, version())
+    assert abs(datetime.fromisoformat(told["date"]) - before).total_seconds() < 60
+    assert set(told["machine"]) == {"platform", "python", "cpus"}
+    assert told["machine"]["python"] == platform.python_version()
+    text = json.dumps(told, allow_nan=False)
+    assert "somebody" not in text
+    assert socket.gethostname() not in text
+    assert told["configuration"]["pump"]["max_power_w"] == model.pump.max_power_w
+    assert "headroom_m" not in told["configuration"]["tank"]  # without bound, as by default
+    assert math.isinf(model.tank.headroom_m)
+
+
+def test_commit_is_that_of_the_tree_and_unknown_where_there_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commit.cache_clear()
+    head = subprocess.run(["git", "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
+    if head.returncode == 0:  # not so in an unpacked archive
+        described = commit().removesuffix("-dirty").rpartition("-g")[2]
+        assert head.stdout.startswith(described) or described.startswith("v")
+    commit.cache_clear()
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    assert commit() == "unknown"  # an editable installation has no commit of its own
+    (tmp_path / ".git").mkdir()
+    commit.cache_clear()
+    assert commit() == "unknown"  # no repository
+    commit.cache_clear()
+
+
+@pytest.mark.parametrize("application", [app, ship_app], ids=["utank-hil", "firmware-sim"])
+def test_both_commands_have_a_version(application) -> None:
+    result = CliRunner().invoke(application, ["--version"])
+    assert (result.exit_code, result.stdout) == (0, f"{headline()}\n")
+    assert re.fullmatch(r"utank-hil \d+\.\d+\.\d+\S*, commit \S+\n", result.stdout)
+
+
+@pytest.mark.slow
+def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ran(
+    tmp_path: Path,
+) -> None:
+    words = ["bench", str(PATTI_B), "--seed", "3", "--duration", "20", "--out", str(tmp_path)]
+    result = CliRunner().invoke(app, [*words, "--json"])
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "bench.json").read_text())
+    again = loaded_again(told["configuration"], Scenario, tmp_path)
+    ran = load_config(PATTI_B, Scenario)
+    assert again == ran.model_copy(update={"seed": 3, "duration_s": 20.0, "settle_s": 10.0})
+    assert told["options"]["seed"] == told["seed"] == 3
+    picture = json.loads(Image.open(tmp_path / "bench.png").text["Description"])
+    recording = read_about(tmp_path / "bench.rrd")
+    assert picture == recording == {key: told[key] for key in picture}
+    assert {"version", "commit", "date", "machine", "configuration"} <= set(picture)
+
+
+@pytest.mark.slow
+def test_recording_of_a_run_holds_where_it_comes_from(tmp_path: Path) -> None:
+    config = load_config(CONFIGS / "controllers" / "gpc.yaml", ControllerConfig)
+    about = describe("run", config, tmp_path, options={})
+    recording = RunRecording(tmp_path, about=about)
+    recording.stop()
+    assert recording.summary.file is not None
+    assert read_about(Path(recording.summary.file)) == about
+
+
+@pytest.mark.slow
+def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path: Path) -> None:
+    recording = RunRecording(tmp_path)
+    recording.stop()
+    assert recording.summary.file is not None
+    with pytest.raises(ValueError, match="does not say where it comes from"):
+        read_about(Path(recording.summary.file))

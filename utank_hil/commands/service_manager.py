@@ -1,0 +1,74 @@
+"""What systemd is told of a service of ``Type=notify``: ready, alive, stopping (sd_notify(3))."""
+
+import contextlib
+import os
+import socket
+from collections.abc import Mapping
+from typing import Final
+
+from utank_hil.closing import Closing
+from utank_hil.tick import TICK_NS
+
+_FEEDS: Final = 4
+"""Signs of life in the watchdog's time."""
+
+
+class ServiceManager(Closing):
+    """The socket of the service manager; without one, nothing is sent.
+
+    Parameters
+    ----------
+    environment : mapping of str to str
+        ``NOTIFY_SOCKET`` and ``WATCHDOG_USEC`` as systemd sets them.
+
+    Raises
+    ------
+    OSError
+        If there is such a socket and it can't be reached.
+    """
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        self._socket: socket.socket | None = None
+        self._every_ticks = 0
+        address = environment.get("NOTIFY_SOCKET", "")
+        if not address:
+            return
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+        self._socket.setblocking(False)
+        try:
+            self._socket.connect(address.replace("@", "\0", 1) if address[0] == "@" else address)
+        except OSError:
+            self.close()
+            raise
+        watchdog_ns = 1000 * int(environment.get("WATCHDOG_USEC", "0"))
+        if watchdog_ns:
+            self._every_ticks = max(1, watchdog_ns // (_FEEDS * TICK_NS))
+
+    def ready(self, status: str) -> None:
+        """Tell that the loop begins; from here on the watchdog waits for ticks."""
+        self._send(f"READY=1\nSTATUS={status}")
+
+    def progress(self, ticks: int) -> None:
+        """Feed the watchdog by the loop's own progress: only as the count of ticks goes on.
+
+        To be called before each tick. It costs a datagram in a fraction of the watchdog's time and
+        never waits.
+        """
+        if self._every_ticks and ticks % self._every_ticks == 0:
+            self._send("WATCHDOG=1")
+
+    def stopping(self) -> None:
+        """Tell that the loop has ended."""
+        self._send("STOPPING=1")
+
+    def close(self) -> None:
+        """Close the socket; idempotent."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _send(self, message: str) -> None:
+        if self._socket is not None:
+            # a manager that is busy or starts anew misses a datagram; the next one follows
+            with contextlib.suppress(OSError):
+                self._socket.send(message.encode())

@@ -1,0 +1,157 @@
+"""Where a result comes from: program, machine, command and the whole configuration, as one mapping.
+
+Figures, recordings and pictures carry it, so that they still say what ran when files have moved on.
+"""
+
+import hashlib
+import importlib.metadata
+import json
+import math
+import os
+import platform
+import subprocess
+from collections.abc import Iterator, Mapping
+from datetime import UTC, date, datetime
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import BaseModel
+
+PROGRAM: Final = "utank-hil"
+UNKNOWN: Final = "unknown"
+_ROOT: Final = Path(__file__).resolve().parents[1]
+_GIT_S: Final = 5.0
+
+
+def version() -> str:
+    """The program's version; `UNKNOWN` where it is not installed."""
+    try:
+        return importlib.metadata.version(PROGRAM)
+    except importlib.metadata.PackageNotFoundError:
+        return UNKNOWN
+
+
+@cache
+def commit() -> str:
+    """The commit that the program is of.
+
+    As ``git describe`` says it of the source tree, with ``-dirty`` if that was changed since; else
+    the one that pip noted when it installed from a repository; else `UNKNOWN`.
+    """
+    if (_ROOT / ".git").exists():
+        # no lock: another git may be at work there
+        command = ["git", "--no-optional-locks", "-C", str(_ROOT), "describe", "--always",
+                   "--dirty", "--abbrev=12"]  # fmt: skip
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=_GIT_S, check=True
+            )
+        except (OSError, subprocess.SubprocessError):
+            return UNKNOWN
+        return done.stdout.strip()
+    try:
+        origin = importlib.metadata.distribution(PROGRAM).read_text("direct_url.json")
+    except importlib.metadata.PackageNotFoundError:
+        return UNKNOWN
+    found = json.loads(origin or "{}").get("vcs_info", {}).get("commit_id", UNKNOWN)
+    return str(found)
+
+
+def headline() -> str:
+    """Program, version and commit in one line."""
+    return f"{PROGRAM} {version()}, commit {commit()}"
+
+
+def describe(
+    command: str,
+    configuration: BaseModel,
+    folder: Path,
+    *,
+    options: Mapping[str, Any],
+    seed: int | None = None,
+) -> dict[str, Any]:
+    """Describe a result, ready for `json.dumps`.
+
+    Parameters
+    ----------
+    command : str
+        Name of the command.
+    configuration : BaseModel
+        What it ran with, as loaded.
+    folder : Path
+        Where the result is written: paths of data files are relative to it.
+    options : mapping of str to any
+        Options and arguments of the command.
+    seed : int, optional
+
+    Returns
+    -------
+    dict
+        ``program``, ``version``, ``commit``, ``date`` (UTC), ``machine``, ``command``, ``options``,
+        ``seed``, ``configuration`` (a file of this content in `folder` loads as what ran), ``data``
+        (SHA-256 of the data files that the configuration names).
+    """
+    content = configuration.model_dump()
+    files = sorted({_relative(path, folder): path for path in _paths(content)}.items())
+    return {
+        "program": PROGRAM,
+        "version": version(),
+        "commit": commit(),
+        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        "machine": {
+            "platform": platform.platform(),
+            "python": platform.python_version(),
+            "cpus": os.cpu_count(),
+        },
+        "command": command,
+        "options": {name: _given(value) for name, value in options.items()},
+        "seed": seed,
+        "configuration": _plain(content, folder),
+        "data": {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files},
+    }
+
+
+def _given(value: Any) -> Any:
+    """An option's value; of a path outside of the working directory only its name."""
+    if isinstance(value, Path):
+        relative = os.path.relpath(value)
+        return value.name if relative.startswith("..") else relative
+    return value
+
+
+def _paths(value: Any) -> Iterator[Path]:
+    if isinstance(value, Path):
+        yield value
+    elif isinstance(value, Mapping):
+        for each in value.values():
+            yield from _paths(each)
+    elif isinstance(value, list | tuple):
+        for each in value:
+            yield from _paths(each)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """A path as a configuration in `folder` names it."""
+    relative = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    return relative if relative.startswith("../") else f"./{relative}"
+
+
+def _plain(value: Any, folder: Path) -> Any:
+    """A value as a file can hold it; keys at infinity are left out, which says the same."""
+    if isinstance(value, Mapping):
+        return {
+            name: _plain(each, folder)
+            for name, each in value.items()
+            if not (isinstance(each, float) and math.isinf(each))
+        }
+    if isinstance(value, list | tuple):
+        return [_plain(each, folder) for each in value]
+    if isinstance(value, Path):
+        return _relative(value, folder)
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, date):
+        return value.isoformat()
+    return value
