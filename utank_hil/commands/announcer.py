@@ -25,7 +25,7 @@ from utank_hil.telemetry import EventReader, EventWriter, event_text
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5
 _START_S: Final = 30.0
-_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _END_S: Final = 10.0
 
 

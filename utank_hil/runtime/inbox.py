@@ -65,8 +65,10 @@ class Inbox:
         What the operator wants.
     versions_match : bool
         Drive and sensors run the controller's catalogue and configuration.
-    address_conflict : bool
-        Somebody else sends with the controller's address.
+    panel_matches : bool
+        So does the operator's panel.
+    conflict_ns : int
+        When somebody else last sent with the controller's address.
     frames : int
         Frames heard so far, good and bad, of any kind.
     """
@@ -86,6 +88,8 @@ class Inbox:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
+        panel = catalogue.receiver(Heartbeat, Address.OPERATOR)
+        self._subscribe(panel, self._on_panel_heartbeat)
         self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
@@ -93,7 +97,7 @@ class Inbox:
         self.high_level = False
         self.drive_state: DriveState | None = None
         self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.versions_match = False
+        self.versions_match = self.panel_matches = False
         self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
         self.drive_ns = self.echo_ns = NEVER_HEARD_NS
         self._echo: int | None = None
@@ -101,7 +105,7 @@ class Inbox:
         self._tank_frame_ns = NEVER_HEARD_NS
         # a longer gap than the counter bridges is told by the time
         self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
-        self.address_conflict = False
+        self.conflict_ns = NEVER_HEARD_NS
         self.frames = 0
 
     @property
@@ -129,7 +133,7 @@ class Inbox:
             if message is not None:
                 handle(message, now_ns)
         elif frame.can_id in self._own_ids:
-            self.address_conflict = True
+            self.conflict_ns = now_ns
 
     def _on_motion(self, motion: SensorMotion, now_ns: int) -> None:
         if motion.quality not in _USABLE:
@@ -178,3 +182,7 @@ class Inbox:
         versions = (beat.catalogue_version, beat.configuration_version)
         self._matching[can_id] = versions == self._versions
         self.versions_match = all(self._matching.values())
+
+    def _on_panel_heartbeat(self, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
+        versions = (beat.catalogue_version, beat.configuration_version)
+        self.panel_matches = versions == self._versions
