@@ -96,7 +96,7 @@ class ControllerBench:
             self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
-            ControllerSettings(configuration_version=VERSION),
+            ControllerSettings(VERSION, level_limit_m=VESSEL.tank.level_limit_m),
             CATALOGUE,
             statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),

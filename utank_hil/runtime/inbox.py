@@ -36,6 +36,11 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
 
+LEVEL_MARGIN: Final = 1.1
+"""A level farther beyond full or empty than that, for gauges and sloshing, is no measurement."""
+SUM_SHARE: Final = 0.5
+"""Nor are levels whose sum is more than this share of a full reservoir: the water stays."""
+
 _MATCHED: Final = (Address.DRIVE, Address.SENSORS)
 """Nodes whose versions must equal the controller's before arming."""
 
@@ -46,6 +51,14 @@ _Handle = Callable[[Any, int], None]
 
 class Inbox:
     """Latest trusted content of every message the controller listens to.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    configuration_version : int
+        Of the controller, to compare with the others'.
+    level_limit_m : float
+        Level at which a reservoir is full or empty; infinite if it is not known.
 
     Attributes
     ----------
@@ -73,7 +86,11 @@ class Inbox:
         Frames heard so far, good and bad, of any kind.
     """
 
-    def __init__(self, catalogue: Catalogue, configuration_version: int) -> None:
+    def __init__(
+        self, catalogue: Catalogue, configuration_version: int, level_limit_m: float = math.inf
+    ) -> None:
+        self._most_level_m = LEVEL_MARGIN * level_limit_m
+        self._most_sum_m = SUM_SHARE * level_limit_m
         self._versions = (catalogue.version, configuration_version)
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
@@ -149,8 +166,13 @@ class Inbox:
         self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in _USABLE:
             return
-        if math.isfinite(tank.port_level_m + tank.starboard_level_m):
-            self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
+        port_m, starboard_m = tank.port_level_m, tank.starboard_level_m
+        # written so that NaN, not available, fails too; a reservoir fills as the other one empties
+        if (
+            abs(port_m - starboard_m) <= 2 * self._most_level_m
+            and abs(port_m + starboard_m) <= self._most_sum_m
+        ):
+            self.port_level_m, self.starboard_level_m = port_m, starboard_m
             self.tank_ns, self.tank_cycles = now_ns, self._cycles
 
     def _count_cycles(self, now_ns: int) -> None:
