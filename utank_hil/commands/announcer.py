@@ -141,7 +141,7 @@ def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
         # first of all: a terminal may be held up, or gone
         try:
             files = ships.write(event.found)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # no room; or found beyond what a file may hold
             kept = f"[red]the ship that was found could not be written:[/red] {escape(str(error))}"
         else:
             kept = escape(f"the ship that was found: {', '.join(map(shown, files.values()))}")
