@@ -152,6 +152,7 @@ def build_controller_node(
             configuration_version=config.vessel.version,
             command_timeout_s=config.command_timeout_ms * 1e-3,
             bit_rate=config.bit_rate,
+            level_limit_m=tank.level_limit_m,
         ),
         catalogue,
         retuning=retuning,

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -130,6 +131,17 @@ def test_broken_pipe_keeps_no_ship_from_being_kept(tmp_path: Path) -> None:
     announcer.stop()
     assert announcer.error is None
     assert len(list(tmp_path.glob("identified_vessel-*.yaml"))) == 1
+
+
+def test_a_ship_that_no_file_may_hold_is_told_and_leaves_no_file(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    nonsense = replace(RETUNED, found=replace(FOUND, inertia_kg_m2=-1.0))
+    module._tell(nonsense, ships(tmp_path))
+    said = capfd.readouterr().err
+    assert "could not be written" in said
+    assert "inertia_kg_m2" in said
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_process_that_can_not_be_started_leaves_the_events_to_the_recorder(

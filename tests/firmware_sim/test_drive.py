@@ -1,5 +1,6 @@
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from drive_bench import CATALOGUE, ENABLE, MS, DriveBench
@@ -7,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP, DriveLimits
+from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -18,6 +20,7 @@ from utank_hil.canbus import (
     NodeState,
     PumpCommand,
 )
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.tick import TICK_NS
 
 START_NS = 5_123_456_789
@@ -180,6 +183,19 @@ def test_a_stop_out_of_sequence_is_heard_and_an_enable_is_not(lost: int, word: C
     bench.command(2000.0)
     bench.ticks(2)
     assert bench.told.command_echo == echo
+
+
+def test_status_can_say_the_power_of_every_shipped_pump(monkeypatch: pytest.MonkeyPatch) -> None:
+    vessels = [load_config(file, Vessel) for file in Path("configs/ships").glob("*.yaml")]
+    most_w = max(vessel.pump.max_power_w for vessel in vessels if vessel.pump is not None)
+    assert most_w > 2e6
+    for power_w in (most_w, -most_w):
+        monkeypatch.setattr(Plant, "pump_power_w", power_w)
+        bench = DriveBench()
+        bench.tick()
+        assert bench.status_2 is not None
+        said_w = bench.status_2.bus_voltage_v * bench.status_2.current_a
+        assert said_w == pytest.approx(power_w, rel=1e-3)
 
 
 RATE_PA_S = DriveLimits().pressure_rate_pa_s

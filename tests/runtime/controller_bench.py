@@ -96,7 +96,7 @@ class ControllerBench:
             self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
-            ControllerSettings(configuration_version=VERSION),
+            ControllerSettings(VERSION, level_limit_m=VESSEL.tank.level_limit_m),
             CATALOGUE,
             statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),
@@ -109,7 +109,7 @@ class ControllerBench:
         self.drive_follows = True
         self.drive_fault = DriveFault.NONE
         self.order = OperatorCommand(Mode.STANDBY, *(False,) * 4)
-        self.versions = (CATALOGUE.version, VERSION)
+        self.versions = self.panel_versions = (CATALOGUE.version, VERSION)
         self.silent: set[type] = set()
         self.spoil: Callable[[type, Frame], Iterable[Frame]] = lambda kind, frame: (frame,)
         self._tick_index = 0
@@ -121,7 +121,7 @@ class ControllerBench:
         }  # fmt: skip
         self._beats = {
             address: CATALOGUE.transmitter(Heartbeat, address)
-            for address in (Address.DRIVE, Address.SENSORS)
+            for address in (Address.DRIVE, Address.SENSORS, Address.OPERATOR)
         }
         self._commands = CATALOGUE.receiver(PumpCommand)
         self._statuses = CATALOGUE.receiver(ControllerStatus)
@@ -188,10 +188,11 @@ class ControllerBench:
                 DriveStatus2,
                 DriveStatus2(self.drive_fault, 1000.0, 12.0, 40.0, 40.0, *(False,) * 4),
             )
-            for sender in self._beats.values() if Heartbeat not in self.silent else ():
+            for address, sender in self._beats.items() if Heartbeat not in self.silent else ():
                 nan = float("nan")
+                versions = self.panel_versions if address is Address.OPERATOR else self.versions
                 beat = Heartbeat(
-                    NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, *self.versions, nan, nan
+                    NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, *versions, nan, nan
                 )
                 self.send(sender.frame(beat))
         if index % 20 == 0:

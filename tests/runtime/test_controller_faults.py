@@ -31,6 +31,7 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
+from utank_hil.runtime.supervisor import Demand
 from utank_hil.tick import TICK_NS
 
 START_NS = 7_000_000_123
@@ -168,10 +169,13 @@ def test_stale_levels_halve_the_pressure_before_they_stop_it() -> None:
         CATALOGUE.transmitter(AddressClaim, Address.CONTROLLER).can_id,
     ],
 )
-def test_a_second_sender_of_an_own_identifier_stops_for_good(own: int) -> None:
+@pytest.mark.parametrize("data", [bytes(8), b""])
+def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(
+    own: int, data: bytes
+) -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
-    bench.send(Frame(own, bytes(8)))
+    bench.send(Frame(own, data))
     bench.run(40)
     assert bench.node.fault is Fault.ADDRESS_CONFLICT
     assert bench.pressure_pa == 0.0
@@ -179,7 +183,45 @@ def test_a_second_sender_of_an_own_identifier_stops_for_good(own: int) -> None:
     bench.run(400)
     bench.order_is(arm=True, mode_request=Mode.ACTIVE)
     bench.run(400)
-    assert bench.node.mode in (Mode.FAULT, Mode.INIT)
+    assert bench.node.mode is Mode.FAULT
+    assert bench.node.supervisor.reset_refused_by is Fault.ADDRESS_CONFLICT
+    bench.order_is(arm=False, reset=False)
+    bench.run(9500)
+    bench.order_is(reset=True)
+    bench.run(600)
+    assert bench.node.mode is Mode.STANDBY
+    bench.order_is(arm=True, reset=False)
+    bench.run(600)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_an_own_identifier_before_arming_is_said_to_be_the_reason() -> None:
+    bench = ControllerBench(START_NS)
+    bench.run(400)
+    bench.send(Frame(CATALOGUE.transmitter(PumpCommand).can_id, b""))
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(9000)
+    assert bench.status is not None
+    assert (bench.status.mode, bench.status.fault) == (Mode.INIT, Fault.ADDRESS_CONFLICT)
+    bench.run(2000)
+    assert bench.node.mode is Mode.STANDBY
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_panel_of_other_versions_can_not_arm_and_does_not_stop(off: int) -> None:
+    wrong = [CATALOGUE.version, VERSION]
+    wrong[off] ^= 1
+    bench = ControllerBench(START_NS)
+    bench.panel_versions = (wrong[0], wrong[1])
+    bench.run(400)
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(400)
+    assert (bench.node.mode, bench.node.fault) == (Mode.STANDBY, Fault.VERSION_MISMATCH)
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.panel_versions = (wrong[0], wrong[1])
+    bench.run(400)
+    assert bench.node.mode is Mode.ACTIVE
 
 
 def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:
@@ -197,14 +239,17 @@ def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:
     assert {c.pressure_pa for _, c in bench.commands[-100:]} == {0.0}
 
 
-@pytest.mark.parametrize(("late_ticks", "fault"), [(5, Fault.NONE), (6, Fault.OVERRUN)])
-def test_one_long_overrun_stops(late_ticks: int, fault: Fault) -> None:
+@pytest.mark.parametrize("late_ticks", range(1, 15))
+def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks: int) -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     # the loop hands over what arrived meanwhile, so nothing is stale
     bench.tick(late_ticks=late_ticks)
     bench.tick()
-    assert bench.node.fault is fault
+    assert bench.node.seen.overruns_in_ten == min(late_ticks, 9)
+    assert bench.node.fault is (Fault.OVERRUN if late_ticks >= 3 else Fault.NONE)
+    stopped = bench.node.supervisor.demand is Demand.ZERO
+    assert stopped == (late_ticks > 5)
 
 
 def test_three_overruns_in_ten_ticks_ramp_down_two_do_not() -> None:

@@ -36,6 +36,7 @@ from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.tick import TICK_NS
 
 NAN = math.nan
+LEVEL_LIMIT_M = 4.88
 GOOD: dict[type, tuple[object, ...]] = {
     SensorMotion: SensorMotion(0.1, -0.05, Quality.GOOD),
     SensorTank: SensorTank(-0.5, 0.75, Switch.OFF, Switch.OFF, Quality.GOOD),
@@ -63,7 +64,7 @@ class Line:
     """An inbox and everybody who sends to it."""
 
     def __init__(self) -> None:
-        self.inbox = Inbox(CATALOGUE, VERSION)
+        self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M)
         self.senders = {kind: CATALOGUE.transmitter(kind) for kind in GOOD}
         self.now_ns = 1000
 
@@ -130,6 +131,11 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
         SensorTank(NAN, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD),
         SensorTank(0.0, NAN, Switch.OFF, Switch.OFF, Quality.GOOD),
         SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.BAD),
+        SensorTank(-30.0, 30.0, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(30.0, -30.0, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(-5.4, 5.4, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(2.5, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD),
+        SensorTank(-1.3, -1.3, Switch.OFF, Switch.OFF, Quality.GOOD),
         SensorPump(NAN, 0.0, Quality.GOOD),
         SensorPump(0.0, 0.0, None),
     ],
@@ -141,6 +147,18 @@ def test_what_is_no_measurement_changes_nothing(message: tuple[object, ...]) -> 
     before = line.content()
     line.say(message)
     assert line.content() == before
+
+
+@pytest.mark.parametrize(
+    ("port_m", "starboard_m"), [(-5.3, 5.3), (5.3, -5.3), (2.4, 0.0), (-1.2, -1.2)]
+)
+def test_levels_within_the_margins_of_gauges_and_sloshing_are_measurements(
+    port_m: float, starboard_m: float
+) -> None:
+    line = Line()
+    line.say(SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD))
+    assert line.inbox.port_level_m == pytest.approx(port_m)
+    assert line.inbox.starboard_level_m == pytest.approx(starboard_m)
 
 
 @pytest.mark.parametrize("kind", GOOD)
@@ -190,7 +208,7 @@ def test_noise_on_the_bus_is_never_a_measurement(can_id: int, data: bytes, crc_e
         twin = Line()
         twin.hear(frame)
         unchanged += twin.content() == before
-        assert twin.inbox.address_conflict == (can_id in OWN)
+        assert (twin.inbox.conflict_ns > 0) == (can_id in OWN)
     assert unchanged >= 1 or can_id in OWN
 
 

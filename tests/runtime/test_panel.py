@@ -177,6 +177,17 @@ def test_script_presses_in_order_from_when_the_controller_is_ready(late_ticks: i
     ]
 
 
+def test_presses_of_one_time_come_in_the_order_given() -> None:
+    for actions, armed in (
+        ((Action.PASSIVE, Action.ARM), True),
+        ((Action.ARM, Action.PASSIVE), False),
+    ):
+        table = Table([TimedAction(0.0, action) for action in actions])
+        table.hear(Mode.STANDBY)
+        table.run(2)
+        assert table.last.arm == armed
+
+
 def test_script_waits_for_ever_for_a_controller_that_is_not_there() -> None:
     table = Table([TimedAction(0.0, Action.ARM)])
     table.run(100)

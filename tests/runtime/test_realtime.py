@@ -249,7 +249,7 @@ def test_counts_whether_the_system_runs_the_loop_in_real_time(monkeypatch, polic
     assert loop.statistics.real_time is real_time
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signal_ends_the_loop_and_the_handlers_are_put_back(number):
     found = signal.getsignal(number)
     node = ToyNode("a")

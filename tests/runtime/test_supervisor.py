@@ -207,6 +207,15 @@ def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault() -> None:
         assert bench.tick().mode is mode
 
 
+@pytest.mark.parametrize(("age_ms", "mode"), [(600, Mode.PASSIVE), (601, Mode.STANDBY)])
+def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> None:
+    bench = Bench()
+    bench.tick(motion_age_ms=40)  # INIT
+    bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
+    bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
+    assert bench.supervisor.mode is mode
+
+
 def test_arm_bit_held_since_before_the_start_never_arms() -> None:
     bench = Bench()
     for _ in range(50):

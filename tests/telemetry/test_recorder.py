@@ -197,7 +197,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     assert "retuning REFUSED: why it was" in [line.text for line in text_log(file)]
 
 
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
     tmp_path: Path, stop: signal.Signals
 ) -> None:

@@ -285,6 +285,27 @@ def test_the_segment_of_a_dead_writer_is_replaced() -> None:
         assert reader.columns == ("new",)
 
 
+def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> None:
+    name = f"utank-{os.getpid()}-killed-with-its-tracker"
+    untracked = "from multiprocessing import resource_tracker\n" + WRITE_FOR_EVER.replace(
+        "print(", "resource_tracker.unregister('/' + writer.name, 'shared_memory'); print("
+    )
+    foreign = SHM / f"utank-{os.getpid()}-no-ring"
+    foreign.write_bytes(bytes(1000))
+    try:
+        with python(untracked, name) as process:
+            with RingWriter(["a"]) as writer:
+                assert (SHM / name).exists()  # its writer lives
+            process.kill()
+            process.wait()
+        with RingWriter(["a"]) as writer, RingWriter(["b"]):
+            assert not (SHM / name).exists()
+            assert (SHM / writer.name).exists()
+        assert foreign.exists()
+    finally:
+        foreign.unlink()
+
+
 @pytest.mark.slow
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """

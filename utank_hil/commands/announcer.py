@@ -25,7 +25,7 @@ from utank_hil.telemetry import EventReader, EventWriter, event_text
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5
 _START_S: Final = 30.0
-_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _END_S: Final = 10.0
 
 
@@ -141,7 +141,7 @@ def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
         # first of all: a terminal may be held up, or gone
         try:
             files = ships.write(event.found)
-        except OSError as error:
+        except (OSError, ValueError) as error:  # no room; or found beyond what a file may hold
             kept = f"[red]the ship that was found could not be written:[/red] {escape(str(error))}"
         else:
             kept = escape(f"the ship that was found: {', '.join(map(shown, files.values()))}")

@@ -77,10 +77,9 @@ class IdentifiedShips:
         ------
         OSError
             If they can't be written.
+        ParameterError
+            If she is no ship that a file may hold.
         """
-        self.folder.mkdir(parents=True, exist_ok=True)
-        names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
-        vessel_file, controller_file = claimed_files(self.folder, *names)
         ship = dataclasses.replace(
             self.vessel.ship,
             inertia_kg_m2=found.inertia_kg_m2,
@@ -88,6 +87,9 @@ class IdentifiedShips:
             damping_nms_rad=found.damping_nms_rad,
         )
         tank = dataclasses.replace(self.vessel.tank, damping_ratio=found.tank_damping_ratio)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
+        vessel_file, controller_file = claimed_files(self.folder, *names)
         return _write(vessel_file, controller_file, self.vessel, ship, tank, self.content)
 
 

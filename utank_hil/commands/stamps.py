@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def claimed_files(folder: Path, *names: str) -> tuple[Path, ...]:
-    """Files named by the time (UTC), numbered where that is taken; the first is made, and empty.
+    """Files named by the time (UTC), numbered where that is taken; all are made, and empty.
 
     Parameters
     ----------
@@ -17,17 +17,22 @@ def claimed_files(folder: Path, *names: str) -> tuple[Path, ...]:
     Raises
     ------
     OSError
-        If the first can't be made.
+        If one can't be made.
     """
     now = stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     for number in count(2):
         files = tuple(folder / name.format(stamp) for name in names)
-        if not any(file.exists() for file in files):
-            try:
-                files[0].touch(exist_ok=False)
-            except FileExistsError:  # another program's, this very moment
-                pass
-            else:
-                break
+        made: list[Path] = []
+        try:
+            for file in files:
+                file.touch(exist_ok=False)  # a link that leads nowhere is taken, too
+                made.append(file)
+        except OSError as error:
+            for file in made:
+                file.unlink()
+            if not isinstance(error, FileExistsError):
+                raise
+        else:
+            break
         stamp = f"{now}-{number}"
     return files

@@ -14,7 +14,7 @@ draught d, length L at the waterline)::
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import PlainSerializer, WrapValidator

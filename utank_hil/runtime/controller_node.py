@@ -62,11 +62,14 @@ class ControllerSettings:
         Sent with every command: the drive stops on its own after so long a silence.
     bit_rate : int
         Of the bus, to judge its load.
+    level_limit_m : float
+        Level at which a reservoir is full or empty, to tell what is no measurement.
     """
 
     configuration_version: int
     command_timeout_s: float = 0.05
     bit_rate: int = 250_000
+    level_limit_m: float = math.inf
 
 
 class ControllerNode:
@@ -151,7 +154,7 @@ class ControllerNode:
         self._sink = sink
         self._event_sink = event_sink
         self._events_sent = 0
-        self.inbox = Inbox(catalogue, settings.configuration_version)
+        self.inbox = Inbox(catalogue, settings.configuration_version, settings.level_limit_m)
         self._catalogue_version = catalogue.version
         self._level = level
         self._drive_sequence = DriveSequence()

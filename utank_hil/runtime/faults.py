@@ -102,24 +102,29 @@ FAULTS: Final = (
     _row(
         Fault.ADDRESS_CONFLICT,
         "Another node sends with the controller's address.",
-        f"Stop the second sender of identifiers that end in {Address.CONTROLLER:X}; then start "
-        "the controller again.",
+        f"Stop the second sender of identifiers that end in {Address.CONTROLLER:X}, which may also "
+        "be a test tool; then wait for ten seconds.",
         Condition(
             Reaction.STOP,
-            "an identifier of the controller is received",
+            "an identifier of the controller was received within 10 s, whatever came with it",
             lambda seen, _: seen.address_conflict,
             awaited=2,
         ),
     ),
     _row(
         Fault.VERSION_MISMATCH,
-        "Drive or sensors run another message catalogue or another ship configuration.",
+        "Drive, sensors or panel run another message catalogue or another ship configuration.",
         "Compare the versions in the heartbeats; give all nodes the same catalogue and ship file.",
         Condition(
             Reaction.STOP,
             "a version in the heartbeats of drive or sensors differs, or none was received",
             lambda seen, _: not seen.versions_match,
             awaited=7,
+        ),
+        Condition(
+            Reaction.REFUSE,
+            "a version in the panel's heartbeat differs, or none was received",
+            lambda seen, _: not seen.panel_matches,
         ),
     ),
     _row(

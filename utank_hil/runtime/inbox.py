@@ -36,6 +36,11 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
 
+LEVEL_MARGIN: Final = 1.1
+"""A level farther beyond full or empty than that, for gauges and sloshing, is no measurement."""
+SUM_SHARE: Final = 0.5
+"""Nor are levels whose sum is more than this share of a full reservoir: the water stays."""
+
 _MATCHED: Final = (Address.DRIVE, Address.SENSORS)
 """Nodes whose versions must equal the controller's before arming."""
 
@@ -46,6 +51,14 @@ _Handle = Callable[[Any, int], None]
 
 class Inbox:
     """Latest trusted content of every message the controller listens to.
+
+    Parameters
+    ----------
+    catalogue : Catalogue
+    configuration_version : int
+        Of the controller, to compare with the others'.
+    level_limit_m : float
+        Level at which a reservoir is full or empty; infinite if it is not known.
 
     Attributes
     ----------
@@ -65,13 +78,19 @@ class Inbox:
         What the operator wants.
     versions_match : bool
         Drive and sensors run the controller's catalogue and configuration.
-    address_conflict : bool
-        Somebody else sends with the controller's address.
+    panel_matches : bool
+        So does the operator's panel.
+    conflict_ns : int
+        When somebody else last sent with the controller's address.
     frames : int
         Frames heard so far, good and bad, of any kind.
     """
 
-    def __init__(self, catalogue: Catalogue, configuration_version: int) -> None:
+    def __init__(
+        self, catalogue: Catalogue, configuration_version: int, level_limit_m: float = math.inf
+    ) -> None:
+        self._most_level_m = LEVEL_MARGIN * level_limit_m
+        self._most_sum_m = SUM_SHARE * level_limit_m
         self._versions = (catalogue.version, configuration_version)
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
@@ -86,6 +105,8 @@ class Inbox:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
+        panel = catalogue.receiver(Heartbeat, Address.OPERATOR)
+        self._subscribe(panel, self._on_panel_heartbeat)
         self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
@@ -93,7 +114,7 @@ class Inbox:
         self.high_level = False
         self.drive_state: DriveState | None = None
         self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.versions_match = False
+        self.versions_match = self.panel_matches = False
         self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
         self.drive_ns = self.echo_ns = NEVER_HEARD_NS
         self._echo: int | None = None
@@ -101,7 +122,7 @@ class Inbox:
         self._tank_frame_ns = NEVER_HEARD_NS
         # a longer gap than the counter bridges is told by the time
         self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
-        self.address_conflict = False
+        self.conflict_ns = NEVER_HEARD_NS
         self.frames = 0
 
     @property
@@ -129,7 +150,7 @@ class Inbox:
             if message is not None:
                 handle(message, now_ns)
         elif frame.can_id in self._own_ids:
-            self.address_conflict = True
+            self.conflict_ns = now_ns
 
     def _on_motion(self, motion: SensorMotion, now_ns: int) -> None:
         if motion.quality not in _USABLE:
@@ -145,8 +166,13 @@ class Inbox:
         self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
         if tank.quality not in _USABLE:
             return
-        if math.isfinite(tank.port_level_m + tank.starboard_level_m):
-            self.port_level_m, self.starboard_level_m = tank.port_level_m, tank.starboard_level_m
+        port_m, starboard_m = tank.port_level_m, tank.starboard_level_m
+        # written so that NaN, not available, fails too; a reservoir fills as the other one empties
+        if (
+            abs(port_m - starboard_m) <= 2 * self._most_level_m
+            and abs(port_m + starboard_m) <= self._most_sum_m
+        ):
+            self.port_level_m, self.starboard_level_m = port_m, starboard_m
             self.tank_ns, self.tank_cycles = now_ns, self._cycles
 
     def _count_cycles(self, now_ns: int) -> None:
@@ -178,3 +204,7 @@ class Inbox:
         versions = (beat.catalogue_version, beat.configuration_version)
         self._matching[can_id] = versions == self._versions
         self.versions_match = all(self._matching.values())
+
+    def _on_panel_heartbeat(self, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
+        versions = (beat.catalogue_version, beat.configuration_version)
+        self.panel_matches = versions == self._versions

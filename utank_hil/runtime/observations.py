@@ -15,6 +15,9 @@ LOAD_WINDOW_NS: Final = 100 * TICK_NS
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
 HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
+CONFLICT_NS: Final = 10_000_000_000
+"""A second sender of the controller's address is gone when it has been silent for so long."""
+_ALL_LATE: Final = 0x3FF
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
@@ -45,9 +48,11 @@ class Observations:
     link_lost : bool
         The bus could not be read or written in the last command cycle.
     address_conflict : bool
-        Another node sends with the controller's address.
+        Another node sends with the controller's address, or has within `CONFLICT_NS`.
     versions_match : bool
         Drive and sensors run the controller's catalogue and configuration.
+    panel_matches : bool
+        So does the operator's panel.
     bus_load : float
         Share of the bus in use over the last second.
     protection_valid : bool
@@ -59,7 +64,7 @@ class Observations:
     tick_late_ms : float
         Lateness of this tick.
     overruns_in_ten : int
-        Late ticks among the last ten.
+        Late ticks among the last ten; one that is late by three counts three times.
     law_failed : bool
         The law raised an error, or its last answer is not finite.
     command_pa : float
@@ -85,6 +90,7 @@ class Observations:
     link_lost: bool = False
     address_conflict: bool = False
     versions_match: bool = True
+    panel_matches: bool = True
     bus_load: float = 0.0
     protection_valid: bool = True
     high_level: bool = False
@@ -142,7 +148,9 @@ class Observer:
             self._last_ns = self._load_since_ns = now_ns
         late_ns = max(0, now_ns - self._last_ns - TICK_NS)
         self._last_ns = now_ns
-        self._late_history = (self._late_history << 1 | (late_ns > 0)) & 0x3FF
+        missed = -(-late_ns // TICK_NS)  # grid points, each of which counts
+        late = (1 << missed) - 1 if missed < 10 else _ALL_LATE
+        self._late_history = (self._late_history << max(1, missed) | late) & _ALL_LATE
         seen.tick_late_ms = late_ns / MILLISECOND_NS
         seen.overruns_in_ten = self._late_history.bit_count()
         seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
@@ -158,8 +166,9 @@ class Observer:
         seen.link_lost = (
             self._link_lost_ns is not None and now_ns - self._link_lost_ns <= self._command_cycle_ns
         )
-        seen.address_conflict = inbox.address_conflict
+        seen.address_conflict = now_ns - inbox.conflict_ns <= CONFLICT_NS
         seen.versions_match = inbox.versions_match
+        seen.panel_matches = inbox.panel_matches
         seen.protection_valid = inbox.protection_valid
         seen.high_level = inbox.high_level
         seen.roll_rad = inbox.roll_rad

@@ -97,7 +97,8 @@ class OperatorPanel:
         self._listener = catalogue.receiver(ControllerStatus)
         self.hears = frozenset([self._listener.can_id])
         self._housekeeping = Housekeeping(Address.OPERATOR, catalogue, configuration_version)
-        self._script = sorted(script, key=lambda timed: timed.time_s, reverse=True)
+        # the next one last; of several at a time, the first given comes first
+        self._script = sorted(script, key=lambda timed: timed.time_s)[::-1]
         self._start_ns: int | None = None
         self._mode = Mode.STANDBY
         self._armed = False

@@ -1,14 +1,17 @@
-"""Stop by signal: SIGINT and SIGTERM set a flag, and the loop ends between two ticks."""
+"""Stop by signal: SIGINT, SIGTERM and SIGHUP set a flag, and the loop ends between two ticks."""
 
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Final
+
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
 def stop_on_signals() -> Iterator[Callable[[], bool]]:
-    """Handle SIGINT and SIGTERM; yield a function that returns whether one has arrived.
+    """Yield a function that returns whether SIGINT, SIGTERM or SIGHUP (a closed terminal) arrived.
 
     The former handlers are restored at the end. Main thread only, as Python requires.
     """
@@ -18,7 +21,7 @@ def stop_on_signals() -> Iterator[Callable[[], bool]]:
         nonlocal stopped
         stopped = True
 
-    found = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    found = {number: signal.signal(number, note) for number in _SIGNALS}
     try:
         yield lambda: stopped
     finally:

@@ -143,7 +143,12 @@ class Supervisor:
         elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
             if seen.command_pa == 0.0:  # the ramp down has come to its end
                 self._disarm(Mode.STANDBY)
-        elif seen.requested_mode is Mode.PASSIVE and self.mode is Mode.STANDBY:
+        elif (
+            seen.requested_mode is Mode.PASSIVE
+            and self.mode is Mode.STANDBY
+            # an old order says nothing of now
+            and seen.panel_age_ms <= self._limits.panel_age_to_arm_ms
+        ):
             self._disarm(Mode.PASSIVE)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:

@@ -2,7 +2,7 @@
 
 `RecorderProcess` starts it from a bench or from the deployed controller; `python -m
 utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
-is closed, when the ring's writer dies, or on SIGINT or SIGTERM, with all rows written. The
+is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with all rows written. The
 controller never waits for it: rows that it reads too late are overwritten and counted as lost.
 """
 
@@ -66,7 +66,7 @@ def record_ring(
     events: str | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> RecorderReport:
-    """Record a ring until it ends, or SIGINT or SIGTERM arrives; main function of the process.
+    """Record a ring until it ends or a signal stops it; main function of the process.
 
     Parameters
     ----------
@@ -272,11 +272,11 @@ def _flush(recording: "rr.RecordingStream") -> None:
 
 
 def _stop_pipe() -> int:
-    """Return a descriptor that becomes readable when SIGINT or SIGTERM arrives."""
+    """Return a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives."""
     readable, written = os.pipe()
     os.set_blocking(written, False)
     signal.set_wakeup_fd(written)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda _number, _frame: None)  # the wake-up descriptor does the work
     return readable
 

@@ -17,7 +17,8 @@ row with a wrong checksum is never returned: it was either overwritten meanwhile
 shows) or is not visible yet (left for the next read).
 
 Lifetime. The writer owns the segment: `close` marks it closed and unlinks it, and attached readers
-drain the rest. If the writer is killed, its `multiprocessing` resource tracker unlinks it. Readers
+drain the rest. If the writer is killed, its `multiprocessing` resource tracker unlinks it; if that
+is killed with it, the next writer does, whoever it is. Readers
 open the segment as a file, not as `SharedMemory`, whose tracker (Python below 3.13) would unlink it
 when a reader exits.
 """
@@ -104,7 +105,9 @@ class RingWriter(Closing):
         first = _first_slot_word(len(names))
         size = 8 * (first + capacity * (width + 1))
         self.name = name or f"utank-{os.getpid()}-{secrets.token_hex(4)}"
-        _remove_if_orphaned(self.name)
+        # a killed process group has nobody left to unlink its own
+        for left_over in {self.name, *(path.name for path in _SHM.glob("utank-*"))}:
+            _remove_if_orphaned(left_over)
         try:
             self._shm: SharedMemory | None = SharedMemory(self.name, create=True, size=size)
         except FileExistsError as error:
@@ -297,8 +300,8 @@ def _remove_if_orphaned(name: str) -> None:
     try:
         with RingReader(name) as left_over:
             orphaned = left_over.ended
-    except RingError:
+    except OSError:  # none, no ring, or somebody else's
         return
     if orphaned:
-        with contextlib.suppress(FileNotFoundError):
+        with contextlib.suppress(OSError):
             os.unlink(_SHM / name)
