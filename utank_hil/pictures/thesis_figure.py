@@ -69,6 +69,8 @@ def _draw_panel(axis: "Axes", panel: Panel) -> None:
     axis.margins(x=0.02)
     axis.set_xlabel(panel.x_label)
     axis.set_ylabel(panel.y_label)
+    if len(panel.curves) == 1 and not panel.title and panel.span is None:
+        return  # the axis says it
     legend = axis.legend(
         loc="lower left",
         bbox_to_anchor=(-0.01, 1.0),

@@ -1,6 +1,6 @@
 """A figure of the source: curves, printed numbers beside ours, and its text's statements judged."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
@@ -24,6 +24,12 @@ class Verdict(StrEnum):
     def of(cls, holds: bool) -> "Verdict":
         """`HOLDS` or `FAILS`."""
         return cls.HOLDS if holds else cls.FAILS
+
+    @classmethod
+    def of_all(cls, each: Iterable[bool]) -> "Verdict":
+        """`HOLDS` if all do, `PARTLY` if some do."""
+        held = list(each)
+        return cls.HOLDS if all(held) else cls.PARTLY if any(held) else cls.FAILS
 
 
 @dataclass(frozen=True, slots=True)
