@@ -177,6 +177,7 @@ def as_json(figure: Figure) -> dict[str, Any]:
     return {
         "key": figure.key,
         "title": figure.title,
+        "word": None,
         "method": figure.method,
         "open_points": figure.open_points,
         "rows": [
