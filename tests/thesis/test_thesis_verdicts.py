@@ -8,6 +8,7 @@ from utank_hil.thesis.registry import ENTRIES, UnknownFigureError, chosen
 SIGNS = {Verdict.HOLDS: "+", Verdict.PARTLY: "~", Verdict.FAILS: "-", Verdict.OPEN: "?"}
 # of each figure its statements, in their order
 FAST = {
+    "magnification": "+",
     "2.3": "+~~~",
     "2.4": "+~",
     "2.5": "++",
@@ -39,7 +40,7 @@ FAST = {
 }
 LONG = {
     "3.11": "~+",
-    "3.13": "-~",
+    "3.13": "~~",
     "4.7": "+",
     "4.8": "+",
     "4.9": "+",
@@ -105,7 +106,15 @@ def test_no_figure_of_chapters_2_to_4_is_missing() -> None:
     numbered = [f"{chapter}.{n}" for chapter in last for n in range(1, last[chapter] + 1)]
     keys = [entry.key for entry in ENTRIES]
     assert [key for key in keys if key in numbered] == numbered
-    named = {"tank-height", "first-ship", "gains", "table-4.1", "capsize", "damping"}
+    named = {
+        "tank-height",
+        "first-ship",
+        "gains",
+        "table-4.1",
+        "capsize",
+        "damping",
+        "magnification",
+    }
     assert set(keys) - set(numbered) == named
 
 

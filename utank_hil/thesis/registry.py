@@ -24,6 +24,7 @@ from utank_hil.thesis.law_figures import (
     figure_3_9,
     figure_3_10,
 )
+from utank_hil.thesis.magnification import figure_magnification
 from utank_hil.thesis.membership import figure_4_5
 from utank_hil.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
 from utank_hil.thesis.phase_plane import figure_4_1, table_4_1
@@ -65,6 +66,9 @@ class Entry:
 
 
 ENTRIES: Final = (
+    Entry(
+        "magnification", "Magnification factors (introduction of chapter 2)", figure_magnification
+    ),
     Entry("2.1", "Active U-tube tank", word="sketch of ship and tank"),
     Entry("2.2", "Inner pressure loop", word="block diagram"),
     Entry("2.3", "Roll by pump pressure: magnitude", figure_2_3),
