@@ -8,6 +8,7 @@ from utank_hil.thesis.registry import ENTRIES, UnknownFigureError, chosen
 SIGNS = {Verdict.HOLDS: "+", Verdict.PARTLY: "~", Verdict.FAILS: "-", Verdict.OPEN: "?"}
 # of each figure its statements, in their order
 FAST = {
+    "magnification": "+",
     "2.3": "+~~~",
     "2.4": "+~",
     "2.5": "++",
@@ -26,6 +27,9 @@ FAST = {
     "3.8": "+",
     "3.9": "+",
     "3.10": "++~",
+    "3.12": "+",
+    "3.14": "+",
+    "3.15": "~~~",
     "4.1": "++",
     "table-4.1": "-",
     "4.5": "--+",
@@ -35,6 +39,8 @@ FAST = {
     "4.16": "++",
 }
 LONG = {
+    "3.11": "~+",
+    "3.13": "~~",
     "4.7": "+",
     "4.8": "+",
     "4.9": "+",
@@ -93,6 +99,23 @@ def test_keys_are_unique_and_what_has_nothing_to_compute_is_named() -> None:
     assert len({entry.key for entry in ENTRIES}) == len(ENTRIES)
     assert all((entry.make is None) == bool(entry.word) for entry in ENTRIES)
     assert all(entry.title for entry in ENTRIES)
+
+
+def test_no_figure_of_chapters_2_to_4_is_missing() -> None:
+    last = {2: 8, 3: 15, 4: 16}
+    numbered = [f"{chapter}.{n}" for chapter in last for n in range(1, last[chapter] + 1)]
+    keys = [entry.key for entry in ENTRIES]
+    assert [key for key in keys if key in numbered] == numbered
+    named = {
+        "tank-height",
+        "first-ship",
+        "gains",
+        "table-4.1",
+        "capsize",
+        "damping",
+        "magnification",
+    }
+    assert set(keys) - set(numbered) == named
 
 
 def test_chosen_figures_come_in_the_source_s_order() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from tools.evidence.parts import PARTS
 from tools.evidence.record import Record, read
+from utank_hil.thesis.figure import Verdict, printed_text
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PLACE = re.compile(r"(<!-- table: (.*?) -->\n)(.*?)(<!-- end of table -->)", re.S)
@@ -117,6 +118,53 @@ def errata_terms(result: dict[str, Any]) -> Rows:
     ]
 
 
+def thesis_figures(result: dict[str, Any]) -> Rows:
+    """One row a figure of the source."""
+    rows = [["figure", "", "greatest deviation", "holds", "in part", "does not", "open"]]
+    for figure in result["figures"]:
+        name = [figure["key"], figure["title"]]
+        if figure["word"]:
+            rows.append([*name, f"{figure['word']}: nothing to compute", "", "", "", ""])
+            continue
+        known = [row["deviation"] for row in figure["rows"] if row["deviation"] is not None]
+        verdicts = [check["verdict"] for check in figure["checks"]]
+        counts = (str(verdicts.count(verdict) or "") for verdict in Verdict)
+        rows.append([*name, f"{max(known, key=abs):+.2%}" if known else "", *counts])
+    return rows
+
+
+def thesis_numbers(result: dict[str, Any]) -> Rows:
+    """One row a printed number of the source."""
+    return [
+        ["figure", "number", "printed", "ours", "", "deviation", "reason"],
+        *(
+            [
+                figure["key"],
+                row["quantity"],
+                printed_text(row),
+                number(row["ours"], ".5g"),
+                row["unit"],
+                number(row["deviation"], "+.2%"),
+                row["reason"],
+            ]
+            for figure in result["figures"]
+            for row in figure.get("rows", ())
+        ),
+    ]
+
+
+def thesis_statements(result: dict[str, Any]) -> Rows:
+    """One row a statement of the source's text."""
+    return [
+        ["figure", "the text says", "", "measured"],
+        *(
+            [figure["key"], check["statement"], f"**{check['verdict']}**", check["measured"]]
+            for figure in result["figures"]
+            for check in figure.get("checks", ())
+        ),
+    ]
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -125,6 +173,9 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "printed index": ("linear_law_tables", printed_index),
     "step costs": ("cost_controllers", step_costs),
     "errata terms": ("thesis_derivation", errata_terms),
+    "thesis figures": ("thesis_figures", thesis_figures),
+    "thesis numbers": ("thesis_figures", thesis_numbers),
+    "thesis statements": ("thesis_figures", thesis_statements),
 }
 
 

@@ -96,6 +96,12 @@ PARTS = (
         5,
     ),
     Part(
+        "thesis_figures",
+        "python -m tools.thesis.figures",
+        "every figure and printed number of the source, and what its text says of them",
+        2,
+    ),
+    Part(
         "thesis_derivation",
         "python -m tools.thesis.derive_tank_forces --json",
         "every printed term of the tank's forces that differs from the derivation",

@@ -50,12 +50,12 @@ def reproduce(
 
     files = {"page": write_gallery(entries, made, out, out / PAGE), "numbers": out / NUMBERS}
     result = {
-        "figures": [as_json(figure) for figure in made.values()],
-        "sketches": [
-            {"key": entry.key, "title": entry.title, "word": entry.word}
+        "figures": [
+            as_json(made[entry.key])
+            if entry.make is not None
+            else {"key": entry.key, "title": entry.title, "word": entry.word}
             for entry in entries
-            if entry.make is None
-        ],
+        ]
     }
     files["numbers"].write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if json_:

@@ -1,6 +1,7 @@
 """A figure of the source: curves, printed numbers beside ours, and its text's statements judged."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
@@ -24,6 +25,12 @@ class Verdict(StrEnum):
     def of(cls, holds: bool) -> "Verdict":
         """`HOLDS` or `FAILS`."""
         return cls.HOLDS if holds else cls.FAILS
+
+    @classmethod
+    def of_all(cls, each: Iterable[bool]) -> "Verdict":
+        """`HOLDS` if all do, `PARTLY` if some do."""
+        held = list(each)
+        return cls.HOLDS if all(held) else cls.PARTLY if any(held) else cls.FAILS
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +103,7 @@ class Row:
     quantity : str
     unit : str
     printed : float or tuple of float
-        A number, or the ends of a range.
+        A number, or the ends of a range; the upper one infinite for "or more".
     ours : float or None
         None where the source gives too little to make it.
     reason : str
@@ -171,13 +178,14 @@ def as_json(figure: Figure) -> dict[str, Any]:
     return {
         "key": figure.key,
         "title": figure.title,
+        "word": None,
         "method": figure.method,
         "open_points": figure.open_points,
         "rows": [
             {
                 "quantity": row.quantity,
                 "unit": row.unit,
-                "printed": row.printed,
+                "printed": _finite(row.printed),
                 "ours": row.ours,
                 "deviation": row.deviation,
                 "reason": row.reason,
@@ -195,11 +203,21 @@ def as_json(figure: Figure) -> dict[str, Any]:
     }
 
 
+def _finite(printed: float | tuple[float, float]) -> Any:
+    """A printed number for JSON, which knows no infinity: None for an open end."""
+    if not isinstance(printed, tuple):
+        return printed
+    return [each if math.isfinite(each) else None for each in printed]
+
+
 def printed_text(row: Mapping[str, Any] | Row) -> str:
     """The printed number of a row, or of its JSON, as text."""
     printed = row.printed if isinstance(row, Row) else row["printed"]
     if isinstance(printed, (tuple, list)):
-        return f"{printed[0]:.5g} to {printed[1]:.5g}"
+        low, high = printed
+        if high is None or math.isinf(high):
+            return f"{low:.5g} or more"
+        return f"{low:.5g} to {high:.5g}" if low else f"less than {high:.5g}"
     return f"{printed:.5g}"
 
 

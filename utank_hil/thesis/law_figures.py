@@ -132,8 +132,9 @@ def _tops(answers: Mapping[str, Response]) -> str:
 
 def _effective(answers: Mapping[str, Response]) -> Verdict:
     passive = answers[PASSIVE].roll.max()
-    better = [each.roll.max() < passive for law, each in answers.items() if law != PASSIVE]
-    return Verdict.HOLDS if all(better) else Verdict.PARTLY if any(better) else Verdict.FAILS
+    return Verdict.of_all(
+        each.roll.max() < passive for law, each in answers.items() if law != PASSIVE
+    )
 
 
 def _stability(name: str) -> str:
@@ -190,7 +191,7 @@ def figure_3_7() -> Figure:
         checks=(
             Check(
                 "the PD control has the worst performance",
-                _all_or_some([name == PD for name in worst.values()]),
+                Verdict.of_all([name == PD for name in worst.values()]),
                 "; ".join(
                     f"{w:g} rad/s: "
                     + ", ".join(
@@ -202,10 +203,6 @@ def figure_3_7() -> Figure:
         ),
         columns=1,
     )
-
-
-def _all_or_some(each: list[bool]) -> Verdict:
-    return Verdict.HOLDS if all(each) else Verdict.PARTLY if any(each) else Verdict.FAILS
 
 
 def figure_3_8() -> Figure:
@@ -289,7 +286,7 @@ def figure_3_9() -> Figure:
         checks=(
             Check(
                 "the lower the control horizon, the more the roll is reduced",
-                _all_or_some(verdicts),
+                Verdict.of_all(verdicts),
                 "; ".join(told),
             ),
         ),

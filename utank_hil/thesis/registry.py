@@ -4,6 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from utank_hil.thesis.adaptive_figures import (
+    figure_3_11,
+    figure_3_12,
+    figure_3_13,
+    figure_3_14,
+    figure_3_15,
+)
 from utank_hil.thesis.capsize_amplitudes import figure_capsize
 from utank_hil.thesis.damping import figure_damping
 from utank_hil.thesis.figure import Figure
@@ -17,6 +24,7 @@ from utank_hil.thesis.law_figures import (
     figure_3_9,
     figure_3_10,
 )
+from utank_hil.thesis.magnification import figure_magnification
 from utank_hil.thesis.membership import figure_4_5
 from utank_hil.thesis.optimum import figure_3_2, figure_3_3, figure_3_4
 from utank_hil.thesis.phase_plane import figure_4_1, table_4_1
@@ -58,6 +66,9 @@ class Entry:
 
 
 ENTRIES: Final = (
+    Entry(
+        "magnification", "Magnification factors (introduction of chapter 2)", figure_magnification
+    ),
     Entry("2.1", "Active U-tube tank", word="sketch of ship and tank"),
     Entry("2.2", "Inner pressure loop", word="block diagram"),
     Entry("2.3", "Roll by pump pressure: magnitude", figure_2_3),
@@ -79,6 +90,11 @@ ENTRIES: Final = (
     Entry("3.8", "Pump pressure over time with LQR, GPC and DPC", figure_3_8),
     Entry("3.9", "Control horizon of DPC (roll, level)", figure_3_9),
     Entry("3.10", "Roll reduced per pressure", figure_3_10),
+    Entry("3.11", "Adaptive DPC on roll and level", figure_3_11),
+    Entry("3.12", "Record for identification: pulses, roll and water", figure_3_12),
+    Entry("3.13", "Adaptive DPC on roll", figure_3_13),
+    Entry("3.14", "Record for identification: pulses and roll", figure_3_14),
+    Entry("3.15", "Adaptive GPC on roll", figure_3_15),
     Entry("4.1", "Phase plane without damping", figure_4_1),
     Entry("4.2", "Feedback linearization", word="block diagram"),
     Entry("4.3", "Fuzzy system", word="block diagram"),

@@ -141,8 +141,9 @@ def figure_2_8() -> Figure:
             Check(
                 "at the stop the level shifts to about 180° from the roll",
                 Verdict.of(abs(abs(after) - 180) < 45),
-                f"level against roll: {math.degrees(found.level_lead_rad):.0f}° before, "
-                f"{after:.0f}° in the first cycle after, {later:.0f}° in the second",
+                f"level against roll {math.degrees(found.level_lead_rad):.0f}° before, "
+                f"{after:.0f}° over the first cycle after, {later:.0f}° over the second: it passes "
+                "180° within half a cycle",
             ),
             Check(
                 "the roll then leads the water",

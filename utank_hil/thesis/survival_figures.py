@@ -82,10 +82,6 @@ def _survives(each: Run) -> bool:
     return math.isinf(each.result.capsized_s)
 
 
-def _all_or_some(each: list[bool]) -> Verdict:
-    return Verdict.HOLDS if all(each) else Verdict.PARTLY if any(each) else Verdict.FAILS
-
-
 def _kn(amplitude_nm: float) -> str:
     return f"{amplitude_nm / 1e3:.1f} kN m"
 
@@ -199,7 +195,7 @@ def figure_4_10() -> Figure:
             ),
             Check(
                 "the controlled ships survive 1.7292e5 N m (implied)",
-                _all_or_some([_survives(strong[name]) for name in CONTROLLED]),
+                Verdict.of_all([_survives(strong[name]) for name in CONTROLLED]),
                 _told(strong)
                 + "; greatest pressure of those that survive "
                 + ", ".join(
