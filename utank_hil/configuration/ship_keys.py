@@ -13,7 +13,7 @@ draught d, length L at the waterline)::
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -36,6 +36,22 @@ _PAIRS = (
 
 _MOST = 1e30  # as for `RollShip`; the keys below keep what is computed from them within it
 _Length = Annotated[float, Range(above=0, most=1e4)]
+
+
+def written_key(name: str, given: Iterable[str]) -> str:
+    """The key of a file that a parameter of the ship was computed from.
+
+    Parameters
+    ----------
+    name : str
+        Parameter of `RollShip`.
+    given : iterable of str
+        Keys of the section as they are written.
+    """
+    if name in given:
+        return name
+    own = {other: own for own, other in _PAIRS}.get(name, name)
+    return "beam_m" if own == "roll_period_s" and own not in given else own
 
 
 def weather_criterion_period_s(

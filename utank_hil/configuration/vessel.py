@@ -11,7 +11,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
-from utank_hil.configuration.ship_keys import ShipFromFile
+from utank_hil.configuration.ship_keys import ShipFromFile, written_key
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import Problem, refuse
@@ -34,6 +34,7 @@ class Vessel(Section):
     pump: Pump | None = None
     """None leaves the tank passive."""
     _assumptions: tuple[str, ...] = ()
+    _ship_keys: frozenset[str] = frozenset()
 
     @property
     def version(self) -> int:
@@ -80,23 +81,31 @@ class Vessel(Section):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _say_what_is_assumed(cls, content: Any, validated: Callable[[Any], "Vessel"]) -> "Vessel":
+    def _judged_as_written(cls, content: Any, validated: Callable[[Any], "Vessel"]) -> "Vessel":
         vessel = validated(content)
         if isinstance(content, dict) and isinstance(content["ship"], dict):
             given = content["ship"].keys()
+            vessel._ship_keys = frozenset(given)
             if not given & {"roll_period_s", "inertia_kg_m2"}:
                 period_s = 2 * math.pi / vessel.ship.natural_frequency_rad_s
                 vessel._assumptions = (
                     f"ship: roll period {period_s:.1f} s by the weather criterion's formula (IS "
                     "Code 2008, part A, 2.3.4); give roll_period_s if it is known",
                 )
+        refuse("", vessel._as_written(vessel_problems(vessel.ship, vessel.tank, vessel.pump)))
         return vessel
-
-    @model_validator(mode="after")
-    def _plausible(self) -> "Vessel":
-        refuse("", vessel_problems(self.ship, self.tank, self.pump))
-        return self
 
     def warnings(self) -> list[Problem]:
         """What is unusual in the vessel."""
-        return vessel_warnings(self.ship, self.tank, self.pump)
+        return self._as_written(vessel_warnings(self.ship, self.tank, self.pump))
+
+    def _as_written(self, problems: list[Problem]) -> list[Problem]:
+        """Problems at the keys that the file has for the ship."""
+        if not self._ship_keys:
+            return problems
+        parts = [(*key.partition("."), reason) for key, reason in problems]
+        return [
+            (f"ship.{written_key(name, self._ship_keys)}" if part == "ship" else part + dot + name,
+             reason)
+            for part, dot, name, reason in parts
+        ]  # fmt: skip
