@@ -84,7 +84,7 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
         ({"actual_ship": {"inertia_kg_m2": -1.0}}, "actual_ship.inertia_kg_m2", "got -1.0"),
         ({"actual_ship": {"wind_moment_nm": 4e8}}, "actual_ship",
          "full or empty at one side: lower offset_moment_nm or wind_moment_nm"),
-        ({"controllers": {}}, "controllers", "must name at least 1"),
+        ({"controllers": {}}, "controllers", "must have 1 or more"),
         ({"operator": None}, "operator", "is required but missing"),
         ({"controllers": {"passive": str(CONFIGS / "controllers" / "gpc.yaml")}}, "controllers",
          "names one 'passive'"),
