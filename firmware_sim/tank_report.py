@@ -26,7 +26,7 @@ def cost_rows(cost: TankCost) -> Rows:
     """What a tank takes from the ship, and what it can hold."""
     share, loss_m = cost.share_of_displacement, cost.gm_loss_m
     return [
-        ("water", f"{cost.water_t:.3g} t" + ("" if share is None else f", {share:.1%}")),
+        ("water", _tonnes(cost.water_t) + ("" if share is None else f", {share:.1%}")),
         (
             "free surface takes",
             f"{cost.stability_taken:.1%}"
@@ -113,7 +113,7 @@ def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
             row = {p.frequency_ratio: p for p in points if p.stability_share == share}
             water_t = [water_moments(point.tank, 0.0).mass_kg / 1e3 for point in row.values()]
             cells = (_sweep_cell(row.get(ratio), name) for ratio in ratios)
-            heading = f"{share:.0%}, {min(water_t):.3g} to {max(water_t):.3g} t"
+            heading = f"{share:.0%}, {_tonnes(min(water_t))} to {_tonnes(max(water_t))}"
             table.add_row(heading, *cells)
         tables.append(table)
     return tables
@@ -158,6 +158,10 @@ def prediction_json(found: RollPrediction) -> dict[str, Any]:
 def power(value_w: float) -> str:
     """A power in the unit that fits."""
     return f"{value_w / 1e6:.2f} MW" if abs(value_w) >= 1e6 else f"{value_w / 1e3:.3g} kW"
+
+
+def _tonnes(mass_t: float) -> str:
+    return f"{mass_t:.0f} t" if mass_t >= 100 else f"{mass_t:.3g} t"
 
 
 def _degrees(angle_rad: float) -> str:

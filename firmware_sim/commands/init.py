@@ -15,6 +15,7 @@ from rich.table import Table
 from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.commands.common import Json, fail, notes, prepare_out, shown
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.parameters import ParameterError
 
@@ -126,7 +127,7 @@ def init(
         if json_:
             sys.stdout.write(json.dumps({"possible": False, "reason": str(error)}) + "\n")
         notes.print("[red]no tank:[/red]", escape(str(error)), soft_wrap=True)
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
         fail(f"--tp: {error}")
     except ParameterError as error:
@@ -158,7 +159,7 @@ def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
         if option != "duct-below-cg":
             option = prefix + option
         notes.print("[red]error:[/red]", escape(f"--{option}: {reason}"), soft_wrap=True)
-    raise typer.Exit(2)
+    raise typer.Exit(ExitCode.USAGE)
 
 
 def _as_json(project: "StarterProject") -> dict[str, Any]:

@@ -103,6 +103,6 @@ def test_what_is_a_file_and_what_is_run() -> None:
     assert [each.file for each in found if each.file] == [
         f"configs/{kind}/supply_vessel.yaml" for kind in ("ships", "controllers", "scenarios")
     ]
-    assert [len(commands(each)) for each in found if each.language == "sh"] == [2, 1, 1, 1]
+    assert [len(commands(each)) for each in found if each.language == "sh"] == [2, 1, 2, 1, 1, 1]
     for text in ("make docs\n", "utank-hil run a.yaml --bus vcan0\n", "firmware-sim a.yaml &\n"):
         assert commands(Block("sh", "", "", 1, "utank-hil check a.yaml\n" + text)) == []

@@ -12,6 +12,7 @@ from firmware_sim.commands.init import init
 from firmware_sim.report import figures
 from firmware_sim.scenario import Scenario
 from utank_hil.commands.common import new_app
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 
@@ -94,7 +95,7 @@ def test_sea_can_be_given(tmp_path: Path) -> None:
 
 def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> None:
     done = run(tmp_path, PATROL | {"gm": 0.15})
-    assert done.exit_code == 1
+    assert done.exit_code == ExitCode.REFUSED
     assert "a GM of 0.15 m can spare nothing for a free surface" in done.stderr
     assert list(tmp_path.iterdir()) == []
     told = json.loads(run(tmp_path, PATROL | {"tank-length": 0.3}, "--json").stdout)
@@ -117,7 +118,7 @@ def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> Non
 )
 def test_wrong_options_are_named(tmp_path: Path, changes: dict[str, float], expected: str) -> None:
     done = run(tmp_path, PATROL | {"roll-period": 20} | changes)
-    assert done.exit_code == 2
+    assert done.exit_code == ExitCode.USAGE
     assert expected in done.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -125,13 +126,13 @@ def test_wrong_options_are_named(tmp_path: Path, changes: dict[str, float], expe
 def test_period_or_draught_is_needed(tmp_path: Path) -> None:
     ship = {key: value for key, value in PATROL.items() if key != "roll-period"}
     done = run(tmp_path, ship)
-    assert done.exit_code == 2
+    assert done.exit_code == ExitCode.USAGE
     assert "--roll-period: is needed, or else the draught" in done.stderr
 
 
 def test_files_that_are_there_stay(tmp_path: Path) -> None:
     (tmp_path / "ship.yaml").write_text("mine\n")
     done = run(tmp_path, PATROL)
-    assert done.exit_code == 2
+    assert done.exit_code == ExitCode.USAGE
     assert "ship.yaml: is there already" in done.stderr
     assert (tmp_path / "ship.yaml").read_text() == "mine\n"

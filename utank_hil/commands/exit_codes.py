@@ -26,9 +26,9 @@ class ExitCode(IntEnum):
     OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
     REFUSED = (
         1,
-        "`check`, `identify`",
-        "A law misses its margins, or a model or its law is refused. Of any command, with a "
-        "traceback: an error in the program.",
+        "`check`, `identify`, `init`",
+        "A law misses its margins, a model or its law is refused, or no tank can be for a ship. Of "
+        "any command, with a traceback: an error in the program.",
     )
     USAGE = (
         2,
