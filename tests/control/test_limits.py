@@ -79,6 +79,26 @@ def test_pump_pushing_with_the_flow_never_overshoots_the_level(start_m):
     assert 3.4 < highest < 3.85
 
 
+@pytest.mark.parametrize("brake_share", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("sharpness", [1.0, 2.2])
+def test_barrier_allows_what_its_formula_says(brake_share, sharpness):
+    level, rate, level_limit = 3.6, 0.85, 3.85
+    limits = PumpLimits(
+        rate_pa_s=1e9, brake_share=brake_share, sharpness=sharpness, lookahead_s=0.0
+    )
+    # the pressure under which the water, free of losses, just comes to rest at the limit: the
+    # energy h'^2 / 2 w0^2 + (h - h_e)^2 / 2 is the same there
+    speed = rate / TANK.natural_frequency_rad_s
+    candidates = np.linspace(-6, 6, 2_000_001)
+    left = speed**2 + (level - candidates) ** 2 - (level_limit - candidates) ** 2
+    touch = 2 * TANK.density_kg_m3 * 9.80665 * candidates[np.abs(left).argmin()]
+    brake = brake_share * 50e3
+    expected = np.clip(-brake + sharpness * (touch + brake), -50e3, 50e3)
+    command = CommandLimiter(limits, TANK, PERIOD_S).limit(1e6, level, rate)
+    assert abs(expected) < 50e3
+    assert command == pytest.approx(expected, abs=10)
+
+
 def test_mean_of_the_commands_between_two_steps():
     limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
     commands = [limiter.limit(50e3, 0.0, 0.0) for _ in range(10)]

@@ -265,10 +265,11 @@ def test_three_overruns_in_ten_ticks_ramp_down_two_do_not() -> None:
     assert bench.pressure_pa == 0.0
 
 
-def test_law_that_fails_stops_the_pump() -> None:
+@pytest.mark.parametrize("answer_pa", [math.nan, math.inf, -math.inf])
+def test_law_that_fails_stops_the_pump(answer_pa: float) -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
-    bench.law.answer_pa = math.nan
+    bench.law.answer_pa = answer_pa
     bench.run(240)
     assert bench.node.fault is Fault.INTERNAL
     assert bench.pressure_pa == 0.0

@@ -28,7 +28,9 @@ from utank_hil.canbus import (
     RetuningState,
     SensorMotion,
     SensorPump,
+    SensorTank,
 )
+from utank_hil.retuning import RetuningEvent, RetuningOrder
 from utank_hil.runtime import RealTimeLoop
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
@@ -249,3 +251,32 @@ def test_heartbeat_tells_the_fault() -> None:
     assert heard[-1] is not None
     assert heard[-1].state is NodeState.FAULT
     assert VESSEL.version == VERSION == heard[-1].configuration_version
+
+
+class NotedUpdates:
+    """A retuning that does nothing."""
+
+    state = RetuningState.IDLE
+    events: tuple[RetuningEvent, ...] = ()
+
+    def __init__(self) -> None:
+        self.fresh: list[bool] = []
+
+    def update(self, now_ns: int, order: RetuningOrder, *, engaged: bool, fresh: bool) -> None:
+        self.fresh.append(fresh)
+
+
+@pytest.mark.parametrize("kind", [SensorMotion, SensorTank])
+def test_a_sample_is_fresh_only_if_motion_and_levels_are(
+    kind: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    bench.run(1000)
+    assert all(noted.fresh[1:])
+    bench.silent.add(kind)
+    bench.run(400)
+    assert not noted.fresh[-1]
+    bench.silent.clear()
+    bench.run(400)
+    assert noted.fresh[-1]

@@ -63,6 +63,14 @@ def test_fault_is_reset_once_and_only_on_request() -> None:
     assert set(led(states, sequence, wanted=False)) == {S.FAULT}
 
 
+def test_no_reset_is_sent_while_the_drive_reacts_to_its_fault() -> None:
+    sequence = DriveSequence()
+    sequence.request_reset()
+    for _ in range(3):
+        word = sequence.next_word(S.FAULT_REACTION_ACTIVE, wanted=False)
+        assert word is C.DISABLE_VOLTAGE
+
+
 def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later() -> None:
     states, sequence = DriveStates(), DriveSequence()
     states.tick()

@@ -226,6 +226,18 @@ def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed(
             assert line.inbox.high_level == closed
 
 
+@pytest.mark.parametrize("kind", [SensorMotion, SensorTank, DriveStatus1])
+def test_every_stream_that_control_stands_on_counts_for_the_protection(kind: type) -> None:
+    line = Line()
+    for message in GOOD.values():
+        line.say(message)
+    assert line.inbox.protection_valid
+    for _ in range(5):
+        frame = line.frame(GOOD[kind])
+        line.hear(Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,))))
+    assert not line.inbox.protection_valid
+
+
 def test_echo_is_fresh_only_when_it_moves() -> None:
     line = Line()
     for echo, fresh in ((None, False), (3, True), (3, False), (4, True), (4, False), (3, True)):

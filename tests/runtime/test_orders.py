@@ -49,6 +49,22 @@ def test_stop_and_disarm_are_heard_once_from_any_intact_frame(lost: int) -> None
         assert wishes.armed
 
 
+def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
+    line = Line()
+    line.say(arm=True, reset=True, retune=True, undo=True)
+    wishes = line.orders.take()
+    assert not wishes.arm_edge
+    assert not wishes.reset_edge
+    assert line.orders.take_retuning() == RetuningOrder()
+
+
+def test_a_mode_that_is_none_is_standby() -> None:
+    line = Line()
+    line.say(mode_request=Mode.ACTIVE)
+    line.say(mode_request=None)
+    assert line.orders.requested_mode is Mode.STANDBY
+
+
 def test_a_damaged_stop_is_not_heard() -> None:
     line = Line()
     line.say()

@@ -1,0 +1,68 @@
+"""What the supervisor looks at: windows, time constants and thresholds to the tick."""
+
+import math
+
+import pytest
+from controller_bench import CATALOGUE, MS, VERSION
+
+from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.observations import HEEL_TIME_CONSTANT_S, Observer
+from utank_hil.tick import TICK_NS, TICK_S
+
+
+class Table:
+    """An observer of an inbox that hears nothing."""
+
+    def __init__(self) -> None:
+        self.inbox = Inbox(CATALOGUE, VERSION)
+        self.observer = Observer(self.inbox, 250_000, 20 * MS)
+        self.seen = self.observer.seen
+        self.now_ns = 0
+
+    def tick(self, late_ticks: int = 0) -> None:
+        self.now_ns += (1 + late_ticks) * TICK_NS
+        self.observer.observe(self.now_ns, 0)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: float) -> None:
+    table = Table()
+    table.inbox.roll_rad = sign * 0.1
+    for _ in range(round(60.0 / TICK_S)):
+        table.tick()
+    assert HEEL_TIME_CONSTANT_S == 60.0
+    assert table.seen.heel_rad == pytest.approx(sign * 0.1 * (1 - math.exp(-1)), rel=1e-3)
+
+
+def test_link_is_lost_for_a_command_cycle_after_an_error() -> None:
+    table = Table()
+    table.tick()
+    assert not table.seen.link_lost
+    table.observer.link_error(table.now_ns)
+    for lost in (True, True, False, False):
+        table.tick()
+        assert table.seen.link_lost == lost
+
+
+def test_a_late_tick_counts_for_ten_ticks() -> None:
+    table = Table()
+    table.tick()
+    table.tick(late_ticks=1)
+    for _ in range(9):
+        assert table.seen.overruns_in_ten == 1
+        table.tick()
+    assert table.seen.overruns_in_ten == 1
+    table.tick()
+    assert table.seen.overruns_in_ten == 0
+
+
+def test_a_second_sender_is_gone_after_ten_seconds() -> None:
+    table = Table()
+    table.tick()
+    assert not table.seen.address_conflict
+    table.inbox.conflict_ns = table.now_ns
+    for _ in range(1000):
+        table.tick()
+        assert table.seen.address_conflict
+    table.tick()
+    assert not table.seen.address_conflict
