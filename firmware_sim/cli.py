@@ -103,7 +103,7 @@ def firmware_sim(
             "duration_s": len(log.rows) * RECORD_S,
             "roll": asdict(roll),
             "pump": asdict(pump),
-            "refused_commands": None if external else ship.drive.refused,
+            "refused_commands": None if external else ship.refused_commands,
             "reported_pressure_share": external and external.reported_share,
             "loop": statistics.summary(),
         }
@@ -114,7 +114,7 @@ def firmware_sim(
     drive = (
         f"pressure reported in {external.reported_share:.1%} of the time"
         if external
-        else f"{ship.drive.refused} commands refused"
+        else f"{ship.refused_commands} commands refused"
     )
     console.print(
         f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "

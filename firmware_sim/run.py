@@ -296,7 +296,7 @@ def _ship_figures(
     """Fields of `Run` and `ShipRun` from `refused_commands` to `pump_speed_rad_s`, in order."""
     plant = ship.plant
     return (
-        ship.drive.refused,
+        ship.refused_commands,
         plant.pump_energy_j,
         plant.strikes,
         plant.capsized_s,

@@ -6,16 +6,22 @@ from typing import Final
 
 from firmware_sim.drive import PumpDrive
 from firmware_sim.external_drive import ExternalDrive
+from firmware_sim.external_valve import ExternalValve
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
+from firmware_sim.valve import ValveNode
 from utank_hil.canbus import load_catalogue
+from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import negligible
 from utank_hil.runtime import Node
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
-NODE_NAMES: Final = ("sensors", "drive", "panel")
-"""The emulated nodes, in the order in which they tick; hardware may take the place of each."""
+NODE_NAMES: Final = ("sensors", "drive", "valve", "panel")
+"""The emulated nodes, in the order in which they tick; hardware may take the place of each.
+
+Only a ship with a pump has a drive, and only one with a valve has that.
+"""
 
 # enabled at zero pressure the pump leaves the tank alone; switched off, its rotor turns with the
 # water and changes the tank
@@ -28,26 +34,39 @@ class ShipSide:
 
     Attributes
     ----------
+    vessel : Vessel
     plant : Plant
     sensors : SensorNode
-    drive : PumpDrive
+    drive : PumpDrive or None
+        If the tank has a pump.
     panel : OperatorPanel
+    valve : ValveNode or None
+        If the tank has one.
     """
 
+    vessel: Vessel
     plant: Plant
     sensors: SensorNode
-    drive: PumpDrive
+    drive: PumpDrive | None
     panel: OperatorPanel
+    valve: ValveNode | None = None
 
     @property
-    def nodes(self) -> tuple[SensorNode, PumpDrive, OperatorPanel]:
+    def nodes(self) -> tuple[Node, ...]:
         """The nodes, in the order in which they tick."""
-        return self.sensors, self.drive, self.panel
+        actuators = [node for node in (self.drive, self.valve) if node is not None]
+        return self.sensors, *actuators, self.panel
+
+    @property
+    def refused_commands(self) -> int:
+        """Commands that drive and valve found wrong or outside their own limits."""
+        return sum(node.refused for node in (self.drive, self.valve) if node is not None)
 
     def without(self, names: Collection[str]) -> list[Node]:
         """The nodes that are left when hardware takes the place of some.
 
-        Without the emulated drive an `ExternalDrive` moves the plant's pump.
+        Without the emulated drive an `ExternalDrive` moves the plant's pump, without the emulated
+        valve an `ExternalValve` its valve.
 
         Parameters
         ----------
@@ -57,16 +76,18 @@ class ShipSide:
         Raises
         ------
         ValueError
-            If a name is unknown.
+            If the ship has no such node.
         """
+        known = [node.name for node in self.nodes]
         for name in names:
-            if name not in NODE_NAMES:
-                raise ValueError(
-                    f"no node {name!r} to leave out; there are {', '.join(NODE_NAMES)}"
-                )
+            if name not in known:
+                raise ValueError(f"no node {name!r} to leave out; there are {', '.join(known)}")
         nodes: list[Node] = [node for node in self.nodes if node.name not in names]
         if "drive" in names:
             nodes.append(ExternalDrive(self.plant, load_catalogue()))
+        if "valve" in names and self.vessel.valve is not None:
+            valve = ExternalValve(self.plant, self.vessel.tank, self.vessel.valve, load_catalogue())
+            nodes.append(valve)
         return nodes
 
 
@@ -109,11 +130,20 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         linear=scenario.plant == "linear",
     )
     version = vessel.version
+    drive = valve = None
+    if vessel.pump is not None:
+        drive = PumpDrive(plant, scenario.drive, catalogue, configuration_version=version)
+    if vessel.valve is not None:
+        valve = ValveNode(
+            plant, vessel.tank, vessel.valve, catalogue, configuration_version=version
+        )
     return ShipSide(
+        vessel,
         plant,
         SensorNode(
             plant, scenario.sensors, catalogue, configuration_version=version, seed=seed + 1
         ),
-        PumpDrive(plant, scenario.drive, catalogue, configuration_version=version),
+        drive,
         OperatorPanel(catalogue, configuration_version=version, script=script),
+        valve,
     )

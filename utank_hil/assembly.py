@@ -24,6 +24,7 @@ from utank_hil.runtime.controller_node import (
 from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
+from utank_hil.runtime.valve_command import ValveCommander
 from utank_hil.tick import TICK_S, is_whole_ticks
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def build_law(config: ControllerConfig) -> BuiltLaw:
             # an equation that was solved for another matrix than the one given
             warnings.simplefilter("error", RuntimeWarning)
             law = config.law.build(config.plant)
-            if law.linear is None and law.closes_loop:
+            if law.linear is None and law.closes_loop and not law.dissipates:
                 law = _by_impulse_response(law)
             finite = law.linear is None or all(
                 np.isfinite(matrix).all() for matrix in law.linear.matrices()[:4]
@@ -142,6 +143,10 @@ def build_controller_node(
     retuning = None
     if retuner is not None and config.retuning is not None:
         retuning = _adaptive(config, law, retuner)
+    timeout_s = config.command_timeout_ms * 1e-3
+    valve = None
+    if config.vessel.valve is not None:
+        valve = ValveCommander(config.vessel.valve, tank, catalogue, timeout_s)
     return ControllerNode(
         retuning or law.controller(),
         measure_of(law.measured),
@@ -150,11 +155,14 @@ def build_controller_node(
         Supervisor(config.safety),
         ControllerSettings(
             configuration_version=config.vessel.version,
-            command_timeout_s=config.command_timeout_ms * 1e-3,
+            command_timeout_s=timeout_s,
             bit_rate=config.bit_rate,
             level_limit_m=tank.level_limit_m,
         ),
         catalogue,
+        commands=law.commands,
+        pump=config.vessel.pump is not None,
+        valve=valve,
         retuning=retuning,
         statistics=statistics,
         sink=sink,

@@ -10,6 +10,7 @@ from firmware_sim.drive import DriveLimits
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorErrors
 from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
+from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Mode
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
@@ -25,6 +26,7 @@ SEA_OF = {
     "Thesis ship 1": "storm.yaml",
     "Naval vessel": "naval_vessel.yaml",
     "Patti-B": "patti_b.yaml",
+    "Thesis ship 1 with a duct valve": "semi_active.yaml",
 }
 """A scenario for each ship, by her name."""
 SECOND_NS = 1_000_000_000
@@ -60,13 +62,15 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
     scenario = load_config(CONFIGS / "scenarios" / SEA_OF[config.vessel.name], Scenario)
     assert scenario.vessel == config.vessel
     ship = build_ship_side(scenario, 1, (TimedAction(2.0, Action.ARM),))
-    pressures: list[float] = []
-    node = build_controller_node(config, sink=lambda row: pressures.append(row[5]))
+    rows: list[FloatArray] = []
+    node = build_controller_node(config, sink=lambda row: rows.append(row.copy()))
     lockstep = Lockstep([*ship.nodes, node])
     lockstep.run_until(30 * SECOND_NS)
     assert node.mode is Mode.ACTIVE
-    assert np.ptp(pressures) > 10.0
+    column, least = ("valve_opening", 0.2) if ship.valve else ("pressure_command_pa", 10.0)
+    assert np.ptp(np.array(rows)[:, SIGNALS.index(column)]) > least
     assert ship.drive.refused == 0
+    assert ship.valve is None or ship.valve.refused == 0
 
 
 def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s: int) -> float:
@@ -83,7 +87,9 @@ def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "below"), [("naval_vessel", 0.15), ("patti_b", 0.2)])
+@pytest.mark.parametrize(
+    ("name", "below"), [("naval_vessel", 0.15), ("patti_b", 0.2), ("semi_active", 0.05)]
+)
 def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
     name: str, below: float
 ) -> None:

@@ -24,12 +24,13 @@ from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.interface import StartsAnew
 from utank_hil.control.lqg import design_lqr
-from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
+from utank_hil.control.semi_active import ClippedValve, OnOffValve
 from utank_hil.control.stimulation import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import sample
+from utank_hil.dynamics.valves import ValveRange
 from utank_hil.sea import jonswap
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)

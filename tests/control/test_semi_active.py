@@ -1,17 +1,27 @@
 """Valve laws: energy, range of the valve, and where they gain."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shipped_designs import GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.capsize.survival import controlled_run
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.gain import GainLaw
-from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
+from utank_hil.control.pd import PDDesign
+from utank_hil.control.semi_active import (
+    ClippedValve,
+    ClippedValveDesign,
+    OnOffValve,
+    OnOffValveDesign,
+)
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
-from utank_hil.dynamics.valves import duct_valve_loss
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.valves import ValveRange, duct_valve_loss
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
 TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.03)
@@ -130,3 +140,44 @@ def test_range_out_of_order_is_refused(losses):
 def test_valve_law_out_of_range_is_refused_by_name(change, message):
     with pytest.raises(ValueError, match=message):
         OnOffValve(VALVE, **change)
+
+
+PLANT = DesignPlant(SHIP, TANK, valve=VALVE)
+
+
+def test_design_of_the_on_off_law_throttles_the_plant_s_valve():
+    built = OnOffValveDesign(threshold_rad_m_s2=0.01).build(PLANT)
+    assert built.measured == STATES
+    assert built.dissipates
+    assert built.controller().step(np.array([0.0, 0.1, 0.0, 0.5]))[0] == VALVE.shut_loss
+
+
+@pytest.mark.parametrize("pump", [GPC_ROLL, LQG_ROLL_RATE_LEVEL], ids=["gpc", "lqg"])
+def test_design_of_the_clipped_law_hands_the_pump_s_law_its_own_measurements(pump):
+    built = ClippedValveDesign(pump).build(PLANT)
+    measured = pump.predictor.measured
+    assert built.measured == (*measured, "level_rate_m_s")
+    assert built.dissipates
+    alone, clipped = pump.build(PLANT).controller(), built.controller()
+    flow = 0.3
+    for time in np.arange(0, 20, alone.sample_time_s):
+        y = 0.1 * np.sin(0.5 * time + np.arange(len(measured)))
+        pressure = alone.step(y)[0]
+        loss = clipped.step(np.array([*y, flow]))[0]
+        wanted = -pressure / flow**2 if pressure < 0 else 0.0
+        assert loss == pytest.approx(min(max(wanted, VALVE.open_loss), VALVE.shut_loss))
+        alone.applied(np.array([-loss * flow**2]))
+        clipped.applied(np.array([loss]))
+
+
+@pytest.mark.parametrize(
+    ("design", "plant", "message"),
+    [
+        (OnOffValveDesign(), replace(PLANT, valve=None), "the vessel has none"),
+        (ClippedValveDesign(PDDesign()), replace(PLANT, valve=None), "the vessel has none"),
+        (ClippedValveDesign(OnOffValveDesign()), PLANT, "pump must be a law that drives a pump"),
+    ],
+)
+def test_design_of_a_valve_s_law_that_can_not_be_is_refused(design, plant, message):
+    with pytest.raises(ValueError, match=message):
+        design.build(plant)

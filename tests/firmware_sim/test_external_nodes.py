@@ -1,5 +1,7 @@
 """Hardware in the place of emulated nodes: another maker's nodes on a lockstep bus."""
 
+from collections.abc import Iterable
+from functools import partial
 from itertools import chain, combinations
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from foreign_nodes import (
 
 from firmware_sim.external_drive import STALE_NS, ExternalDrive
 from firmware_sim.scenario import Scenario
-from firmware_sim.ship_side import NODE_NAMES, build_ship_side
+from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
@@ -32,7 +34,7 @@ SENT = {
     "drive": {"DRIVE_STATUS_1", "DRIVE_STATUS_2", "HEARTBEAT_DRIVE"},
     "panel": {"OPERATOR_CMD", "HEARTBEAT_OPERATOR"},
 }
-SOME = list(chain.from_iterable(combinations(NODE_NAMES, n) for n in (1, 2, 3)))
+SOME = list(chain.from_iterable(combinations(SENT, n) for n in (1, 2, 3)))
 
 
 class Bench:
@@ -169,7 +171,7 @@ def test_without_all_nodes_nothing_is_sent_and_the_truth_is_recorded() -> None:
     ship = build_ship_side(STORM, 1, STORM.operator)
     sent: list[Frame] = []
     log = MemoryLog(len(TRUTH), 1000)
-    nodes = [*ship.without(NODE_NAMES), TruthRecorder(ship.plant, log, TICK_NS)]
+    nodes = [*ship.without(tuple(SENT)), TruthRecorder(ship.plant, log, TICK_NS)]
     Lockstep(nodes, trace=lambda now_ns, sender, frame: sent.append(frame)).run_until(500 * TICK_NS)
     assert sent == []
     assert len(log.rows) == 500
@@ -179,6 +181,55 @@ def test_without_all_nodes_nothing_is_sent_and_the_truth_is_recorded() -> None:
 def test_without_nothing_is_the_whole_ship_and_an_unknown_node_is_refused() -> None:
     ship = build_ship_side(STORM, 1, ())
     assert ship.without(()) == list(ship.nodes)
-    assert tuple(node.name for node in ship.nodes) == NODE_NAMES
+    assert tuple(node.name for node in ship.nodes) == tuple(SENT)
     with pytest.raises(ValueError, match="no node 'motor' to leave out; there are sensors, drive"):
         ship.without(("sensors", "motor"))
+
+
+class ForeignValve(ForeignNode):
+    """A valve that goes nearly to where it is told, in the time of the ship file."""
+
+    silent = False
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.reported = 1.0
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        frames = self.life(now_ns)
+        command = self.heard.get("VALVE_CMD", {"counter": 255, "opening": 1, "control": 0})
+        if self.due("VALVE_STATUS", now_ns) and not self.silent:
+            following = command["control"] == 1
+            target = 0.9 * command["opening"] if following else 1.0
+            self.reported += min(max(target - self.reported, -0.04), 0.04)
+            frames.append(self.frame(
+                "VALVE_STATUS", opening=self.reported, state=int(following), fault=0,
+                command_echo=int(command["counter"]), fail_position=0, moving=0, open_limit=0,
+                shut_limit=0,
+            ))  # fmt: skip
+        return frames
+
+
+def test_a_valve_of_another_maker_throttles_the_emulated_tank() -> None:
+    scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
+    ship = build_ship_side(scenario, 1, (TimedAction(2.0, Action.ARM),))
+    losses: list[float] = []
+    ship.plant.set_valve_loss = losses.append  # type: ignore[method-assign]
+    foreign = ForeignValve("valve")
+    foreign.versions = (load_catalogue().version, scenario.vessel.version)
+    controller = build_controller_node(scenario.controllers["on_off"])
+    lockstep = Lockstep([*ship.without(("valve",)), foreign, controller])
+    assert scenario.vessel.valve is not None
+    loss_at = partial(scenario.vessel.valve.loss, scenario.vessel.tank)
+    openings = set()
+    for _ in range(1500):
+        heard = foreign.reported
+        lockstep.run_until(lockstep.now_ns + 2 * TICK_NS)
+        if controller.mode is Mode.ACTIVE and foreign.reported == heard:
+            openings.add(round(heard, 3))
+            assert losses[-1] == pytest.approx(loss_at(heard), rel=1e-3)
+    assert openings >= {0.0, 0.9}
+    foreign.silent = True
+    lockstep.run_until(lockstep.now_ns + 10 * TICK_NS)
+    assert losses[-1] == loss_at(1.0)
+    assert controller.fault is Fault.VALVE_SILENT

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -86,6 +87,7 @@ class ControllerBench:
         start_ns: int = 0,
         law: ToyLaw | None = None,
         statistics: LoopStatistics | None = None,
+        **more: Any,
     ) -> None:
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
@@ -100,6 +102,7 @@ class ControllerBench:
             CATALOGUE,
             statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),
+            **more,
         )
         self.start_ns = self.now_ns = start_ns
         self.motion = SensorMotion(0.0, 0.0, Quality.GOOD)

@@ -38,12 +38,11 @@ from utank_hil.control import (
     GainLaw,
     OnOffValve,
     Stimulation,
-    ValveRange,
     design_lqr,
 )
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.valves import duct_valve_loss
+from utank_hil.dynamics.valves import ValveRange, duct_valve_loss
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea
 from utank_hil.tick import TICK_S
 

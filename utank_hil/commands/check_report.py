@@ -24,6 +24,11 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.water import water_moments
 
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
+DISSIPATES = (
+    "The law throttles a valve, which can only take energy out of the water, whatever it measures: "
+    "no loop can become unstable, and there are no margins. It may still roll the ship more than "
+    "the valve at rest; see what a bench says."
+)
 
 LEAST_LOOP_GAIN = 0.05
 """Below it a law with all margins hardly acts; the shipped ones have 1.3 and more."""
@@ -41,6 +46,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
         "configuration_version": config.vessel.version,
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
+        "dissipates": judged.law.dissipates,
         "limits": _finite(asdict(config.limits)),
         "robustness": None if report is None else _finite(asdict(report)),
         "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
@@ -169,7 +175,8 @@ def print_controller(judged: JudgedLaw) -> None:
         if judged.law.unjudged:
             _print_verdict(console, judged)
         else:
-            console.print(NO_LOOP)
+            text = DISSIPATES if judged.law.dissipates else NO_LOOP
+            console.print(text, soft_wrap=True)
         return
     margin = report.nominal
     table = Table(title="Margins, delay and pump lag included")
@@ -259,7 +266,7 @@ def _verdict(judged: JudgedLaw) -> str:
     if judged.failures:
         return "[yellow]accepted[/yellow]" if judged.accepted else "[red]refused[/red]"
     if judged.robustness is None:
-        return "no loop"
+        return "dissipates" if judged.law.dissipates else "no loop"
     return "at rest" if judged.law.adapts else "[green]ok[/green]"
 
 

@@ -14,12 +14,15 @@ from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
+from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
 from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.tick import TICK_S, is_whole_ticks
+
+_WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 
 MOST_PULSES_S: Final = 3600.0
 """Longest identification: the pulses and the record are kept in memory."""
@@ -137,7 +140,7 @@ class ControllerConfig(Section):
         return [(f"retuning.{name}", reason) for name, reason in problems]
 
     def _law_problems(self) -> list[Problem]:
-        if self.vessel.pump is None and not isinstance(self.law, PassiveDesign):
+        if self.vessel.pump is None and not isinstance(self.law, _WITHOUT_PUMP):
             reason = (
                 f"is {self.law.kind}, which drives a pump, but {self.vessel.name} has none: give "
                 "the vessel a pump, or take kind: passive"
@@ -155,4 +158,5 @@ class ControllerConfig(Section):
         """What the law is designed for."""
         vessel = self.vessel
         lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
-        return DesignPlant(vessel.ship, vessel.tank, self.delay_s, lag_s, self.limits)
+        valve = None if vessel.valve is None else vessel.valve.range(vessel.tank)
+        return DesignPlant(vessel.ship, vessel.tank, self.delay_s, lag_s, self.limits, valve)

@@ -17,6 +17,7 @@ from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.registry import LAWS
+from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.control.state_space import StateSpaceDesign
 
 GROUP: Final = "utank_hil.laws"
@@ -42,18 +43,35 @@ _FROM_FILE: Final[dict[type[LawDesign], type[LawDesign]]] = {
 }
 
 if TYPE_CHECKING:
-    Law = LawDesign
+    PumpLaw = LawDesign
 else:
     _installed = tuple(point.load() for point in entry_points(group=GROUP))
-    _kinds = tuple(_FROM_FILE.get(law, law) for law in (*LAWS, *_installed))
+    _of_a_valve = (OnOffValveDesign, ClippedValveDesign)
+    _of_a_pump = tuple(
+        _FROM_FILE.get(law, law) for law in (*LAWS, *_installed) if law not in _of_a_valve
+    )
+    PumpLaw = Annotated[reduce(or_, _of_a_pump), Field(discriminator="kind")]
+
+
+@dataclass(frozen=True, slots=True)
+class ClippedValveFromFile(ClippedValveDesign):
+    """A valve's law that holds a pump's law."""
+
+    pump: PumpLaw
+
+
+if TYPE_CHECKING:
+    Law = LawDesign
+else:
+    _kinds = (*_of_a_pump, OnOffValveDesign, ClippedValveFromFile)
     Law = Annotated[reduce(or_, _kinds), Field(discriminator="kind")]
 
 
 def sample_time(law: LawDesign) -> tuple[str, float] | None:
     """Dotted key below ``law`` and value of a law's sample time, if that is a parameter of it."""
     name, part = "", law
-    for section in ("predictor", "system"):
+    for section in ("pump", "predictor", "system"):
         if hasattr(part, section):
-            name, part = f"{section}.", getattr(part, section)
+            name, part = f"{name}{section}.", getattr(part, section)
     value: Any = getattr(part, "sample_time_s", None)
     return None if value is None else (f"{name}sample_time_s", value)

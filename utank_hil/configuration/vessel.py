@@ -15,6 +15,7 @@ from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, refuse
 
 NOT_AVAILABLE = 0xFFF
@@ -33,14 +34,18 @@ class Vessel(Section):
     ship: ShipFromFile
     tank: Tank
     pump: Pump | None = None
-    """None leaves the tank passive."""
+    valve: Valve | None = None
+    """None and None leave the tank passive."""
     _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property
     def version(self) -> int:
         """Hash of everything but the name, for the nodes to compare before arming."""
         parts = (self.ship, self.tank, self.pump)
+        parts = (self.ship, self.tank, self.pump)
         content = [None if part is None else _not_by_default(part) for part in parts]
+        if self.valve is not None:
+            content.append(_not_by_default(self.valve))
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -82,6 +87,9 @@ class Vessel(Section):
         if isinstance(written, dict):
             vessel._written = frozenset(written)
         problems = vessel_problems(vessel.ship, vessel.tank, vessel.pump)
+        if vessel.valve is not None:
+            wrong = valve_problems(vessel.tank, vessel.valve)
+            problems += [(f"valve.{name}", reason) for name, reason in wrong]
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
 
@@ -101,7 +109,7 @@ class Vessel(Section):
         return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
 
 
-def _not_by_default(part: RollShip | Tank | Pump) -> dict[str, Any]:
+def _not_by_default(part: RollShip | Tank | Pump | Valve) -> dict[str, Any]:
     """The parameters that differ from their default, so that a new one changes no version."""
     defaults = {field.name: field.default for field in fields(part)}
     return {name: value for name, value in asdict(part).items() if value != defaults[name]}

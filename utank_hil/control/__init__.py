@@ -25,7 +25,7 @@ from utank_hil.control.predictive.design import PredictiveDesign, Predictor, wav
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.control.predictive.law import PredictiveController, PredictiveLaw
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.control.semi_active import ClippedValve, OnOffValve, ValveRange
+from utank_hil.control.semi_active import ClippedValve, OnOffValve
 from utank_hil.control.state_space import StateSpaceLaw
 from utank_hil.control.stimulation import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
@@ -65,7 +65,6 @@ __all__ = [
     "SmallGainFuzzy",
     "StateSpaceLaw",
     "Stimulation",
-    "ValveRange",
     "WashoutLaw",
     "design_constrained_gpc",
     "design_dpc",

@@ -8,6 +8,7 @@ from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import ValveRange
 from utank_hil.parameters import NotNegative, range_problems, refuse
 
 _LIMITS: Final = PumpLimits()
@@ -27,6 +28,8 @@ class DesignPlant:
         Time constant of the pump's pressure.
     limits : PumpLimits
         On the command, for the laws that plan within them.
+    valve : ValveRange or None
+        Of the tank's valve, if it has one.
 
     Raises
     ------
@@ -39,6 +42,7 @@ class DesignPlant:
     delay_s: NotNegative = 0.05
     lag_s: NotNegative = 0.1
     limits: PumpLimits = _LIMITS
+    valve: ValveRange | None = None
 
     def __post_init__(self) -> None:
         refuse("design plant", range_problems(self))

@@ -2,11 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.sampling import LinearModel
+
+PRESSURE: Final = "pressure_pa"
+VALVE: Final = "valve_loss"
 
 
 class Controller(Protocol):
@@ -118,6 +121,9 @@ class BuiltLaw:
         impulse response.
     unjudged : str
         Why its loop can't be judged; empty where it can, or need not.
+    commands : tuple of str
+        What the controller commands, in order: `PRESSURE` of the pump in Pa, `VALVE` for the loss
+        of the valve in Pa per (m/s)^2 of dh/dt.
     """
 
     controller: Callable[[], Controller]
@@ -127,6 +133,12 @@ class BuiltLaw:
     adapts: bool = False
     closes_loop: bool = True
     unjudged: str = ""
+    commands: tuple[str, ...] = (PRESSURE,)
+
+    @property
+    def dissipates(self) -> bool:
+        """Whether it can only take energy out of the water, whatever it commands: a valve's law."""
+        return self.commands == (VALVE,)
 
 
 class LawDesign(Protocol):

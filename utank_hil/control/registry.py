@@ -16,6 +16,7 @@ from utank_hil.control.passive import PassiveDesign
 from utank_hil.control.pd import PDDesign
 from utank_hil.control.predictive.design import PredictiveDesign
 from utank_hil.control.python_law import PythonDesign
+from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.control.state_space import StateSpaceDesign
 from utank_hil.control.stimulation import StimulationDesign
 
@@ -32,4 +33,6 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     StimulationDesign,
     StateSpaceDesign,
     PythonDesign,
+    OnOffValveDesign,
+    ClippedValveDesign,
 )

@@ -16,39 +16,26 @@ The command is a loss in Pa per (m/s)^2 of dh/dt, as `utank_hil.dynamics.valves`
 opening. No valve shuts in no time: between two samples it stays where it is.
 """
 
-import math
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Final, Literal
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control.interface import Controller
-from utank_hil.parameters import NotNegative, SampleTime, range_problems, refuse
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.valves import ValveRange
+from utank_hil.parameters import (
+    NotNegative,
+    ParameterError,
+    SampleTime,
+    range_problems,
+    refuse,
+)
 
-
-@dataclass(frozen=True, slots=True)
-class ValveRange:
-    """What the valve can do.
-
-    Parameters
-    ----------
-    open_loss, shut_loss : float
-        Least and greatest loss in Pa per (m/s)^2 of dh/dt.
-
-    Raises
-    ------
-    ValueError
-        If the losses are negative or not in order.
-    """
-
-    open_loss: float
-    shut_loss: float
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.open_loss < self.shut_loss < math.inf:
-            raise ValueError(
-                f"a valve needs 0 <= open_loss < shut_loss, got {self.open_loss}, {self.shut_loss}"
-            )
+_FLOW: Final = "level_rate_m_s"
 
 
 @dataclass(slots=True, eq=False)
@@ -99,20 +86,23 @@ class ClippedValve:
     ----------
     valve : ValveRange
     pump : Controller
-        One input; on measurements whose last is the level rate. Its `applied` gets the pressure
-        that the valve really made.
+        One input. Its `applied` gets the pressure that the valve really made.
+    measured : int, optional
+        How many of the measurements, the last of which is the level rate, are the pump law's own;
+        all by default.
     """
 
-    def __init__(self, valve: ValveRange, pump: Controller) -> None:
+    def __init__(self, valve: ValveRange, pump: Controller, measured: int | None = None) -> None:
         self.sample_time_s = pump.sample_time_s
         self._valve = valve
         self._pump = pump
+        self._measured = measured
         self._flow = 0.0
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Loss, shape (1,), for the pump law's measurements `y`."""
         flow = float(y[-1])
-        pressure = float(self._pump.step(y, reference)[0])
+        pressure = float(self._pump.step(y[: self._measured], reference)[0])
         self._flow = abs(flow) * flow
         least, greatest = self._valve.open_loss, self._valve.shut_loss
         if pressure * flow >= 0:
@@ -129,3 +119,53 @@ class ClippedValve:
         """Forget the past."""
         self._flow = 0.0
         self._pump.reset()
+
+
+@dataclass(frozen=True, slots=True)
+class OnOffValveDesign:
+    """The on-off valve as a law of a configuration; parameters as in `OnOffValve`."""
+
+    threshold_rad_m_s2: NotNegative = 0.0
+    sample_time_s: SampleTime = 0.1
+    kind: Literal["valve_on_off"] = "valve_on_off"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the law for a plant."""
+        make = partial(OnOffValve, _range(plant), self.threshold_rad_m_s2, self.sample_time_s)
+        return BuiltLaw(make, STATES, commands=(VALVE,))
+
+
+@dataclass(frozen=True, slots=True)
+class ClippedValveDesign:
+    """A valve in the stead of a pump, as a law of a configuration.
+
+    Parameters
+    ----------
+    pump : LawDesign
+        The law whose pressure it makes as far as a throttle can.
+    """
+
+    pump: LawDesign
+    kind: Literal["valve_clipped"] = "valve_clipped"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design both laws for a plant."""
+        valve = _range(plant)
+        try:
+            pump = self.pump.build(plant)
+        except ParameterError as error:
+            problems = [(f"pump.{name}".rstrip("."), reason) for name, reason in error.problems]
+            raise ParameterError("", problems) from error
+        if pump.commands != (PRESSURE,):
+            raise ParameterError("", [("pump", "must be a law that drives a pump")])
+
+        def make() -> Controller:
+            return ClippedValve(valve, pump.controller(), len(pump.measured))
+
+        return BuiltLaw(make, (*pump.measured, _FLOW), commands=(VALVE,))
+
+
+def _range(plant: DesignPlant) -> ValveRange:
+    if plant.valve is None:
+        raise ParameterError("", [("kind", "throttles a valve, but the vessel has none")])
+    return plant.valve

@@ -5,9 +5,119 @@ Both losses are quadratic in the flow speed, so the models take one number, the 
 valve is well below atmospheric. A closed valve (an air spring, or a locked tank) is not modelled.
 """
 
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import Positive, Problem, Range, range_problems, refuse
 
 AIR_DENSITY_KG_M3 = 1.225
+STOPPING_S = 1e-3
+"""A valve that stops the water faster is as good as closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class ValveRange:
+    """What a valve can do.
+
+    Parameters
+    ----------
+    open_loss, shut_loss : float
+        Least and greatest loss in Pa per (m/s)^2 of dh/dt.
+
+    Raises
+    ------
+    ValueError
+        If the losses are negative or not in order.
+    """
+
+    open_loss: float
+    shut_loss: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.open_loss < self.shut_loss < math.inf:
+            raise ValueError(
+                f"a valve needs 0 <= open_loss < shut_loss, got {self.open_loss}, {self.shut_loss}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Valve:
+    """Valve of a semi-active tank, with its actuator.
+
+    Parameters
+    ----------
+    kind : str
+        "duct": a gate in the duct. "air": an orifice in the air pipe between the reservoirs.
+    opening_time_s : float
+        From shut to open, and back.
+    leakage : float
+        Open share that is left when it is shut.
+    fail_position : str
+        "open" or "shut": where it goes without a command or power.
+    pipe_area_m2 : float, optional
+        Of an air valve, fully open.
+    discharge_coefficient : float
+        Of an air valve, see `air_valve_loss`.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or `pipe_area_m2` does not go with the kind.
+    """
+
+    kind: Literal["air", "duct"]
+    opening_time_s: Annotated[float, Range(least=0.05, most=60)]
+    leakage: Annotated[float, Range(above=0, below=1)]
+    fail_position: Literal["open", "shut"] = "open"
+    pipe_area_m2: Positive | None = None
+    discharge_coefficient: Annotated[float, Range(above=0, most=1)] = 0.6
+
+    def __post_init__(self) -> None:
+        problems = range_problems(self)
+        if self.kind == "air" and self.pipe_area_m2 is None:
+            problems.append(("pipe_area_m2", "is required but missing: kind is air"))
+        if self.kind == "duct" and self.pipe_area_m2 is not None:
+            problems.append(("pipe_area_m2", "is for kind: air; a gate in the duct has its area"))
+        refuse("valve", problems)
+
+    @property
+    def fail_opening(self) -> float:
+        """Opening of the fail position."""
+        return 1.0 if self.fail_position == "open" else 0.0
+
+    def loss(self, tank: Tank, opening: float) -> float:
+        """Loss in Pa per (m/s)^2 of dh/dt at an opening from 0, shut but for the leakage, to 1."""
+        share = self.leakage + (1 - self.leakage) * opening
+        if self.pipe_area_m2 is None:
+            return duct_valve_loss(tank, share)
+        return air_valve_loss(tank, self.pipe_area_m2, share, self.discharge_coefficient)
+
+    def opening(self, tank: Tank, loss: float) -> float:
+        """The opening, 0 to 1, with the loss nearest to the one given."""
+        if self.pipe_area_m2 is None:
+            area_ratio = tank.reservoir_area_m2 / tank.duct_area_m2
+            speed_ratio = math.sqrt(2 * loss / tank.density_kg_m3)
+            share = area_ratio / (area_ratio + speed_ratio)
+        else:
+            least_loss = air_valve_loss(tank, self.pipe_area_m2, 1.0, self.discharge_coefficient)
+            share = math.sqrt(least_loss / loss) if loss > least_loss else 1.0
+        return min(max((share - self.leakage) / (1 - self.leakage), 0.0), 1.0)
+
+    def range(self, tank: Tank) -> ValveRange:
+        """Losses of the valve, open and shut."""
+        return ValveRange(self.loss(tank, 1.0), self.loss(tank, 0.0))
+
+
+def valve_problems(tank: Tank, valve: Valve) -> list[Problem]:
+    """Why a tank can't have a valve: it must let some water pass."""
+    speed_m_s = tank.natural_frequency_rad_s * tank.level_limit_m
+    inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
+    if valve.loss(tank, 0.0) * speed_m_s * STOPPING_S < inertia_pa_s2_m:
+        return []
+    reason = f"would stop the water within {1e3 * STOPPING_S:g} ms, as a closed one: raise it"
+    return [("leakage" if valve.pipe_area_m2 is None else "pipe_area_m2", reason)]
 
 
 def duct_valve_loss(tank: Tank, opening: float) -> float:

@@ -19,7 +19,7 @@ from utank_hil.canbus import (
     PumpCommand,
     RetuningState,
 )
-from utank_hil.control.interface import Controller, Plans, StartsAnew
+from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
@@ -32,6 +32,7 @@ from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
+from utank_hil.runtime.valve_command import ValveCommander
 from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
@@ -89,6 +90,12 @@ class ControllerNode:
     catalogue : Catalogue
     statistics : LoopStatistics, optional
         Of the loop that drives this node, to be shown in the telemetry.
+    commands : tuple of str
+        What the controller commands, see `BuiltLaw`.
+    pump : bool
+        Whether the tank has a pump to be commanded.
+    valve : ValveCommander, optional
+        If the tank has a valve.
     retuning : AdaptiveController, optional
         The controller again, when it is one that retunes itself.
     sink : callable, optional
@@ -133,6 +140,9 @@ class ControllerNode:
         settings: ControllerSettings,
         catalogue: Catalogue,
         *,
+        commands: tuple[str, ...] = (PRESSURE,),
+        pump: bool = True,
+        valve: ValveCommander | None = None,
         retuning: AdaptiveController | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
@@ -154,7 +164,16 @@ class ControllerNode:
         self._sink = sink
         self._event_sink = event_sink
         self._events_sent = 0
-        self.inbox = Inbox(catalogue, settings.configuration_version, settings.level_limit_m)
+        self._law_commands = commands
+        self._pump = pump
+        self._valve = valve
+        self.inbox = Inbox(
+            catalogue,
+            settings.configuration_version,
+            settings.level_limit_m,
+            pump=pump,
+            valve=valve is not None,
+        )
         self._catalogue_version = catalogue.version
         self._level = level
         self._drive_sequence = DriveSequence()
@@ -166,7 +185,7 @@ class ControllerNode:
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
         self._row = np.zeros(len(SIGNALS))
-        self._applied = np.zeros(1)
+        self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
@@ -174,7 +193,7 @@ class ControllerNode:
         self.start_ns = self.last_ns = 0
         self._observed_cycles = 0
         self._frames_sent = 0
-        self._law_pa = 0.0
+        self._law_pa = self._law_loss = 0.0
         self._law_failed = self._law_raised = False  # raised: until the operator resets
         self.law_error = ""
         self.command_pa = 0.0
@@ -243,9 +262,9 @@ class ControllerNode:
         return frames
 
     def stop(self, now_ns: int) -> Iterable[Frame]:  # noqa: ARG002
-        """Leave the pump at zero: the last command before the node goes."""
+        """Leave the pump at zero, the valve at its fail position: the last commands of the node."""
         self.command_pa = 0.0
-        return [self._command_frame(ControlWord.QUICK_STOP)]
+        return self._command_frames(ControlWord.QUICK_STOP, follow=False)
 
     def _estimate(self, now_ns: int) -> None:
         """Level and its rate from measurements, or from the model while one is missing."""
@@ -264,20 +283,27 @@ class ControllerNode:
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         if seen.reset_edge:
             self._drive_sequence.request_reset()
+        if self._valve is not None:
+            self._valve.observe(self.inbox, seen, now_ns)
+            if seen.reset_edge:
+                self._valve.request_reset()
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
         due = self._samples.due(now_ns)
         if due:
-            self._applied[0] = self._limiter.mean_since_last_call()
+            self._note_applied()
         try:
             self._start_anew()
             if not due:
                 return
-            self._law_pa = self._answer(now_ns)
-            if not math.isfinite(self._law_pa):
+            self._law_pa, self._law_loss = self._answer(now_ns)
+            if not math.isfinite(self._law_pa + self._law_loss):
                 self._law_failed = True
-                self.law_error = self.law_error or f"its answer is {self._law_pa:g} Pa"
+                wrong = f"{self._law_pa:g} Pa"
+                if math.isfinite(self._law_pa):
+                    wrong = f"a valve loss of {self._law_loss:g}"
+                self.law_error = self.law_error or f"its answer is {wrong}"
                 self._controller.reset()
             elif not self._law_raised:
                 self._law_failed = False
@@ -286,10 +312,21 @@ class ControllerNode:
             self.law_error = self.law_error or f"{type(error).__name__}: {error}"
         if self._law_failed:
             self._law_pa = 0.0
+        elif self._valve is not None:
+            self._valve.ask(self._law_loss)
         if self._retuning is not None and self._event_sink is not None:
             for event in self._retuning.events[self._events_sent :]:
                 self._event_sink(event, self.start_ns)
                 self._events_sent += 1
+
+    def _note_applied(self) -> None:
+        """Keep what left, and what was done of it, since the last answer."""
+        mean_pa = self._limiter.mean_since_last_call()
+        for index, name in enumerate(self._law_commands):
+            if name == VALVE and self._valve is not None:
+                self._applied[index] = self._valve.applied_loss(self.inbox)
+            else:
+                self._applied[index] = mean_pa
 
     def _start_anew(self) -> None:
         """Reset a law that asks for it when an operator arms or resets, and one that raised."""
@@ -301,8 +338,8 @@ class ControllerNode:
             self._law_failed = self._law_raised = False
             self._controller.reset()
 
-    def _answer(self, now_ns: int) -> float:
-        """The law's pressure for the newest measurement."""
+    def _answer(self, now_ns: int) -> tuple[float, float]:
+        """The law's pressure and valve loss for the newest measurement."""
         # the command that left since the last answer: anti-windup and bumpless take-over
         if self._answered:
             self._controller.applied(self._applied.copy())  # a law may keep it
@@ -315,11 +352,15 @@ class ControllerNode:
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )
         self._answered = True
-        return float(self._controller.step(self._measure(self.inbox, self._level))[0])
+        answer = self._controller.step(self._measure(self.inbox, self._level))
+        answered = dict(zip(self._law_commands, answer, strict=False))
+        return float(answered.get(PRESSURE, 0.0)), float(answered.get(VALVE, 0.0))
 
     def _limit(self) -> None:
         """Turn the law's pressure, or zero, into a permitted one."""
         demand, limiter, level = self.supervisor.demand, self._limiter, self._level
+        if not self._pump:
+            return
         if demand is _CONTROL:
             share = DEGRADED_SHARE if self.supervisor.degraded else 1.0
             self.command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
@@ -337,7 +378,7 @@ class ControllerNode:
             word = self._drive_sequence.next_word(
                 self.inbox.drive_state, wanted=supervisor.drive_wanted
             )
-            frames.append(self._command_frame(word))
+            frames += self._command_frames(word, follow=supervisor.demand is _CONTROL)
         if self._status_schedule.due(now_ns):
             frames.append(
                 self._status.frame(
@@ -358,10 +399,15 @@ class ControllerNode:
             )
         return frames
 
-    def _command_frame(self, word: ControlWord) -> Frame:
-        return self._commands.frame(
-            PumpCommand(self.command_pa, word, self._settings.command_timeout_s)
-        )
+    def _command_frames(self, word: ControlWord, *, follow: bool) -> list[Frame]:
+        """The next commands of what is on board."""
+        frames = []
+        if self._pump:
+            timeout_s = self._settings.command_timeout_s
+            frames.append(self._commands.frame(PumpCommand(self.command_pa, word, timeout_s)))
+        if self._valve is not None:
+            frames.append(self._valve.frame(self.inbox, follow=follow))
+        return frames
 
     def _show(self) -> None:
         """Hand one telemetry row to the sink."""

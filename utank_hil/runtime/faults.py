@@ -11,7 +11,7 @@ from typing import Final, TypeAlias
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
-from utank_hil.runtime.observations import Observations
+from utank_hil.runtime.observations import VALVE_OFF, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 
 Judgement: TypeAlias = Callable[[Observations, SafetyLimits], bool]
@@ -113,13 +113,13 @@ FAULTS: Final = (
     ),
     _row(
         Fault.VERSION_MISMATCH,
-        "Drive, sensors or panel run another message catalogue or another ship configuration.",
+        "A node runs another message catalogue or another ship configuration.",
         "Compare the versions in the heartbeats; give all nodes the same catalogue and ship file.",
         Condition(
             Reaction.STOP,
-            "a version in the heartbeats of drive or sensors differs, or none was received",
+            "a version in the heartbeats of drive, sensors or valve differs, or none was received",
             lambda seen, _: not seen.versions_match,
-            awaited=7,
+            awaited=8,
         ),
         Condition(
             Reaction.REFUSE,
@@ -158,6 +158,44 @@ FAULTS: Final = (
                 seen.drive_age_ms > limits.drive_age_ms or seen.echo_age_ms > limits.echo_age_ms
             ),
             awaited=6,
+        ),
+    ),
+    _row(
+        Fault.VALVE_SILENT,
+        "The tank's valve sends no status, or does not receive the commands.",
+        "Check the valve's supply and bus connection. If VALVE_STATUS arrives but its command echo "
+        "stands still, the valve does not accept VALVE_CMD.",
+        Condition(
+            Reaction.STOP,
+            "status older than {valve_age_ms:g} ms, or no new command echo for over "
+            "{valve_echo_age_ms:g} ms",
+            lambda seen, limits: (
+                seen.valve_age_ms > limits.valve_age_ms
+                or seen.valve_echo_age_ms > limits.valve_echo_age_ms
+            ),
+            awaited=7,
+        ),
+    ),
+    _row(
+        Fault.VALVE_FAULT,
+        "The tank's valve reports a fault, or does not follow.",
+        "Read the valve's fault in VALVE_STATUS and remove its cause.",
+        Condition(
+            Reaction.STOP,
+            "valve reports a fault, or is not following for over {valve_follows_within_ms:g} ms",
+            lambda seen, limits: (
+                seen.valve_fault or seen.valve_out_ms > limits.valve_follows_within_ms
+            ),
+        ),
+    ),
+    _row(
+        Fault.VALVE_NOT_FOLLOWING,
+        "The tank's valve is not where it was told to be.",
+        "Look for what blocks the valve; compare its time from shut to open with the ship file.",
+        Condition(
+            Reaction.STOP,
+            f"more than {VALVE_OFF:.0%} of its way off for over {{valve_off_within_ms:g}} ms",
+            lambda seen, limits: seen.valve_off_ms > limits.valve_off_within_ms,
         ),
     ),
     _row(

@@ -25,6 +25,8 @@ from utank_hil.canbus import (
     SensorPump,
     SensorTank,
     Switch,
+    ValveState,
+    ValveStatus,
 )
 from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
@@ -35,14 +37,15 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
+_ENABLED = DriveState.OPERATION_ENABLED
 
 LEVEL_MARGIN: Final = 1.1
 """A level farther beyond full or empty than that, for gauges and sloshing, is no measurement."""
 SUM_SHARE: Final = 0.5
 """Nor are levels whose sum is more than this share of a full reservoir: the water stays."""
 
-_MATCHED: Final = (Address.DRIVE, Address.SENSORS)
-"""Nodes whose versions must equal the controller's before arming."""
+_ABSENT_NS: Final = 1 << 62
+"""Time at which what is not on board was last heard: it is never late."""
 
 _M = TypeVar("_M", bound=tuple[Any, ...])
 _Accept = Callable[[Frame], tuple[Any, ...] | None]
@@ -59,6 +62,8 @@ class Inbox:
         Of the controller, to compare with the others'.
     level_limit_m : float
         Level at which a reservoir is full or empty; infinite if it is not known.
+    pump, valve : bool
+        Whether the ship has a pump, and a valve, to be heard.
 
     Attributes
     ----------
@@ -71,13 +76,18 @@ class Inbox:
     pressure_pa : float
         Measured across the pump, received at `pump_ns`.
     drive_state, drive_fault : DriveState or None, DriveFault or None
-        Received at `drive_ns`; the echo of a new command at `echo_ns`.
+        Received at `drive_ns`; the echo of a new command at `echo_ns`. Without a pump the drive
+        counts as enabled and is never late.
     power_w : float
         Electric power the drive takes.
+    valve_opening : float
+        As the valve last measured it, at `valve_ns`; 1, open, before and where there is none.
+    valve_state : ValveState or None
+        State the valve last reported; the echo of a new command came at `valve_echo_ns`.
     orders : Orders
         What the operator wants.
     versions_match : bool
-        Drive and sensors run the controller's catalogue and configuration.
+        Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
         So does the operator's panel.
     conflict_ns : int
@@ -87,7 +97,13 @@ class Inbox:
     """
 
     def __init__(
-        self, catalogue: Catalogue, configuration_version: int, level_limit_m: float = math.inf
+        self,
+        catalogue: Catalogue,
+        configuration_version: int,
+        level_limit_m: float = math.inf,
+        *,
+        pump: bool = True,
+        valve: bool = False,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
@@ -95,13 +111,20 @@ class Inbox:
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
         self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
-        self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
-        self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
-        self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
+        self._drive_1: Receiver[DriveStatus1] | None = None
+        matched = [Address.SENSORS]
+        if pump:
+            matched.append(Address.DRIVE)
+            self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
+            self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
+            self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
+        if valve:
+            matched.append(Address.VALVE)
+            self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
         self.orders = Orders(catalogue.receiver(OperatorCommand))
         self._subscriptions[self.orders.can_id] = self.orders.accept, self.orders.obey
         self._matching: dict[int, bool] = {}
-        for address in _MATCHED:
+        for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
@@ -112,11 +135,15 @@ class Inbox:
         self.port_level_m = self.starboard_level_m = 0.0
         self.pressure_pa = self.power_w = 0.0
         self.high_level = False
-        self.drive_state: DriveState | None = None
+        self.valve_opening = 1.0
+        self.valve_state: ValveState | None = None
+        self.valve_ns = self.valve_echo_ns = NEVER_HEARD_NS
+        self._valve_echo: int | None = None
+        self.drive_state = None if pump else _ENABLED
         self.drive_fault: DriveFault | None = DriveFault.NONE
         self.versions_match = self.panel_matches = False
-        self.motion_ns = self.tank_ns = self.pump_ns = NEVER_HEARD_NS
-        self.drive_ns = self.echo_ns = NEVER_HEARD_NS
+        self.motion_ns = self.tank_ns = NEVER_HEARD_NS
+        self.pump_ns = self.drive_ns = self.echo_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
         self._echo: int | None = None
         self.tank_cycles = self._cycles = self._tank_lost = 0
         self._tank_frame_ns = NEVER_HEARD_NS
@@ -133,7 +160,8 @@ class Inbox:
     @property
     def protection_valid(self) -> bool:
         """Whether the messages that control stands on keep arriving intact and in order."""
-        return self._motion.valid and self._tank.valid and self._drive_1.valid
+        drive_valid = self._drive_1 is None or self._drive_1.valid
+        return self._motion.valid and self._tank.valid and drive_valid
 
     def _subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
         """Hand the accepted messages of a receiver to `handle`, with the time they came."""
@@ -199,6 +227,14 @@ class Inbox:
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self.drive_fault = status.fault
         self.power_w = status.bus_voltage_v * status.current_a
+
+    def _on_valve(self, status: ValveStatus, now_ns: int) -> None:
+        self.valve_state = status.state
+        if math.isfinite(status.opening):
+            self.valve_opening, self.valve_ns = status.opening, now_ns
+        if status.command_echo is not None and status.command_echo != self._valve_echo:
+            self._valve_echo = status.command_echo
+            self.valve_echo_ns = now_ns
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
         versions = (beat.catalogue_version, beat.configuration_version)

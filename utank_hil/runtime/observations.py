@@ -19,6 +19,9 @@ CONFLICT_NS: Final = 10_000_000_000
 """A second sender of the controller's address is gone when it has been silent for so long."""
 _ALL_LATE: Final = 0x3FF
 
+VALVE_OFF: Final = 0.15
+"""Part of its way that a valve may be from where the commands should have brought it."""
+
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
 _DRIVE_FAULT: Final = DriveState.FAULT
@@ -45,12 +48,20 @@ class Observations:
         Time since arming was accepted; the supervisor counts it.
     drive_fault : bool
         The drive's status reports a fault.
+    valve_age_ms, valve_echo_age_ms : float
+        Time since the valve's status, and since its echo of a new command; zero without a valve.
+    valve_fault : bool
+        The valve's status reports a fault.
+    valve_out_ms : float
+        Time for which the valve does not follow, while it should.
+    valve_off_ms : float
+        Time for which it is not where the commands should have brought it.
     link_lost : bool
         The bus could not be read or written in the last command cycle.
     address_conflict : bool
         Another node sends with the controller's address, or has within `CONFLICT_NS`.
     versions_match : bool
-        Drive and sensors run the controller's catalogue and configuration.
+        Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
         So does the operator's panel.
     bus_load : float
@@ -87,6 +98,11 @@ class Observations:
     drive_out_ms: float = 0.0
     arming_ms: float = 0.0
     drive_fault: bool = False
+    valve_age_ms: float = 0.0
+    valve_echo_age_ms: float = 0.0
+    valve_fault: bool = False
+    valve_out_ms: float = 0.0
+    valve_off_ms: float = 0.0
     link_lost: bool = False
     address_conflict: bool = False
     versions_match: bool = True

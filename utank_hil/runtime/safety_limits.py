@@ -40,6 +40,12 @@ class SafetyLimits:
         Longest age of the drive's status, and of its last new command echo.
     drive_enabled_within_ms : float
         Longest time the drive may be out of operation enabled while armed.
+    valve_age_ms, valve_echo_age_ms : float
+        Longest age of the valve's status, and of its last new command echo.
+    valve_follows_within_ms : float
+        Longest time the valve may not follow while armed.
+    valve_off_within_ms : float
+        Longest time it may be elsewhere than where the commands should have brought it.
     panel_age_to_arm_ms, panel_age_armed_ms : float
         Longest silence of the operator panel for arming, and while armed.
     arming_timeout_ms : float
@@ -66,6 +72,10 @@ class SafetyLimits:
     drive_age_ms: _Silence = 60.0
     echo_age_ms: _Silence = 100.0
     drive_enabled_within_ms: _Silence = 40.0
+    valve_age_ms: _Silence = 60.0
+    valve_echo_age_ms: _Silence = 100.0
+    valve_follows_within_ms: _Silence = 100.0
+    valve_off_within_ms: _Silence = 300.0
     panel_age_to_arm_ms: _Silence = 600.0
     panel_age_armed_ms: _Patience = 5000.0
     arming_timeout_ms: _Patience = 2000.0

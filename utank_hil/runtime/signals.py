@@ -12,6 +12,7 @@ _SOURCES: Final = {
     "pressure_command_pa": "command_pa",
     "pressure_actual_pa": "inbox.pressure_pa",
     "pump_power_w": "inbox.power_w",
+    "valve_opening": "inbox.valve_opening",
     "mode": "supervisor.mode",
     "fault": "fault",
     "bus_load": "seen.bus_load",

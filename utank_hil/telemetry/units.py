@@ -41,6 +41,7 @@ UNITS = (
     Unit("_m", "_m", 1.0, "Tank level, m", main=True),
     Unit("_nm", "_mnm", 1e-6, "Moment, MN m"),
     Unit("_w", "_kw", 1e-3, "Pump power, kW"),
+    Unit("_opening", "_opening_percent", 100.0, "Valve opening, %"),
     Unit("_load", "_load_percent", 100.0, "Bus load, %"),
     Unit("_s", "_ms", 1e3, "Loop timing, ms"),
     Unit("", "", 1.0, "Counts"),

@@ -1,0 +1,205 @@
+"""The valve of a semi-active tank: takes openings, judges them on its own, and moves.
+
+It goes to its fail position when commands stop, by the timeout that came with the last one, and
+when its power fails; and it stays there: it follows only after it was told the fail position once
+more. So neither a valve that starts anew nor one whose fault was reset follows by itself.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from firmware_sim.plant import Plant
+from utank_hil.canbus import (
+    Address,
+    Catalogue,
+    FailPosition,
+    Frame,
+    ValveCommand,
+    ValveControl,
+    ValveFault,
+    ValveState,
+    ValveStatus,
+)
+from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import Valve
+from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.tick import TICK_NS, TICK_S
+
+NANOSECONDS: Final = 1e-9
+LONGEST_TIMEOUT_S: Final = 0.1
+MISCODED_COMMANDS_TO_TRIP: Final = 5
+STUCK_OFF: Final = 0.05
+"""A valve that is so far from where it shall be must move."""
+STUCK_NS: Final = 200_000_000
+"""Time in which it must."""
+_AT_END: Final = 1e-3
+
+
+class ValveNode:
+    """The valve and its actuator.
+
+    Parameters
+    ----------
+    plant : Plant
+        Its valve loss is set.
+    tank : Tank
+    valve : Valve
+    catalogue : Catalogue
+    configuration_version : int
+        Sent in the heartbeat, for the controller to compare with its own.
+
+    Attributes
+    ----------
+    hears : frozenset of int
+        The valve command, see `Selective`.
+    opening : float
+        Where it is: 0 shut but for its leakage, 1 open.
+    stuck : bool
+        Fault to be tried out: set, it does not move.
+    powered : bool
+        Fault to be tried out: cleared, it is silent and moves to its fail position; set again, it
+        starts anew.
+    refused : int
+        Commands that it found wrong so far.
+    """
+
+    name = "valve"
+    period_ns = TICK_NS
+
+    def __init__(
+        self,
+        plant: Plant,
+        tank: Tank,
+        valve: Valve,
+        catalogue: Catalogue,
+        *,
+        configuration_version: int,
+    ) -> None:
+        self._plant = plant
+        self._tank = tank
+        self._valve = valve
+        self._catalogue = catalogue
+        self._configuration_version = configuration_version
+        self._most_step = TICK_S / valve.opening_time_s
+        self._fail_position = FailPosition[valve.fail_position.upper()]
+        self.opening = valve.fail_opening
+        self.stuck = False
+        self.powered = True
+        self.refused = 0
+        self._start()
+        self.hears = frozenset([self._commands.can_id])
+        plant.set_valve_loss(valve.loss(tank, self.opening))
+
+    def _start(self) -> None:
+        """Begin as newly switched on, wherever the valve stands."""
+        self._commands = self._catalogue.receiver(ValveCommand)
+        self._statuses = self._catalogue.transmitter(ValveStatus)
+        self._status_ticks = self._statuses.cycle_ns // TICK_NS
+        self._housekeeping = Housekeeping(
+            Address.VALVE, self._catalogue, self._configuration_version
+        )
+        self._state = ValveState.FAIL_POSITION
+        self._fault = ValveFault.NONE
+        self._may_follow = False
+        self._resetting = True  # a bit that is set before we look is no edge
+        self._asked = self._valve.fail_opening
+        self._echo: int | None = None
+        self._accepted_ns = self._timeout_ns = 0
+        self._refused_in_a_row = 0
+        self._free_ns: int | None = None
+        self._moving = False
+        self._ticks = 0
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a command if it is intact and can be followed."""
+        if not self.powered or frame.can_id != self._commands.can_id:
+            return
+        command = self._commands.accept(frame)
+        if command is None:
+            # out of sequence it may ask for nothing, but it may say where to go
+            intact = self._commands.intact(frame)
+            if intact is not None and intact.control is ValveControl.FAIL_POSITION:
+                self._go_to_fail_position()
+            return
+        if command.control is ValveControl.FAIL_POSITION:
+            # whatever else is wrong with it, it says where to go
+            self._go_to_fail_position()
+        # written so that NaN, not available, fails too
+        if not (
+            command.control is not None
+            and 0.0 <= command.opening <= 1.0
+            and 0.0 < command.timeout_s <= LONGEST_TIMEOUT_S
+        ):
+            self.refused += 1
+            self._refused_in_a_row += 1
+            if self._refused_in_a_row >= MISCODED_COMMANDS_TO_TRIP:
+                self._trip(ValveFault.COMMAND_REFUSED)
+            return
+        self._refused_in_a_row = 0
+        self._echo = self._commands.counter
+        self._accepted_ns = now_ns
+        self._timeout_ns = round(command.timeout_s / NANOSECONDS)
+        resetting = command.control is ValveControl.RESET
+        if resetting and not self._resetting and self._state is ValveState.FAULT:
+            self._state, self._fault = ValveState.FAIL_POSITION, ValveFault.NONE
+            self._may_follow = False
+            self._free_ns = now_ns  # it gets its time to move once more
+        self._resetting = resetting
+        if command.control is ValveControl.FOLLOW and self._may_follow:
+            self._state = ValveState.FOLLOWING
+            self._asked = command.opening
+
+    def _go_to_fail_position(self) -> None:
+        if self._state is not ValveState.FAULT:
+            self._state = ValveState.FAIL_POSITION
+            self._may_follow = True
+
+    def _trip(self, fault: ValveFault) -> None:
+        if self._state is not ValveState.FAULT:
+            self._state, self._fault = ValveState.FAULT, fault
+        self._may_follow = False
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Watch over the commands, move, report."""
+        self._plant.advance(now_ns)
+        if not self.powered:
+            self._start()
+            self._move(self._valve.fail_opening, now_ns)
+            return ()
+        if self._state is ValveState.FOLLOWING and now_ns - self._accepted_ns > self._timeout_ns:
+            self._trip(ValveFault.COMMAND_TIMEOUT)
+        following = self._state is ValveState.FOLLOWING
+        self._move(self._asked if following else self._valve.fail_opening, now_ns)
+        frames = []
+        if self._ticks % self._status_ticks == 0:
+            frames.append(self._status_frame())
+        frames.extend(self._housekeeping.frames(now_ns, faulted=self._state is ValveState.FAULT))
+        self._ticks += 1
+        return frames
+
+    def _move(self, target: float, now_ns: int) -> None:
+        """Move towards the target, and look whether it can."""
+        before = self.opening
+        if not self.stuck:
+            step = min(max(target - before, -self._most_step), self._most_step)
+            self.opening = min(max(before + step, 0.0), 1.0)
+            self._plant.set_valve_loss(self._valve.loss(self._tank, self.opening))
+        self._moving = self.opening != before
+        if self._free_ns is None or self._moving or abs(target - before) < STUCK_OFF:
+            self._free_ns = now_ns
+        elif self.powered and now_ns - self._free_ns > STUCK_NS:
+            self._trip(ValveFault.STUCK)
+
+    def _status_frame(self) -> Frame:
+        return self._statuses.frame(
+            ValveStatus(
+                opening=self.opening,
+                state=self._state,
+                fault=self._fault,
+                command_echo=self._echo,
+                fail_position=self._fail_position,
+                moving=self._moving,
+                open_limit=self.opening > 1 - _AT_END,
+                shut_limit=self.opening < _AT_END,
+            )
+        )
