@@ -54,7 +54,7 @@ def test_every_shipped_configuration_loads_again_from_what_is_said_of_it(
     again = loaded_again(content(ran, tmp_path), model, tmp_path)
     assert content(again, tmp_path) == content(ran, tmp_path)
     if not describe("test", ran, tmp_path, options={})["data"]:  # its path is another
-        assert again == ran
+        assert again.model_dump() == ran.model_dump()
 
 
 def test_measured_directions_load_again_too(tmp_path: Path) -> None:
@@ -136,7 +136,8 @@ def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ra
     told = json.loads((tmp_path / "bench.json").read_text())
     again = loaded_again(told["configuration"], Scenario, tmp_path)
     ran = load_config(PATTI_B, Scenario)
-    assert again == ran.model_copy(update={"seed": 3, "duration_s": 20.0, "settle_s": 10.0})
+    changed = ran.model_copy(update={"seed": 3, "duration_s": 20.0, "settle_s": 10.0})
+    assert again.model_dump() == changed.model_dump()
     assert told["options"]["seed"] == told["seed"] == 3
     picture = json.loads(Image.open(tmp_path / "bench.png").text["Description"])
     recording = read_about(tmp_path / "bench.rrd")
