@@ -11,6 +11,7 @@ from typing import Any
 
 from tools.evidence.parts import PARTS
 from tools.evidence.record import Record, read
+from tools.studies.shipped_scenarios import HEADINGS, cells
 from utank_hil.thesis.figure import Verdict, printed_text
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -165,6 +166,14 @@ def thesis_statements(result: dict[str, Any]) -> Rows:
     ]
 
 
+def scenarios(result: dict[str, dict[str, Any]]) -> Rows:
+    """Every run of every shipped scenario."""
+    return [
+        list(HEADINGS),
+        *(cells(name, run, row) for name, rows in result.items() for run, row in rows.items()),
+    ]
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -172,6 +181,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "printed laws": ("linear_law_tables", printed_laws),
     "printed index": ("linear_law_tables", printed_index),
     "step costs": ("cost_controllers", step_costs),
+    "shipped scenarios": ("shipped_scenarios", scenarios),
     "errata terms": ("thesis_derivation", errata_terms),
     "thesis figures": ("thesis_figures", thesis_figures),
     "thesis numbers": ("thesis_figures", thesis_numbers),

@@ -71,6 +71,12 @@ PARTS = (
         30,
     ),
     Part(
+        "shipped_scenarios",
+        "python -m tools.studies.shipped_scenarios --json",
+        "every shipped scenario on the bench, beside the linear plant",
+        60,
+    ),
+    Part(
         "identification_bound",
         "python -m tools.studies.identification_bound --json",
         "identification in a storm against the Cramer-Rao bound",
