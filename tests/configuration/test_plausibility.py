@@ -55,11 +55,11 @@ def thousandfold(value: float) -> float:
         (FIRST, {"tank__height_m": 4880}, "tank.height_m", "4880 m in a tank 17.1 m wide"),
         (FIRST, {"tank__density_kg_m3": 1.0}, "tank.density_kg_m3", "no liquid's density"),
         (FIRST, {"ship__inertia_kg_m2": thousandth}, "ship.inertia_kg_m2",
-         "roll period of 0.4 s, short for a ship that holds a tank 17.1 m wide: it is in kg m2 "
-         "(in t m2 it would be 12.6 s)"),
+         "roll period of 0.4 s, short for a ship that holds a tank 17.1 m wide: inertia_kg_m2 is "
+         "in kg m2 (in t m2 it would be 12.6 s)"),
         (FIRST, {"ship__stiffness_nm_rad": thousandth}, "ship.stiffness_nm_rad",
-         "roll period of 397 s, long for a ship that holds a tank 17.1 m wide: it is in N m (in "
-         "kN m it would be 12.6 s)"),
+         "roll period of 397 s, long for a ship that holds a tank 17.1 m wide: stiffness_nm_rad is "
+         "in N m (in kN m it would be 12.6 s)"),
         (FIRST, {"ship__inertia_kg_m2": thousandth, "ship__stiffness_nm_rad": thousandth,
                  "ship__damping_nms_rad": thousandth}, "tank",
          "unless inertia_kg_m2 and stiffness_nm_rad are given in thousands (t m2, kN m)"),
@@ -124,6 +124,24 @@ def test_what_is_unusual_is_warned_of(
     refused, warned = told(tmp_path, vessel(FIRST, **changes), Vessel)
     assert refused == {}
     assert words in warned[key]
+
+
+@pytest.mark.parametrize(
+    ("hull", "key"),
+    [
+        ({"roll_period_s": 0.4}, "ship.roll_period_s"),
+        ({"beam_m": 0.02, "draught_m": 0.01, "length_m": 1.0}, "ship.beam_m"),
+        ({"inertia_kg_m2": 1.9e6}, "ship.inertia_kg_m2"),
+        ({"roll_period_s": 12.6, "damping_ratio": 3.0}, "ship.damping_ratio"),
+    ],
+)
+def test_what_can_not_be_is_refused_at_the_key_that_is_written(
+    tmp_path: Path, hull: dict[str, float], key: str
+) -> None:
+    content = vessel(FIRST)
+    content["ship"] = {"displacement_t": 41e3, "gm_m": 1.2, **hull}
+    refused, _ = told(tmp_path, content, Vessel)
+    assert set(refused) == {key}
 
 
 @pytest.mark.parametrize("ship", SHIPS)

@@ -14,6 +14,7 @@ from utank_hil.analysis.loop.robustness import Robustness
 from utank_hil.analysis.tank_design import tank_figures
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.gate import JudgedLaw
+from utank_hil.commands.remedy import remedy
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
@@ -44,6 +45,7 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
         "robustness": None if report is None else _finite(asdict(report)),
         "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
         "failures": list(judged.failures),
+        "remedy": remedy(judged),
         "accepted": judged.accepted,
     }
 
@@ -198,8 +200,15 @@ def _print_verdict(console: Console, judged: JudgedLaw) -> None:
     if judged.failures:
         verdict = "accepted by the configuration" if judged.accepted else "refused"
         console.print(f"This law is {verdict}.")
+        _print_remedy(console, judged)
     else:
         console.print(_met(judged.law))
+
+
+def _print_remedy(console: Console, judged: JudgedLaw, whose: str = "") -> None:
+    found = remedy(judged)
+    if found is not None:
+        console.print(f"[yellow]remedy{whose}:[/yellow] {escape(found)}", soft_wrap=True)
 
 
 def print_collection(kind: str, collection: Any, judged: Judged) -> None:
@@ -242,6 +251,7 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     for each, one in judged.items():
         for failure in one.failures:
             console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}", soft_wrap=True)
+        _print_remedy(console, one, f" of {escape(each)}")
 
 
 def _verdict(judged: JudgedLaw) -> str:

@@ -117,7 +117,7 @@ def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
         if judged.step_s > MOST_STEP_S:
             fail(f"{config.name}: the law's step is too slow for the loop: make it faster")
         fail(
-            f"{config.name}: the law misses its margins; redesign it, or set "
-            "accept_low_margins: true"
+            f"{config.name}: the law misses its margins; redesign it (utank-hil check may name a "
+            "weight that passes), or set accept_low_margins: true"
         )
     return judged.law

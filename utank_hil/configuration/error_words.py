@@ -67,7 +67,7 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
     if kind in ("too_short", "too_long"):
         most = kind == "too_long"
         bound = f"{context['max_length']} at most" if most else f"{context['min_length']} or more"
-        return f"must have {bound}, got {context['actual_length']}"
+        return f"must have {bound}, got {len(value)}"
     if kind in WANTED:
         return f"must be {WANTED[kind]}, got {_shown(value)}{_remedy(WANTED[kind], value)}"
     words = str(error["msg"]).removeprefix("Value error, ")

@@ -23,6 +23,7 @@ from utank_hil.configuration.plausibility.hull import (
     of_ship,
     of_sizes,
     of_tank,
+    of_weight,
 )
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.pump import Pump
@@ -80,6 +81,7 @@ def _stages(
     """The parts of a vessel in an order in which each is judged by those before it."""
     yield partial(of_sizes, tank)
     yield partial(of_ship, ship, tank)
+    yield partial(of_weight, ship, tank)
     yield partial(of_tank, ship, tank)
     if pump is not None:
         yield partial(of_pump, tank, pump)

@@ -39,16 +39,16 @@ def of_ship(ship: RollShip, tank: Tank) -> Iterator[Figure]:
         period_s / math.sqrt(tank.width_m),  # ships' periods rise with the root of their size
         0.35,
         0.9,
-        f"gives a roll period of {period_s:.2g} s, short {beam}: it is in kg m2 (in t m2 it would "
-        f"be {period_s * _PER_1000:.3g} s), and stiffness_nm_rad in N m",
+        f"gives a roll period of {period_s:.2g} s, short {beam}: inertia_kg_m2 is in kg m2 (in t "
+        f"m2 it would be {period_s * _PER_1000:.3g} s), stiffness_nm_rad in N m",
     )
     yield Figure(
         "ship.stiffness_nm_rad",
         period_s / math.sqrt(tank.width_m),
         warned_above=12,
         refused_above=25,
-        high=f"gives a roll period of {period_s:.3g} s, long {beam}: it is in N m (in kN m it "
-        f"would be {period_s / _PER_1000:.3g} s), and inertia_kg_m2 in kg m2",
+        high=f"gives a roll period of {period_s:.3g} s, long {beam}: stiffness_nm_rad is in N m "
+        f"(in kN m it would be {period_s / _PER_1000:.3g} s), inertia_kg_m2 in kg m2",
     )
     damping = ship.damping_nms_rad / (2 * ship.inertia_kg_m2 * frequency)
     yield Figure(
@@ -68,14 +68,20 @@ def of_ship(ship: RollShip, tank: Tank) -> Iterator[Figure]:
         high=f"is a damping ratio of {slowed:.3g} at 10 degrees of roll; hulls have up to 0.1 or "
         "so: it is in N m s2 per rad2",
     )
-    if ship.displacement_n > 0:
-        gyration_m = math.sqrt(ship.inertia_kg_m2 * GRAVITY_M_S2 / ship.displacement_n)
-        weight = (
-            f"gives a radius of gyration of {gyration_m:.3g} m {beam}; it is about 0.4 of the "
-            "beam: displacement_n is a weight in newtons, not a mass"
-        )
-        share = gyration_m / tank.width_m
-        yield Figure("ship.displacement_n", share, 0.05, 0.2, weight, 1.2, 5, weight)
+
+
+def of_weight(ship: RollShip, tank: Tank) -> Iterator[Figure]:
+    """Radius of gyration, where the weight is known."""
+    if ship.displacement_n <= 0:
+        return
+    gyration_m = math.sqrt(ship.inertia_kg_m2 * GRAVITY_M_S2 / ship.displacement_n)
+    weight = (
+        f"gives a radius of gyration of {gyration_m:.3g} m for a ship that holds a tank "
+        f"{tank.width_m:g} m wide; it is about 0.4 of the "
+        "beam: displacement_n is a weight in newtons, not a mass"
+    )
+    share = gyration_m / tank.width_m
+    yield Figure("ship.displacement_n", share, 0.05, 0.2, weight, 1.2, 5, weight)
 
 
 def of_tank(ship: RollShip, tank: Tank) -> Iterator[Figure]:
