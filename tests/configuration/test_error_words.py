@@ -183,7 +183,7 @@ def scenario(**changes: Any) -> str:
         ({"operator": "arm"}, "operator", "must be a list, got 'arm'"),
         ({"name": True}, "name", "must be text, got true or yes: put it in quotes"),
         ({"seed": 1.5}, "seed", "must be a whole number, got 1.5"),
-        ({"controllers": {}}, "controllers", "must have 1 or more"),
+        ({"controllers": {}}, "controllers", "must have 1 or more, got 0"),
         ({"controllers": {f"c{n}": PD for n in range(8)}}, "controllers",
          "must have 7 at most, got 8"),
         ({"durations": 5}, "durations", "is not a known key; did you mean duration_s?"),
