@@ -156,6 +156,22 @@ def test_figures_picture_and_recording_of_a_bench_hold_the_configuration_that_ra
 
 
 @pytest.mark.slow
+def test_figures_and_picture_of_a_design_hold_ship_and_scenario(tmp_path: Path) -> None:
+    vessel = CONFIGS / "ships" / "patti_b.yaml"
+    words = ["design", "tank", str(vessel), "--scenario", str(PATTI_B), "--out", str(tmp_path)]
+    result = CliRunner().invoke(app, [*words, "--json"])
+    assert result.exit_code == 0, result.output
+    told = json.loads((tmp_path / "tank.json").read_text())
+    again = loaded_again(told["configuration"], Vessel, tmp_path)
+    assert values(again) == values(load_config(vessel, Vessel))
+    scenario = loaded_again(told["scenario_configuration"], Scenario, tmp_path)
+    assert values(scenario) == values(load_config(PATTI_B, Scenario))
+    picture = json.loads(Image.open(tmp_path / "tank.png").text["Description"])
+    assert picture == {key: told[key] for key in picture}
+    assert picture["command"] == "design tank"
+
+
+@pytest.mark.slow
 def test_recording_of_a_run_holds_where_it_comes_from(tmp_path: Path) -> None:
     config = load_config(CONFIGS / "controllers" / "gpc.yaml", ControllerConfig)
     about = describe("run", config, tmp_path, options={})
