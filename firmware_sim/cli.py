@@ -13,40 +13,43 @@ with quietly_interruptible():
     from rich.console import Console
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from firmware_sim.external_drive import ExternalDrive
-    from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
-    from firmware_sim.scenario import Scenario
-    from firmware_sim.ship_side import NODE_NAMES, build_ship_side
-    from firmware_sim.truth import TRUTH, TruthRecorder
-    from utank_hil.analysis.motion.statistics import (
-        PumpStatistics,
-        RollStatistics,
-        pump_statistics,
-        roll_statistics,
-    )
-    from utank_hil.arrays import FloatArray
-    from utank_hil.canbus import SocketCanPort
-    from utank_hil.commands.common import (
-        Duration,
-        Json,
-        Version,
-        fail,
-        load,
-        new_app,
-        notes,
-    )
-    from utank_hil.commands.exit_codes import ExitCode
-    from utank_hil.commands.tables import print_table
-    from utank_hil.commands.timing import timing_table
-    from utank_hil.runtime import (
-        LoopStatistics,
-        Node,
-        RealTimeLoop,
-        heard_by,
-        real_time_scheduling,
-        stop_on_signals,
-    )
-    from utank_hil.telemetry.memory_log import MemoryLog
+    from utank_hil.commands.extras import extras_named
+
+    with extras_named():
+        from firmware_sim.external_drive import ExternalDrive
+        from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
+        from firmware_sim.scenario import Scenario
+        from firmware_sim.ship_side import NODE_NAMES, build_ship_side
+        from firmware_sim.truth import TRUTH, TruthRecorder
+        from utank_hil.analysis.motion.statistics import (
+            PumpStatistics,
+            RollStatistics,
+            pump_statistics,
+            roll_statistics,
+        )
+        from utank_hil.arrays import FloatArray
+        from utank_hil.canbus import SocketCanPort
+        from utank_hil.commands.common import (
+            Duration,
+            Json,
+            Version,
+            fail,
+            load,
+            new_app,
+            notes,
+        )
+        from utank_hil.commands.exit_codes import ExitCode
+        from utank_hil.commands.tables import print_table
+        from utank_hil.commands.timing import timing_table
+        from utank_hil.runtime import (
+            LoopStatistics,
+            Node,
+            RealTimeLoop,
+            heard_by,
+            real_time_scheduling,
+            stop_on_signals,
+        )
+        from utank_hil.telemetry.memory_log import MemoryLog
 
 app = new_app("Ship emulator, sensors, pump drive and operator panel on a CAN bus.")
 
@@ -155,4 +158,5 @@ def _figures(rows: FloatArray) -> tuple[RollStatistics, PumpStatistics]:
 
 def main() -> None:
     """Run the command line."""
-    app()
+    with extras_named():
+        app()

@@ -7,10 +7,9 @@ with the last one), and refuses a command outside its own limits, whatever the c
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from firmware_sim.drive_states import DriveStates
-from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -25,6 +24,9 @@ from utank_hil.canbus import (
 from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.tick import TICK_NS
+
+if TYPE_CHECKING:
+    from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
 NANOSECONDS = 1e-9
 MISCODED_COMMANDS_TO_TRIP = 5
@@ -96,7 +98,7 @@ class PumpDrive:
 
     def __init__(
         self,
-        plant: Plant,
+        plant: "Plant",
         limits: DriveLimits,
         catalogue: Catalogue,
         *,

@@ -3,11 +3,10 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
-from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -22,6 +21,9 @@ from utank_hil.canbus import (
 from utank_hil.parameters import NotNegative, Positive, Range, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.tick import TICK_NS
+
+if TYPE_CHECKING:
+    from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
 NOISE_BLOCK = 4096
 
@@ -102,7 +104,7 @@ class SensorNode:
 
     def __init__(
         self,
-        plant: Plant,
+        plant: "Plant",
         errors: SensorErrors,
         catalogue: Catalogue,
         *,

@@ -1,9 +1,17 @@
 """What the controller's process loads: no plotting, no viewer, no compiler."""
 
+import importlib.metadata
+import re
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
 
 import pytest
+
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.extras import EXTRA_OF
 
 pytestmark = pytest.mark.slow
 
@@ -70,3 +78,125 @@ assert admit(load_config(path, ControllerConfig), path).linear is not None
 
 def test_the_test_can_fail() -> None:
     assert loaded_by("import matplotlib") == "matplotlib"
+
+
+WITHOUT_EXTRAS = """
+import sys
+
+class Without:
+    def __init__(self, finder):
+        self.finder = finder
+
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
+
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {missing!r}:
+            return None
+        return self.finder.find_spec(name, path, target)
+
+sys.meta_path[:] = [Without(finder) for finder in sys.meta_path]
+sys.path.insert(0, "tests/commands")
+import ports
+import utank_hil.commands.run
+utank_hil.commands.run.SocketCanPort = ports.QuietBus
+from {module}.cli import main
+sys.argv = {words!r}
+try:
+    main()
+finally:
+    print(*sorted({{name.partition(".")[0] for name in sys.modules}}), file=sys.stderr)
+"""
+
+
+def without_extras(module: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """A command where only the dependencies of `run` are installed; prints what it has loaded."""
+    source = WITHOUT_EXTRAS.format(missing=set(EXTRA_OF), module=module, words=["x", *words])
+    return subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def dependencies(names: Iterable[str]) -> set[str]:
+    """The distributions that some need, with what those need, without any extras."""
+    found: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = re.match(r"[\w.-]+", waiting.pop())[0].lower().replace("_", "-")
+        if name not in found:
+            found.add(name)
+            try:
+                needs = importlib.metadata.requires(name) or []
+            except importlib.metadata.PackageNotFoundError:
+                continue  # for another platform
+            waiting += [each for each in needs if "extra ==" not in each]
+    return found
+
+
+PROJECT = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("check", "configs/controllers/constrained_gpc.yaml"),
+        ("check", "configs/scenarios/patti_b.yaml"),
+        ("check", "configs/ships/patti_b.yaml"),
+        ("run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.3"),
+        ("run", "configs/controllers/constrained_gpc.yaml", "--bus", "any0", "--duration", "0.3"),
+    ],
+    ids=" ".join,
+)
+def test_the_controllers_commands_need_nothing_but_the_dependencies_without_extras(
+    words: tuple[str, ...],
+) -> None:
+    done = without_extras("utank_hil", *words)
+    assert done.returncode == 0, done.stderr
+    loaded = done.stderr.splitlines()[-1].split()
+    assert "numpy" in loaded
+    needed = dependencies(PROJECT["dependencies"])
+    owners = importlib.metadata.packages_distributions()
+    foreign = {
+        name: owners[name]
+        for name in loaded
+        if name in owners and not {each.lower().replace("_", "-") for each in owners[name]} & needed
+    }
+    # "utank-hil" itself, and what the interpreter's own start loads in a development environment
+    assert set(foreign) <= {"utank_hil", "firmware_sim", "_distutils_hack"}
+
+
+def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_runs(
+    tmp_path: Path,
+) -> None:
+    words = ("run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.3")
+    done = without_extras("utank_hil", *words, "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert "no recording: " in done.stderr
+    assert "pip install 'utank-hil[viewer]'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "words", "package"),
+    [
+        ("utank_hil", ("bench", "--duration", "5"), "numba"),
+        ("utank_hil", ("identify", "x.rrd", "configs/controllers/dpc.yaml"), "rerun"),
+        ("firmware_sim", ("configs/scenarios/storm.yaml", "--bus", "any0"), "numba"),
+    ],
+)
+def test_a_command_whose_extra_is_missing_names_it_and_shows_no_traceback(
+    module: str, words: tuple[str, ...], package: str, tmp_path: Path
+) -> None:
+    done = without_extras(module, *words)
+    assert done.returncode == ExitCode.USAGE
+    told = done.stderr.splitlines()[0]
+    extra = EXTRA_OF[package]
+    assert told.startswith(f"error: this needs {package}, which is not installed: ")
+    assert told.endswith(f"pip install 'utank-hil[{extra}]'")
+    assert "Traceback" not in done.stderr
+
+
+def test_every_extra_is_one_of_the_project_and_holds_its_packages() -> None:
+    extras = PROJECT["optional-dependencies"]
+    held = {extra: " ".join(extras[extra]) for extra in ("bench", "viewer")}
+    for package, extra in EXTRA_OF.items():
+        assert {"rerun": "rerun-sdk", "rerun_cli": "rerun-sdk"}.get(package, package) in held[extra]

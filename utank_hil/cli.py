@@ -16,6 +16,7 @@ with quietly_interruptible():
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.commands.common import Version, new_app
+    from utank_hil.commands.extras import extras_named
 
 GROUP = "utank_hil.commands"
 
@@ -56,4 +57,5 @@ def _utank_hil(version: Version = False) -> None:
 
 def main() -> None:
     """Run the command line."""
-    app()
+    with extras_named():
+        app()

@@ -71,6 +71,7 @@ def describe(
     *,
     options: Mapping[str, Any],
     seed: int | None = None,
+    scenario: BaseModel | None = None,
 ) -> dict[str, Any]:
     """Describe a result, ready for `json.dumps`.
 
@@ -85,16 +86,21 @@ def describe(
     options : mapping of str to any
         Options and arguments of the command.
     seed : int, optional
+    scenario : BaseModel, optional
+        Whose sea counted, where the configuration is not a scenario itself.
 
     Returns
     -------
     dict
         ``program``, ``version``, ``commit``, ``date`` (UTC), ``machine``, ``command``, ``options``,
-        ``seed``, ``configuration`` (a file of this content in `folder` loads as what ran), ``data``
-        (SHA-256 of the data files that the configuration names).
+        ``seed``, ``configuration`` (a file of this content in `folder` loads as what ran),
+        ``scenario_configuration`` if there is one, ``data`` (SHA-256 of the data files that they
+        name).
     """
-    content = configuration.model_dump()
-    files = sorted({_relative(path, folder): path for path in _paths(content)}.items())
+    parts = {"configuration": configuration.model_dump()}
+    if scenario is not None:
+        parts["scenario_configuration"] = scenario.model_dump()
+    files = sorted({_relative(path, folder): path for path in _paths(parts)}.items())
     return {
         "program": PROGRAM,
         "version": version(),
@@ -108,7 +114,7 @@ def describe(
         "command": command,
         "options": {name: _given(value) for name, value in options.items()},
         "seed": seed,
-        "configuration": _plain(content, folder),
+        **_plain(parts, folder),
         "data": {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files},
     }
 

@@ -77,8 +77,7 @@ def controller(
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
     title = f"{loaded.name}: {vessel.name} in {sea.name}"
     limits = loaded.limits
-    about = describe("design controller", loaded, out, options=context.params)
-    about["scenario_configuration"] = describe("", sea, out, options={})["configuration"]
+    about = describe("design controller", loaded, out, options=context.params, scenario=sea)
     draw_trade(result, files["picture"], title, limits.pressure_pa, limits.level_m, about)
     figures = {
         **about,

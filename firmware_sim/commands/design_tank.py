@@ -17,8 +17,10 @@ from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, shown
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import Tank
+from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
+    from firmware_sim.scenario import Scenario
     from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, SweepPoint
     from utank_hil.control import DesignPlant
 
@@ -26,6 +28,7 @@ PICTURE, SWEEP, FIGURES = "tank.png", "tank_sweep.png", "tank.json"
 
 
 def tank(
+    context: typer.Context,
     vessel: Annotated[Path, typer.Argument(help="Ship, tank and pump: a file of configs/ships.")],
     scenario: Annotated[
         Path | None,
@@ -74,7 +77,8 @@ def tank(
         print_table(console, _table(loaded, tanks, {}))
         console.print("Name a sea with --scenario for the roll to be expected.")
         return
-    name, sea = _sea(path, loaded)
+    chosen, sea = _sea(path, loaded)
+    name = chosen.name
     plants = {key: _plant(loaded, each) for key, each in tanks.items()}
     pump = loaded.pump is not None
     found = {key: predict_roll(plant, sea, pump=pump) for key, plant in plants.items()}
@@ -82,13 +86,14 @@ def tank(
     plant, own = plants["present"], found["present"]
     loadings = loading_sensitivity(plant, sea, own)
     title = f"{loaded.name}: {name}"
+    about = describe("design tank", loaded, out, options=context.params, scenario=chosen)
     files = {"picture": out / PICTURE, "figures": out / FIGURES}
-    draw_tank(roll_curves(plant, sea, own.law), loadings, files["picture"], title)
+    draw_tank(roll_curves(plant, sea, own.law), loadings, files["picture"], title, about)
     points: Sequence[SweepPoint] = ()
     if sweep:
         points = sweep_tank(plant, sea, pump=pump)
-        files["sweep"] = draw_sweep(points, out / SWEEP, title)
-    figures |= {
+        files["sweep"] = draw_sweep(points, out / SWEEP, title, about)
+    figures |= about | {
         "scenario": name,
         **{key: _figures(loaded, each, found[key]) for key, each in tanks.items()},
         "loading": loading_json(loadings),
@@ -107,8 +112,8 @@ def tank(
         console.print(f"{key:>10}: {shown(file)}", soft_wrap=True)
 
 
-def _sea(path: Path, vessel: Vessel) -> tuple[str, "SeaState"]:
-    """Name of a scenario, and its sea on the vessel's ship."""
+def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:
+    """A scenario, and its sea on the vessel's ship."""
     from firmware_sim.pooled_waves import pooled_wave_moment
     from firmware_sim.scenario import Scenario
     from utank_hil.analysis.loop.sea_response import CalmSeaError
@@ -116,7 +121,7 @@ def _sea(path: Path, vessel: Vessel) -> tuple[str, "SeaState"]:
 
     scenario = load(path, Scenario)
     try:
-        return scenario.name, SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
+        return scenario, SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     except CalmSeaError as error:
         fail(f"{path}: sea: {error}; name another scenario with --scenario")
 

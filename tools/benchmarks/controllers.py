@@ -37,10 +37,10 @@ from utank_hil.control import (
     OnOffValve,
     PassiveController,
     SmallGainFuzzy,
-    ValveRange,
     design_lqr,
     level_brake,
 )
+from utank_hil.dynamics.valves import ValveRange
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.runtime.process_priority import real_time_scheduling

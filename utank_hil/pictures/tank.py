@@ -1,8 +1,8 @@
 """Pictures of a tank for a ship: roll in waves, other loadings, other tanks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,13 @@ if TYPE_CHECKING:
 _NAMES = ("without tank", "passive tank", "active tank")
 
 
-def draw_tank(curves: RollCurves, loadings: Sequence[LoadingPoint], path: Path, title: str) -> Path:
+def draw_tank(
+    curves: RollCurves,
+    loadings: Sequence[LoadingPoint],
+    path: Path,
+    title: str,
+    about: Mapping[str, Any] | None = None,
+) -> Path:
     """Draw roll over wave period, and roll in the sea over the ship's loading.
 
     Parameters
@@ -25,13 +31,15 @@ def draw_tank(curves: RollCurves, loadings: Sequence[LoadingPoint], path: Path, 
     path : Path
         The `.png` file; overwritten.
     title : str
+    about : mapping, optional
+        As in `picture`.
 
     Returns
     -------
     Path
         `path`.
     """
-    with picture(path, title, (12.0, 5.0)) as figure:
+    with picture(path, title, (12.0, 5.0), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
         waves.fill_between(
             curves.sea_period_s,
@@ -63,7 +71,12 @@ def draw_tank(curves: RollCurves, loadings: Sequence[LoadingPoint], path: Path, 
     return path
 
 
-def draw_sweep(points: Sequence[SweepPoint], path: Path, title: str) -> Path:
+def draw_sweep(
+    points: Sequence[SweepPoint],
+    path: Path,
+    title: str,
+    about: Mapping[str, Any] | None = None,
+) -> Path:
     """Draw roll in the sea over the water's frequency, a line for each share of stability.
 
     Parameters
@@ -72,13 +85,15 @@ def draw_sweep(points: Sequence[SweepPoint], path: Path, title: str) -> Path:
     path : Path
         The `.png` file; overwritten.
     title : str
+    about : mapping, optional
+        As in `picture`.
 
     Returns
     -------
     Path
         `path`.
     """
-    with picture(path, title, (12.0, 5.0)) as figure:
+    with picture(path, title, (12.0, 5.0), about) as figure:
         passive = figure.add_subplot(1, 2, 1)
         active = figure.add_subplot(1, 2, 2, sharey=passive)
         _draw_shares(passive, points, [p.prediction.passive.roll_rms_rad for p in points])

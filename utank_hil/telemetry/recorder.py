@@ -17,6 +17,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -177,6 +178,8 @@ class RecorderProcess(Closing):
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
     ) -> None:
+        if find_spec("rerun") is None:
+            raise RecorderError("it needs rerun-sdk: pip install 'utank-hil[viewer]'")
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
         if events is not None:
             command += ["--events", events]

@@ -1,0 +1,142 @@
+"""The files of deploy/: fit for systemd, and in step with the program."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.configuration import ControllerConfig
+from utank_hil.runtime.process_priority import PRIORITY
+from utank_hil.tick import TICK_NS
+
+DEPLOY = Path("deploy").resolve()
+UNIT = DEPLOY / "utank-hil.service"
+INSTALLED = "/opt/utank-hil/bin/utank-hil"
+GPC = "configs/controllers/gpc.yaml"
+MOST_EXPOSURE = 2.0
+NETWORKD = Path("/usr/lib/systemd/systemd-networkd")
+
+
+def entries(path: Path) -> list[tuple[str, str, str]]:
+    """Section, key and value of each line."""
+    found, section = [], ""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            section = line.strip("[]")
+        elif line and not line.startswith("#"):
+            key, _, value = line.partition("=")
+            found.append((section, key, value))
+    return found
+
+
+def value(key: str, path: Path = UNIT) -> str:
+    (found,) = [value for _, name, value in entries(path) if name == key]
+    return found
+
+
+def systemd_analyze(*words: str, unit: Path) -> subprocess.CompletedProcess[str]:
+    """Run it, or skip where there is none; where CI runs, it must be there."""
+    program = shutil.which("systemd-analyze")
+    if program is None:
+        assert "UTANK_HIL_CI" not in os.environ, (
+            "systemd-analyze is missing: apt-get install systemd"
+        )
+        pytest.skip("no systemd-analyze: apt-get install systemd")
+    return subprocess.run(
+        [program, *words, unit], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+@pytest.fixture
+def unit(tmp_path: Path) -> Path:
+    """The unit with a program that is there."""
+    path = tmp_path / UNIT.name
+    path.write_text(
+        UNIT.read_text().replace(INSTALLED, str(Path(sys.executable).parent / "utank-hil"))
+    )
+    return path
+
+
+def test_systemd_finds_nothing_wrong_with_the_unit(unit: Path) -> None:
+    done = systemd_analyze("verify", "--man=no", unit=unit)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_systemd_finds_what_is_wrong_with_another(unit: Path) -> None:
+    unit.write_text(unit.read_text().replace("WatchdogSec=500ms", "WatchdogSecs=soon"))
+    done = systemd_analyze("verify", "--man=no", unit=unit)
+    assert "WatchdogSecs" in done.stdout + done.stderr
+
+
+def test_exposure_is_what_the_document_says_and_no_more_than_asked_for(unit: Path) -> None:
+    threshold = f"--threshold={10 * MOST_EXPOSURE:.0f}"
+    done = systemd_analyze("security", "--offline=true", "--no-pager", threshold, unit=unit)
+    assert done.returncode == 0, done.stdout
+    found = re.search(r"Overall exposure level for utank-hil.service: (\S+)", done.stdout)
+    assert found
+    assert float(found[1]) <= MOST_EXPOSURE
+    assert f"exposure {found[1]}" in Path("docs/deployment.md").read_text(encoding="utf-8")
+    unit.write_text(unit.read_text().replace("CapabilityBoundingSet=\n", ""))
+    assert systemd_analyze(
+        "security", "--offline=true", "--no-pager", threshold, unit=unit
+    ).returncode
+
+
+def test_commands_of_the_unit_are_those_of_the_program() -> None:
+    codes = {}
+    for key in ("ExecStartPre", "ExecStart"):
+        program, *words = shlex.split(value(key))
+        assert program == INSTALLED
+        shown = [
+            {"/etc/utank-hil/controller.yaml": GPC, "can0": "nowhere0"}.get(w, w) for w in words
+        ]
+        assert len(set(shown) - set(words)) == {"ExecStartPre": 1, "ExecStart": 2}[key]
+        codes[key] = CliRunner().invoke(app, shown).exit_code
+    # it gets as far as the bus
+    assert codes == {"ExecStartPre": ExitCode.OK, "ExecStart": ExitCode.NO_BUS}
+
+
+def test_unit_is_in_step_with_the_program() -> None:
+    assert value("Type") == "notify"
+    assert value("Restart") == "on-failure"
+    assert value("RestartPreventExitStatus") == str(int(ExitCode.USAGE))
+    assert int(value("LimitRTPRIO")) >= PRIORITY
+    assert value("LimitMEMLOCK") == "infinity"
+    assert value("CapabilityBoundingSet") == value("AmbientCapabilities") == ""
+    assert "AF_CAN" in value("RestrictAddressFamilies").split()
+    watchdog_ms = float(value("WatchdogSec").removesuffix("ms"))
+    assert 10 * TICK_NS * 1e-6 < watchdog_ms <= 500
+    keys = {key for _, key, _ in entries(UNIT)}
+    assert not keys & {"CPUQuota", "BindsTo", "CPUSchedulingPolicy", "RestrictRealtime"}
+
+
+def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows() -> None:
+    network, link = DEPLOY / "80-can0.network", DEPLOY / "80-can0.link"
+    rate = value("BitRate", network)
+    assert int(rate.removesuffix("K")) * 1000 == ControllerConfig.model_fields["bit_rate"].default
+    assert value("RestartSec", network) == "100ms"
+    assert int(value("TransmitQueueLength", link)) == 10
+    interface = re.search(r"--bus (\w+)", value("ExecStart"))
+    assert interface
+    assert {value("Name", network), value("OriginalName", link)} == {interface[1]}
+    assert f"sys-subsystem-net-devices-{interface[1]}.device" == value("After") == value("Wants")
+    if NETWORKD.exists():  # its table of keys stands in the program
+        known = NETWORKD.read_bytes()
+        for section, key, _ in entries(network):
+            assert f"{section}.{key}".encode() in known
+        assert b"CAN.BitRat3" not in known
+
+
+def test_group_of_the_device_is_that_of_the_service() -> None:
+    rules = (DEPLOY / "90-utank-hil.rules").read_text()
+    assert f'GROUP="{value("SupplementaryGroups")}"' in rules
+    assert 'KERNEL=="cpu_dma_latency"' in rules
+    assert value("DeviceAllow") == "/dev/cpu_dma_latency rw"
