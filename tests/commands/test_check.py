@@ -195,6 +195,21 @@ def test_ship_is_recognised_and_shown_in_numbers() -> None:
         assert word in text
 
 
+def test_ship_with_a_valve_and_her_law_are_shown_in_numbers() -> None:
+    path = CONFIGS / "ships" / "thesis_first_valve.yaml"
+    report = json.loads(invoke("check", path, "--json").stdout)
+    assert report["valve_damping_open"] == 0
+    assert report["valve_damping_shut"] == pytest.approx(5.6, rel=0.02)
+    text = invoke("check", path).stdout
+    for word in ("valve in the duct, shut to open", "0.5 s", "10.0%", "0 to 5.6"):
+        assert word in text
+    law = CONFIGS / "controllers" / "valve_clipped.yaml"
+    report = json.loads(invoke("check", law, "--json").stdout)
+    assert (report["dissipates"], report["robustness"], report["accepted"]) == (True, None, True)
+    assert "can only take energy out of the water" in invoke("check", law).stdout
+    assert "dissipates" in invoke("check", CONFIGS / "scenarios" / "semi_active.yaml").stdout
+
+
 @pytest.mark.slow
 def test_scenario_is_recognised_and_shown_with_the_margins_of_all_its_controllers(
     tmp_path: Path,

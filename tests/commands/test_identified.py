@@ -9,7 +9,7 @@ import yaml
 
 from utank_hil.assembly import build_law
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import PredictiveDesign
 from utank_hil.retuning import ModelSummary
 
@@ -37,6 +37,12 @@ def test_configuration_loads_with_the_ship_that_was_found_and_all_else_as_it_was
     assert found.vessel.version != given.vessel.version
     same = {"vessel": given.vessel}
     assert found.model_copy(update=same) == given
+
+
+def test_the_valve_of_a_ship_that_was_found_is_kept(tmp_path: Path) -> None:
+    vessel = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
+    files = IdentifiedShips(tmp_path, vessel, read_controller(CONFIG)).write(FOUND)
+    assert load_config(files["vessel"], Vessel).valve == vessel.valve
 
 
 def test_ship_found_later_is_written_beside_the_earlier(tmp_path: Path) -> None:

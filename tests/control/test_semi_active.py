@@ -1,6 +1,7 @@
 """Valve laws: energy, range of the valve, and where they gain."""
 
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -168,6 +169,14 @@ def test_design_of_the_clipped_law_hands_the_pump_s_law_its_own_measurements(pum
         assert loss == pytest.approx(min(max(wanted, VALVE.open_loss), VALVE.shut_loss))
         alone.applied(np.array([-loss * flow**2]))
         clipped.applied(np.array([loss]))
+
+
+@pytest.mark.parametrize("design", [OnOffValveDesign(), ClippedValveDesign(GPC_ROLL)])
+def test_law_of_a_valve_can_go_to_another_process(design):
+    built = design.build(PLANT)
+    y = np.array([0.02, 0.1, 0.3, 0.5])[-len(built.measured) :]
+    there = pickle.loads(pickle.dumps(built)).controller()
+    assert there.step(y) == built.controller().step(y)
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,19 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.dynamics.valves import Valve, air_valve_loss, duct_valve_loss, valve_problems
+from utank_hil.dynamics.valves import (
+    Valve,
+    added_damping_ratio,
+    air_valve_loss,
+    duct_valve_loss,
+    valve_problems,
+)
 
 TANK = load_config(Path("configs/ships/thesis_first.yaml"), Vessel).tank
 DUCT = Valve("duct", opening_time_s=1.0, leakage=0.1)
@@ -40,6 +47,19 @@ def test_ends_of_the_way_are_open_and_the_leakage() -> None:
     assert AIR.loss(TANK, 0.0) == pytest.approx(air_valve_loss(TANK, 0.4, 0.1))
     assert DUCT.fail_opening == 1.0
     assert replace(DUCT, fail_position="shut").fail_opening == 0.0
+
+
+def test_added_damping_takes_the_energy_that_the_quadratic_loss_takes() -> None:
+    loss, level_m = 2e4, 0.7
+    omega = TANK.natural_frequency_rad_s
+    linear = (
+        2
+        * added_damping_ratio(TANK, loss, level_m)
+        * omega
+        * (TANK.density_kg_m3 * TANK.effective_length_m)
+    )
+    speed = level_m * omega * np.cos(np.linspace(0, 2 * np.pi, 10_001))
+    assert np.mean(linear * speed**2) == pytest.approx(np.mean(loss * abs(speed) ** 3), rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,15 @@
 """The controller's side of the valve: what it tells it when, and what it finds wrong with it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from controller_bench import CATALOGUE, ControllerBench, ToyLaw
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import (
@@ -16,6 +19,8 @@ from utank_hil.canbus import (
     Frame,
     Heartbeat,
     Mode,
+    Quality,
+    SensorMotion,
     ValveCommand,
     ValveControl,
     ValveFault,
@@ -257,6 +262,51 @@ def test_a_valve_that_does_not_return_to_its_fail_position_refuses_arming() -> N
     bench.run(1000)
     bench.order_is(arm=False)
     bench.arm()
+
+
+EVENTS: dict[str, Callable[[ValveBench], object]] = {
+    "arm": lambda bench: bench.order_is(mode_request=Mode.ACTIVE, arm=True, stop=False),
+    "disarm": lambda bench: bench.order_is(mode_request=Mode.PASSIVE, arm=False),
+    "stop": lambda bench: bench.order_is(mode_request=Mode.STANDBY, arm=False, stop=True),
+    "reset": lambda bench: (bench.order_is(reset=False), bench.order_is(reset=True)),
+    "valve silent": lambda bench: setattr(bench, "reports", False),
+    "valve stuck": lambda bench: setattr(bench, "moves", False),
+    "valve fault": lambda bench: (
+        setattr(bench, "fault", ValveFault.SUPPLY), setattr(bench, "state", ValveState.FAULT)
+    ),
+    "valve well": lambda bench: (
+        setattr(bench, "reports", True), setattr(bench, "moves", True),
+        setattr(bench, "fault", ValveFault.NONE),
+        setattr(bench, "state", ValveState.FAIL_POSITION),
+    ),
+    "no motion": lambda bench: setattr(bench, "motion", SensorMotion(math.nan, 0.0, None)),
+    "motion": lambda bench: setattr(bench, "motion", SensorMotion(0.0, 0.0, Quality.GOOD)),
+    "no loss": lambda bench: setattr(bench.law, "loss", math.nan),
+    "loss": lambda bench: setattr(bench.law, "loss", SHUT),
+    "pause": lambda bench: bench.run(300),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(sorted(EVENTS)), st.integers(1, 40)), max_size=25))
+def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(
+    events: list[tuple[str, int]],
+) -> None:
+    bench = ValveBench()
+    valve_law(bench).loss = SHUT
+    bench.arm()
+    not_active_ticks = 0
+    for event, ticks in events:
+        EVENTS[event](bench)
+        for _ in range(ticks):
+            bench.tick()
+            active = bench.node.mode is Mode.ACTIVE
+            not_active_ticks = 0 if active else not_active_ticks + 1
+            if not_active_ticks >= 2:  # a command leaves every other tick
+                assert bench.control is not ValveControl.FOLLOW
+                assert bench.told[-1].opening == DUCT.fail_opening
+            assert 0 <= bench.told[-1].opening <= 1
 
 
 def test_a_loss_that_is_no_number_ends_in_an_internal_fault() -> None:

@@ -32,6 +32,9 @@ CHANNEL = "vcan0"
 BIN = Path(sys.executable).parent
 CONFIGS = Path("configs").resolve()
 DBC = Path("utank_hil/canbus/utank.dbc")
+VALVE_LIMITS = (
+    "valve_age_ms", "valve_echo_age_ms", "valve_follows_within_ms", "valve_off_within_ms",
+)  # fmt: skip
 START_S = 180.0  # imports take long in a user-mode kernel
 LINE = re.compile(r"\((?P<s>\d+)\.(?P<us>\d{6})\) \S+ (?P<id>[0-9A-F]{8})#(?P<data>[0-9A-F]*)")
 
@@ -48,14 +51,19 @@ def set_link(*, up: bool) -> None:
         fcntl.ioctl(channel, _SET_FLAGS, struct.pack("16sH14x", CHANNEL.encode(), flags))
 
 
-def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
-    """The shipped GPC with thresholds for a busy machine: these tests judge function, not timing.
+def patient_controller(
+    folder: Path,
+    command_timeout_ms: float = 50.0,
+    controller: str = "gpc",
+    ship: str = "thesis_first",
+) -> Path:
+    """A shipped controller with thresholds for a busy machine: function is judged, not timing.
 
     A user-mode kernel shares its one processor with whatever the machine does besides; its ticks
     come late, by tens of milliseconds at times, which the shipped thresholds rightly punish.
     """
-    content = yaml.safe_load((CONFIGS / "controllers" / "gpc.yaml").read_text())
-    content["vessel"] = str(CONFIGS / "ships" / "thesis_first.yaml")
+    content = yaml.safe_load((CONFIGS / "controllers" / f"{controller}.yaml").read_text())
+    content["vessel"] = str(CONFIGS / "ships" / f"{ship}.yaml")
     content["command_timeout_ms"] = command_timeout_ms
     content["safety"] = {
         "overruns_in_ten": None,
@@ -65,6 +73,7 @@ def patient_controller(folder: Path, command_timeout_ms: float = 50.0) -> Path:
         "drive_age_ms": 500,
         "echo_age_ms": 500,
         "drive_enabled_within_ms": 500,
+        **dict.fromkeys(VALVE_LIMITS, 500),
     }
     path = folder / "patient.yaml"
     path.write_text(yaml.safe_dump(content))

@@ -21,6 +21,7 @@ from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.control import BuiltLaw
 from utank_hil.dynamics.linear import coupled_matrices, state_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.dynamics.valves import added_damping_ratio
 from utank_hil.dynamics.water import water_moments
 
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."
@@ -94,7 +95,8 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         reservoir is full or empty. Metacentric height and the water's share of the displacement
         are None where that is not given, what is of the pump without one: heel and head that its
         greatest pressure holds; power that holds it in still water; flow that moves the level from
-        limit to limit at the roll period, and power of pressure and flow, without losses.
+        limit to limit at the roll period, and power of pressure and flow, without losses. Damping
+        ratios that a valve adds, None without one.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
@@ -128,6 +130,19 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         "stability_taken": free_surface_nm_rad(ship, tank) / ship.stiffness_nm_rad,
         "level_limit_m": tank.level_limit_m,
         **_pump_figures(vessel, stiffness),
+        **_valve_figures(vessel),
+    }
+
+
+def _valve_figures(vessel: Vessel) -> dict[str, float | None]:
+    """Damping ratio that the valve adds to the water at half the greatest level."""
+    if vessel.valve is None:
+        return {"valve_damping_open": None, "valve_damping_shut": None}
+    tank, losses = vessel.tank, vessel.valve.range(vessel.tank)
+    half_m = tank.level_limit_m / 2
+    return {
+        "valve_damping_open": added_damping_ratio(tank, losses.open_loss, half_m),
+        "valve_damping_shut": added_damping_ratio(tank, losses.shut_loss, half_m),
     }
 
 
@@ -162,6 +177,21 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
         ("power of pressure and flow, without losses", _power(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", _power(figures["pump_power_held_w"])),
         ("power of the motor", _power(figures["pump_power_w"])),
+    ]
+
+
+def _valve_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:
+    valve = vessel.valve
+    if valve is None:
+        return []
+    return [
+        (f"valve in the {valve.kind}, shut to open", f"{valve.opening_time_s:g} s"),
+        ("  share left open when shut", f"{valve.leakage:.1%}"),
+        ("  without command or power", valve.fail_position),
+        (
+            "  damping ratio it adds at half that level, open to shut",
+            f"{figures['valve_damping_open']:.2g} to {figures['valve_damping_shut']:.2g}",
+        ),
     ]
 
 
@@ -306,6 +336,7 @@ def print_ship(vessel: Vessel) -> None:
         ("stability taken by the free surface", f"{taken:.1%}"),
         ("  of GM", "" if gm_m is None else f"{taken * gm_m:.3f} m"),
         ("level at which a reservoir is full or empty", f"{figures['level_limit_m']:.2f} m"),
+        *_valve_rows(vessel, figures),
         *_pump_rows(vessel, figures),
     ):
         if value:

@@ -111,7 +111,7 @@ def _write(
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     """What a vessel's file holds; values at their defaults are left out."""
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
-    for key in ("ship", "tank", "pump"):
+    for key in ("ship", "tank", "pump", "valve"):
         part = getattr(vessel, key)
         if part is None:
             continue

@@ -159,10 +159,13 @@ class ClippedValveDesign:
         if pump.commands != (PRESSURE,):
             raise ParameterError("", [("pump", "must be a law that drives a pump")])
 
-        def make() -> Controller:
-            return ClippedValve(valve, pump.controller(), len(pump.measured))
-
+        make = partial(_clipped, valve, pump)
         return BuiltLaw(make, (*pump.measured, _FLOW), commands=(VALVE,))
+
+
+def _clipped(valve: ValveRange, pump: BuiltLaw) -> Controller:
+    """A new controller; a function of the module, so that it can go to another process."""
+    return ClippedValve(valve, pump.controller(), len(pump.measured))
 
 
 def _range(plant: DesignPlant) -> ValveRange:

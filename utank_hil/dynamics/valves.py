@@ -110,6 +110,24 @@ class Valve:
         return ValveRange(self.loss(tank, 1.0), self.loss(tank, 0.0))
 
 
+def added_damping_ratio(tank: Tank, loss: float, level_m: float) -> float:
+    """Damping ratio that a valve adds to the water's swing in a ship held still.
+
+    That of the linear loss which takes the same energy from a sine of amplitude h at the natural
+    frequency: 8 / (3 pi) omega h loss.
+
+    Parameters
+    ----------
+    tank : Tank
+    loss : float
+        Pa per (m/s)^2 of dh/dt.
+    level_m : float
+        Amplitude h of the level.
+    """
+    inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
+    return 4 / (3 * math.pi) * level_m * loss / inertia_pa_s2_m
+
+
 def valve_problems(tank: Tank, valve: Valve) -> list[Problem]:
     """Why a tank can't have a valve: it must let some water pass."""
     speed_m_s = tank.natural_frequency_rad_s * tank.level_limit_m
