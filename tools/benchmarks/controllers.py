@@ -40,9 +40,9 @@ from utank_hil.control import (
     design_lqr,
     level_brake,
 )
-from utank_hil.dynamics.valves import ValveRange
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.valves import ValveRange
 from utank_hil.runtime.process_priority import real_time_scheduling
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 from utank_hil.tick import TICK_S
