@@ -35,6 +35,9 @@ SILENT_S: Final = 1.0
 LATE_ROUND: Final = 1.2
 """So many rounds after the last one, ticks were left out: as a gap."""
 
+NOISE_LASTS_S: Final = 2.0
+
+_DRIFT: Final = int(Finding.DRIFT)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
@@ -93,6 +96,7 @@ class Monitors:
         self._senders = Senders((), self._frames_per_s)
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
+        self._noisy_s = 0.0
         self._turned_rad = self._last_rate_rad_s = 0.0
         self._of_motion = self._of_drive = self._of_water = self._of_volume = 0
         self._of_senders = self._of_twin = self._of_saturation = 0
@@ -150,7 +154,7 @@ class Monitors:
             self._of_drive = self._drive.update(
                 seen.command_pa,
                 inbox.pressure_pa,
-                enabled=seen.drive_enabled,
+                enabled=seen.drive_enabled and seen.pump_age_ms <= STALE_MS,
                 limited=inbox.drive_held_back,
             )
         elif phase == 2 or phase == 7:
@@ -199,7 +203,13 @@ class Monitors:
         found = self._motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
         noisy = self._roll_noise.update(self._motion.residual_rad, elapsed_s)
         noisy |= self._rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s)
-        self._of_motion = found | _NOISE if noisy else found
+        if not noisy:
+            self._noisy_s = 0.0
+            self._of_motion = found
+            return
+        # a flip looks like noise at first, and lasting noise like a flip now and then
+        self._noisy_s += elapsed_s
+        self._of_motion = _NOISE | (found & _DRIFT if self._noisy_s > NOISE_LASTS_S else found)
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excited: bool) -> None:
         twin = self.twin
