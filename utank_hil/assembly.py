@@ -22,6 +22,7 @@ from utank_hil.runtime.controller_node import (
     Measure,
 )
 from utank_hil.runtime.inbox import MEASURED, Inbox
+from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
@@ -163,6 +164,13 @@ def build_controller_node(
         commands=law.commands,
         pump=config.vessel.pump is not None,
         valve=valve,
+        monitors=Monitors(
+            config.plant,
+            config.safety.roll_limit_rad,
+            config.sensors,
+            config.bit_rate,
+            compares=law.closes_loop,
+        ),
         retuning=retuning,
         statistics=statistics,
         sink=sink,

@@ -20,6 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from utank_hil.canbus import (
+    Address,
+    AddressClaim,
     ControlWord,
     DriveState,
     DriveStatus1,
@@ -194,10 +196,13 @@ def test_one_or_two_lost_ticks_do_not_disarm(victim: str, lost: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", ["sensors", "drive", "controller", "panel"])
 def test_frames_sent_twice_are_taken_once(victim: str) -> None:
-    """The second of each is refused as a repetition; what the first said stands."""
+    """The second of each is refused as a repetition; what the first said stands.
+
+    It lasts so short that nobody takes them for a second sender's.
+    """
     once, twice = armed_bench(), armed_bench()
     node = getattr(twice, victim)
-    node.spoil, node.begin_ns = doubled, T0
+    node.spoil, node.begin_ns, node.end_ns = doubled, T0, T0 + 80 * MS
     once.run(8)
     twice.run(8)
     assert twice.mode is Mode.ACTIVE
@@ -225,10 +230,18 @@ def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
     assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, 9 * SECOND)
 
 
-def test_flood_that_starves_nobody_is_an_overload_all_the_same() -> None:
-    bench = armed_bench(extra=[Babbler(0x1FFFFFFF, 2, T0)])
+@pytest.mark.parametrize(
+    ("can_id", "fault"),
+    [
+        (0x1FFFFFFF, Fault.UNKNOWN_IDENTIFIERS),
+        # of the catalogue, and of no node that the controller listens to
+        (CATALOGUE.codec(AddressClaim, Address.VALVE).can_id, Fault.BUS_OVERLOAD),
+    ],
+)
+def test_flood_that_starves_nobody_ends_at_zero_all_the_same(can_id: int, fault: Fault) -> None:
+    bench = armed_bench(extra=[Babbler(can_id, 2, T0)])
     bench.run(8.1)
-    assert (bench.mode, bench.node.fault) == (Mode.FAULT, Fault.BUS_OVERLOAD)
+    assert (bench.mode, bench.node.fault) == (Mode.FAULT, fault)
     assert bench.pressure_at_zero_since(8 * SECOND)
 
 

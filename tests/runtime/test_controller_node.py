@@ -30,8 +30,11 @@ from utank_hil.canbus import (
     SensorPump,
     SensorTank,
 )
+from utank_hil.control import DesignPlant
 from utank_hil.retuning import RetuningEvent, RetuningOrder
 from utank_hil.runtime import RealTimeLoop
+from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.tick import TICK_NS
@@ -236,7 +239,8 @@ def test_status_tells_of_a_loop_without_real_time_scheduling(
 
 @pytest.mark.parametrize("index", range(len(SIGNALS)))
 def test_every_signal_is_finite_from_the_first_row(index: int) -> None:
-    bench = ControllerBench()
+    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+    bench = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
     bench.tick()
     assert math.isfinite(bench.rows[0][index])
 

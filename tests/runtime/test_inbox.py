@@ -88,6 +88,9 @@ class Line:
         """Everything that the inbox shows but the count of frames."""
         shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {
             "frames",
+            "foreign",
+            "watched",
+            "expected",
             "orders",
         }
         return {

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime.faults import FAULTS, Condition, Reaction
+from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.observations import MILLISECOND_NS, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.runtime.supervisor import Demand, Supervisor
@@ -74,6 +75,21 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.OVERRUN, Reaction.STOP, {"tick_late_ms": 60}),
     (Fault.OVERRUN, Reaction.RAMP, {"overruns_in_ten": 3}),
     (Fault.VERSION_MISMATCH, Reaction.STOP, {"versions_match": False}),
+    (Fault.SIGN_FLIP, Reaction.STOP, {"found": Finding.PUMP_SIGN}),
+    (Fault.MOTION_SIGN_FLIP, Reaction.STOP, {"found": Finding.MOTION_SIGN}),
+    (Fault.MOTION_SIGN_FLIP, Reaction.STOP, {"found": Finding.WATER_SIGN}),
+    (Fault.FOREIGN_SENDER, Reaction.STOP, {"found": Finding.SECOND_SENDER}),
+    (Fault.UNKNOWN_IDENTIFIERS, Reaction.STOP, {"found": Finding.FLOOD}),
+    (Fault.DRIVE_NOT_FOLLOWING, Reaction.STOP, {"found": Finding.DRIVE_LOST}),
+    (Fault.DRIVE_NOT_FOLLOWING, Reaction.RAMP, {"found": Finding.DRIVE_LAGS}),
+    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.ROLL_STUCK}),
+    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.RATE_STUCK}),
+    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.LEVEL_STUCK}),
+    (Fault.DRIFT, Reaction.RAMP, {"found": Finding.DRIFT_LASTS}),
+    (Fault.VOLUME, Reaction.RAMP, {"found": Finding.VOLUME_LASTS}),
+    (Fault.SPIKES, Reaction.RAMP, {"found": Finding.SPIKES}),
+    (Fault.SIGNAL_DELAYED, Reaction.RAMP, {"found": Finding.MOTION_LATE}),
+    (Fault.ROLL_AMPLIFIED, Reaction.RAMP, {"found": Finding.ROLL_AMPLIFIED}),
 ]
 
 
@@ -500,3 +516,14 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[Observat
             assert not conditions_in(seen, Reaction.STOP, Reaction.RAMP)
         elif not supervisor.arming:
             edge_since_disarmed = False
+
+
+DEGRADING = ("DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT")
+
+
+@pytest.mark.parametrize("finding", list(Finding), ids=lambda finding: str(finding.name))
+def test_each_finding_of_the_monitors_does_something(finding: Finding) -> None:
+    bench = armed_bench()
+    supervisor = bench.tick(**ACTIVE, found=int(finding))
+    assert supervisor.degraded is (finding.name in DEGRADING)
+    assert (supervisor.mode is Mode.FAULT) is (finding.name not in DEGRADING)

@@ -77,6 +77,8 @@ class Receiver(Generic[T]):
     valid : bool
         State of the stream by a leaky bucket, +1 for a rejected and -1 for an accepted frame. False
         before the first accepted frame, and from `BUCKET_LIMIT` until the bucket is empty again.
+    heard : int
+        Frames so far, accepted or not.
     lost : int
         Frames missing by the counter.
     rejected : dict
@@ -85,14 +87,14 @@ class Receiver(Generic[T]):
 
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
-        "can_id", "cycle_ns", "lost", "rejected", "valid",
+        "can_id", "cycle_ns", "heard", "lost", "rejected", "valid",
     )  # fmt: skip
 
     def __init__(self, codec: Codec[T]) -> None:
         self.can_id = codec.can_id
         self.cycle_ns = codec.cycle_ns
         self.valid = False
-        self.lost = 0
+        self.heard = self.lost = 0
         self.rejected = dict.fromkeys(Rejection, 0)
         self._decode = codec.decode
         self._protected = codec.protected
@@ -108,6 +110,7 @@ class Receiver(Generic[T]):
 
     def accept(self, frame: Frame) -> T | None:
         """Return the message of a frame with this `can_id`, or None if it is rejected."""
+        self.heard += 1
         data = frame.data
         if len(data) != FRAME_BYTES:
             self._reject(Rejection.LENGTH)

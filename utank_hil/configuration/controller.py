@@ -19,6 +19,7 @@ from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
+from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.tick import TICK_S, is_whole_ticks
 
@@ -41,6 +42,8 @@ class ControllerConfig(Section):
     limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
     """Those not given are the vessel's (`Vessel.default_limits`)."""
     safety: SafetyLimits = SafetyLimits()
+    sensors: SensorFigures = SensorFigures()
+    """Noise of the sensors, from which the monitors' thresholds follow."""
     command_timeout_ms: Annotated[float, Range(least=20, most=100)] = 50.0
     bit_rate: Annotated[int, Range(least=10_000, most=1_000_000)] = 250_000
     retuning: RetuningSettings | None = None

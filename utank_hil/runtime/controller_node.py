@@ -16,6 +16,7 @@ from utank_hil.canbus import (
     Fault,
     Frame,
     Mode,
+    PassiveTwin,
     PumpCommand,
     RetuningState,
 )
@@ -27,6 +28,7 @@ from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.signals import SIGNALS, values_of
@@ -44,6 +46,7 @@ FRESH_MS: Final = 50.0
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
 _CONTROL: Final = Demand.CONTROL
+_IDENTIFY: Final = RetuningState.IDENTIFY
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
@@ -96,6 +99,8 @@ class ControllerNode:
         Whether the tank has a pump to be commanded.
     valve : ValveCommander, optional
         If the tank has a valve.
+    monitors : Monitors, optional
+        Of sensors, pump and bus; without them the fault table has ages, states and limits only.
     retuning : AdaptiveController, optional
         The controller again, when it is one that retunes itself.
     sink : callable, optional
@@ -143,6 +148,7 @@ class ControllerNode:
         commands: tuple[str, ...] = (PRESSURE,),
         pump: bool = True,
         valve: ValveCommander | None = None,
+        monitors: Monitors | None = None,
         retuning: AdaptiveController | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
@@ -167,13 +173,17 @@ class ControllerNode:
         self._law_commands = commands
         self._pump = pump
         self._valve = valve
+        self._monitors = monitors
         self.inbox = Inbox(
             catalogue,
             settings.configuration_version,
             settings.level_limit_m,
             pump=pump,
             valve=valve is not None,
+            gates=None if monitors is None else monitors.gates,
         )
+        if monitors is not None:
+            monitors.watch(self.inbox.watched, self.inbox.expected)
         self._catalogue_version = catalogue.version
         self._level = level
         self._drive_sequence = DriveSequence()
@@ -182,6 +192,7 @@ class ControllerNode:
         )
         self._commands = catalogue.transmitter(PumpCommand)
         self._status = catalogue.transmitter(ControllerStatus)
+        self._twin = catalogue.transmitter(PassiveTwin)
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
         self._row = np.zeros(len(SIGNALS))
@@ -229,6 +240,21 @@ class ControllerNode:
         return RetuningState.IDLE if self._retuning is None else self._retuning.state
 
     @property
+    def twin_roll_rad(self) -> float:
+        """Roll of the passive twin; NaN without monitors."""
+        return math.nan if self._monitors is None else self._monitors.twin.roll_rad
+
+    @property
+    def twin_roll_rms_rad(self) -> float:
+        """Root mean square of it over some roll periods."""
+        return math.nan if self._monitors is None else self._monitors.twin.rms_rad
+
+    @property
+    def roll_rms_rad(self) -> float:
+        """Root mean square of the measured roll over some roll periods."""
+        return math.nan if self._monitors is None else self._monitors.twin.ship_rms_rad
+
+    @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:
         """What was done so far to retune the controller."""
         return () if self._retuning is None else tuple(self._retuning.events)
@@ -240,6 +266,7 @@ class ControllerNode:
     def other_frames(self, count: int) -> None:
         """Take note of frames of other kinds on the bus."""
         self.inbox.frames += count
+        self.inbox.foreign += count
 
     def link_error(self, now_ns: int, reason: str) -> None:  # noqa: ARG002
         """Take note that the bus could not be read or written."""
@@ -281,6 +308,14 @@ class ControllerNode:
         seen = self.seen
         self._observer.observe(now_ns, self._frames_sent)
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
+        if self._monitors is not None:
+            seen.found = self._monitors.update(
+                now_ns,
+                self.inbox,
+                seen,
+                self._level.rate_m_s,
+                excited=self.retuning_state is _IDENTIFY,
+            )
         if seen.reset_edge:
             self._drive_sequence.request_reset()
         if self._valve is not None:
@@ -397,6 +432,8 @@ class ControllerNode:
                     )
                 )
             )
+            if self._monitors is not None:
+                frames.append(self._twin.frame(self._monitors.twin_message()))
         return frames
 
     def _command_frames(self, word: ControlWord, *, follow: bool) -> list[Frame]:

@@ -11,8 +11,11 @@ from typing import Final, TypeAlias
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
+from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.observations import VALVE_OFF, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
+
+_NONE: Final = Finding(0)
 
 Judgement: TypeAlias = Callable[[Observations, SafetyLimits], bool]
 
@@ -48,6 +51,8 @@ class Condition:
     awaited : int or None
         Place in the order in which the controller waits, in INIT, for conditions to go; None if
         it is ready all the same.
+    findings : Finding
+        Those of the monitors any of which is this condition, if it is one of theirs.
     """
 
     reaction: Reaction
@@ -55,6 +60,7 @@ class Condition:
     holds: Judgement
     zero_within_ms: int = 1000
     awaited: int | None = None
+    findings: Finding = _NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +90,12 @@ def _row(
     code: Fault, happened: str, remedy: str, *conditions: Condition, law_limit: str = ""
 ) -> FaultRow:
     return FaultRow(code, happened, remedy, conditions, law_limit)
+
+
+def _found(reaction: Reaction, limit: str, findings: Finding) -> Condition:
+    """What the monitors find."""
+    mask = int(findings)  # `&` with a member takes thirty times as long in Python 3.11
+    return Condition(reaction, limit, lambda seen, _: seen.found & mask != 0, findings=findings)
 
 
 # Of the conditions with the same reaction, the first that holds names the fault.
@@ -159,6 +171,11 @@ FAULTS: Final = (
             ),
             awaited=6,
         ),
+        _found(
+            Reaction.HALVE,
+            "DRIVE_STATUS_2, or a heartbeat of drive or sensors, silent for 1 s",
+            Finding.NODE_SILENT,
+        ),
     ),
     _row(
         Fault.VALVE_SILENT,
@@ -231,6 +248,47 @@ FAULTS: Final = (
         ),
     ),
     _row(
+        Fault.SIGN_FLIP,
+        "The pump presses against its command, or its pressure is measured with the wrong sign.",
+        "Check the pump's direction of rotation and the sign of the pressure sensor.",
+        _found(
+            Reaction.STOP,
+            "measured pressure against the command for 200 ms, or against the water's motion",
+            Finding.PUMP_SIGN,
+        ),
+    ),
+    _row(
+        Fault.MOTION_SIGN_FLIP,
+        "Roll, roll rate or the levels are measured with the wrong sign, or are swapped.",
+        "Check how motion sensor and level gauges are mounted and connected: roll is positive "
+        "starboard down.",
+        _found(
+            Reaction.STOP,
+            "roll against its integrated rate, or the water against roll and pressure",
+            Finding.MOTION_SIGN | Finding.WATER_SIGN,
+        ),
+    ),
+    _row(
+        Fault.FOREIGN_SENDER,
+        "A message comes faster than its cycle: two nodes send it, or its counter skips.",
+        "Find the second sender of the identifier (candump) and stop it.",
+        _found(
+            Reaction.STOP,
+            "frames heard and lost by the counter over 1.25 a cycle, eight too many",
+            Finding.SECOND_SENDER,
+        ),
+    ),
+    _row(
+        Fault.UNKNOWN_IDENTIFIERS,
+        "Frames that are not in the catalogue take up the CAN bus.",
+        "Find the node that sends them (candump) and stop it.",
+        _found(
+            Reaction.STOP,
+            "over 10% of the bus in use by identifiers that are not in the catalogue",
+            Finding.FLOOD,
+        ),
+    ),
+    _row(
         Fault.MOTION_SILENT,
         "No usable measurement comes from the motion sensor.",
         "Check the sensor's supply and bus connection, and the quality that SENSOR_MOTION carries.",
@@ -278,6 +336,85 @@ FAULTS: Final = (
             Reaction.RAMP,
             f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
             lambda seen, _: not seen.protection_valid,
+        ),
+    ),
+    _row(
+        Fault.STUCK_SIGNAL,
+        "Roll, roll rate or level stands still although the ship moves.",
+        "Check the motion sensor and the level gauges.",
+        _found(
+            Reaction.RAMP,
+            "roll or rate still while the other one moves, or level still while it is pushed",
+            Finding.ROLL_STUCK | Finding.RATE_STUCK | Finding.LEVEL_STUCK,
+        ),
+    ),
+    _row(
+        Fault.DRIFT,
+        "Roll and integrated roll rate do not agree.",
+        "Check the motion sensor: alignment, bias of the gyroscope, filter of the roll.",
+        _found(
+            Reaction.HALVE, "roll off the integrated rate by six times its noise", Finding.DRIFT
+        ),
+        _found(Reaction.RAMP, "the same for 30 s, or four times as far", Finding.DRIFT_LASTS),
+    ),
+    _row(
+        Fault.VOLUME,
+        "The port and starboard levels do not add up to the water in the tank.",
+        "Check the level gauges, then the tank for a leak or a wrong filling.",
+        _found(
+            Reaction.HALVE,
+            "mean of both levels off zero by 1.5% of the still-water height",
+            Finding.VOLUME,
+        ),
+        _found(Reaction.RAMP, "the same for 30 s, or three times as far", Finding.VOLUME_LASTS),
+    ),
+    _row(
+        Fault.SPIKES,
+        "Samples of motion sensor or level gauges had to be discarded again and again.",
+        "Check the sensors' cables and supply.",
+        _found(Reaction.RAMP, "five spikes, one a second forgotten", Finding.SPIKES),
+    ),
+    _row(
+        Fault.NOISE,
+        "The motion sensor or a level gauge is noisier than its figures.",
+        "Check the sensor's fastening, cable and supply, and the section `sensors` of the "
+        "configuration.",
+        _found(
+            Reaction.HALVE,
+            "five times the noise of the section `sensors`, over 0.7 s",
+            Finding.NOISE,
+        ),
+    ),
+    _row(
+        Fault.SIGNAL_DELAYED,
+        "The water moves before the measured roll does: the motion sensor is late.",
+        "Check the motion sensor's filter and whatever passes its messages on.",
+        _found(Reaction.RAMP, "roll late by a thirtieth of the roll period", Finding.MOTION_LATE),
+    ),
+    _row(
+        Fault.DRIVE_NOT_FOLLOWING,
+        "The pump's pressure does not follow the command.",
+        "Check the pump for blockage, the drive for limits, and the pressure sensor.",
+        _found(Reaction.STOP, "15% of the pressure limit off for 500 ms", Finding.DRIVE_LOST),
+        _found(Reaction.RAMP, "the same for 300 ms", Finding.DRIVE_LAGS),
+    ),
+    _row(
+        Fault.SATURATION,
+        "The pump has been held at its limit on one side.",
+        "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than the "
+        "pump has.",
+        _found(
+            Reaction.HALVE, "command or drive at its limit to one side for 10 s", Finding.SATURATED
+        ),
+    ),
+    _row(
+        Fault.ROLL_AMPLIFIED,
+        "The ship rolls more than she would with the pump at rest.",
+        "Retune the law, or use one for this load and sea.",
+        _found(
+            Reaction.RAMP,
+            "roll over 1.25 times the passive twin's for a roll period, and over 0.5 degrees RMS",
+            Finding.ROLL_AMPLIFIED,
         ),
     ),
     _row(

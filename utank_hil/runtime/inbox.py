@@ -29,6 +29,7 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.canbus.endpoints import MAX_LOST
+from utank_hil.runtime.monitors.spikes import SpikeGates
 from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
@@ -78,6 +79,8 @@ class Inbox:
     drive_state, drive_fault : DriveState or None, DriveFault or None
         Received at `drive_ns`; the echo of a new command at `echo_ns`. Without a pump the drive
         counts as enabled and is never late.
+    drive_held_back : bool
+        The drive says that its power or its speed is at the limit.
     power_w : float
         Electric power the drive takes.
     valve_opening : float
@@ -92,8 +95,12 @@ class Inbox:
         So does the operator's panel.
     conflict_ns : int
         When somebody else last sent with the controller's address.
-    frames : int
-        Frames heard so far, good and bad, of any kind.
+    frames, foreign : int
+        Frames heard so far, good and bad, of any kind, and those that are none of the catalogue's.
+    watched : list of Receiver
+        Of every message that is heard.
+    expected : frozenset of int
+        Identifiers of those whose silence is not judged by their age.
     """
 
     def __init__(
@@ -104,10 +111,14 @@ class Inbox:
         *,
         pump: bool = True,
         valve: bool = False,
+        gates: SpikeGates | None = None,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
         self._versions = (catalogue.version, configuration_version)
+        self._gates = gates
+        self._known = catalogue.can_ids
+        self.watched: list[Receiver[Any]] = []
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
         self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
         self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
@@ -121,19 +132,23 @@ class Inbox:
         if valve:
             matched.append(Address.VALVE)
             self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
-        self.orders = Orders(catalogue.receiver(OperatorCommand))
+        panel = catalogue.receiver(OperatorCommand)
+        self.orders = Orders(panel)
         self._subscriptions[self.orders.can_id] = self.orders.accept, self.orders.obey
+        self.watched.append(panel)
         self._matching: dict[int, bool] = {}
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
-        panel = catalogue.receiver(Heartbeat, Address.OPERATOR)
-        self._subscribe(panel, self._on_panel_heartbeat)
+        self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
+        panel_beat = catalogue.receiver(Heartbeat, Address.OPERATOR)
+        self._subscribe(panel_beat, self._on_panel_heartbeat)
         self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
         self.pressure_pa = self.power_w = 0.0
+        self.drive_held_back = False
         self.high_level = False
         self.valve_opening = 1.0
         self.valve_state: ValveState | None = None
@@ -150,7 +165,7 @@ class Inbox:
         # a longer gap than the counter bridges is told by the time
         self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
         self.conflict_ns = NEVER_HEARD_NS
-        self.frames = 0
+        self.frames = self.foreign = 0
 
     @property
     def level_m(self) -> float:
@@ -166,6 +181,7 @@ class Inbox:
     def _subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
         """Hand the accepted messages of a receiver to `handle`, with the time they came."""
         self._subscriptions[receiver.can_id] = receiver.accept, handle
+        self.watched.append(receiver)
         return receiver
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -179,12 +195,17 @@ class Inbox:
                 handle(message, now_ns)
         elif frame.can_id in self._own_ids:
             self.conflict_ns = now_ns
+        elif frame.can_id not in self._known:
+            self.foreign += 1
 
     def _on_motion(self, motion: SensorMotion, now_ns: int) -> None:
         if motion.quality not in _USABLE:
             return
         # one test for both: the sum is NaN if either is not available
-        if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s):
+        if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
+            self._gates is None
+            or self._gates.motion_passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
+        ):
             self.roll_rad, self.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
             self.motion_ns = now_ns
 
@@ -199,6 +220,7 @@ class Inbox:
         if (
             abs(port_m - starboard_m) <= 2 * self._most_level_m
             and abs(port_m + starboard_m) <= self._most_sum_m
+            and (self._gates is None or self._gates.levels_pass(port_m, starboard_m, now_ns))
         ):
             self.port_level_m, self.starboard_level_m = port_m, starboard_m
             self.tank_ns, self.tank_cycles = now_ns, self._cycles
@@ -219,6 +241,7 @@ class Inbox:
 
     def _on_drive_1(self, status: DriveStatus1, now_ns: int) -> None:
         self.drive_state = status.state
+        self.drive_held_back = status.power_limited or status.speed_limited
         self.drive_ns = now_ns
         if status.command_echo is not None and status.command_echo != self._echo:
             self._echo = status.command_echo

@@ -22,7 +22,14 @@ def _with(reaction: Reaction) -> tuple[Coded, ...]:
 def _first_of(conditions: tuple[Coded, ...]) -> First:
     """Write the function out: a loop over the conditions takes twice the time, every tick."""
     numbers = range(len(conditions))
-    tests = [f"    if holds_{i}(seen, limits): return conditions[{i}]" for i in numbers]
+    # a call for each of the monitors' findings would be most of the time
+    holds = [
+        f"seen.found & {int(condition.findings)}"
+        if condition.findings
+        else f"holds_{i}(seen, limits)"
+        for i, (_, condition) in enumerate(conditions)
+    ]
+    tests = [f"    if {holds[i]}: return conditions[{i}]" for i in numbers]
     scope: dict[str, Any] = {f"holds_{i}": conditions[i][1].holds for i in numbers}
     scope["conditions"] = conditions
     exec("\n".join(["def first(seen, limits):", *tests, "    return None"]), scope)

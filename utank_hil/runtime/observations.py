@@ -78,6 +78,8 @@ class Observations:
         Late ticks among the last ten; one that is late by three counts three times.
     law_failed : bool
         The law raised an error, or its last answer is not finite.
+    found : int
+        What the monitors found, bits of `Finding`.
     command_pa : float
         Pressure last commanded.
     requested_mode : Mode
@@ -115,6 +117,7 @@ class Observations:
     tick_late_ms: float = 0.0
     overruns_in_ten: int = 0
     law_failed: bool = False
+    found: int = 0
     command_pa: float = 0.0
     requested_mode: Mode = Mode.STANDBY
     arm_edge: bool = False
@@ -137,7 +140,7 @@ class Observer:
     Attributes
     ----------
     seen : Observations
-        `law_failed` and `command_pa` are the node's own to set.
+        `law_failed`, `found` and `command_pa` are the node's own to set.
     """
 
     def __init__(self, inbox: Inbox, bit_rate: int, command_cycle_ns: int) -> None:

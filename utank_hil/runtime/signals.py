@@ -20,6 +20,9 @@ _SOURCES: Final = {
     "tick_duration_s": "statistics.duration.last_s",
     "overruns": "statistics.overruns",
     "retuning": "retuning_state",
+    "twin_roll_rad": "twin_roll_rad",
+    "roll_rms_rad": "roll_rms_rad",
+    "twin_roll_rms_rad": "twin_roll_rms_rad",
 }
 """Each signal in SI units, its unit in its name, and the attribute of `ControllerNode` it shows.
 

@@ -6,6 +6,7 @@ time the computed level moves four bands, and some more by the noise. Sixteen ar
 stuck.
 """
 
+import math
 from typing import Final
 
 from utank_hil.dynamics.ship import RollShip
@@ -40,7 +41,12 @@ class LevelStuck:
         self._period_s = period_s
         self._inertia = tank.effective_length_m
         self._loss = tank.loss_pa_per_m_s / tank.density_kg_m3
-        self._level_m = self._moved_m = self._rate_m_s = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._level_m = math.inf
+        self._moved_m = self._rate_m_s = 0.0
 
     def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
         """Take what is measured; return what was found."""

@@ -19,8 +19,10 @@ LEAK_S: Final = 15.0
 BIAS_S: Final = 300.0
 FIRST_BIAS_S: Final = 30.0
 """The bias is zero at the start as if it had been learned for so long."""
+SMOOTH_S: Final = 0.25
 SIGN_S: Final = 0.5
 SIGN_GAIN: Final = -0.25
+STUCK_S: Final = 0.5
 LEARN: Final = 3.0
 """Up to so many times the threshold what is left is taken for a bias."""
 LARGE_DRIFT: Final = 4.0
@@ -51,16 +53,17 @@ class Stuck:
         self._band = band
         self._limit_rad = limit_rad
         self._value = math.inf
-        self._sum_rad = 0.0
+        self._sum_rad = self._still_s = 0.0
 
-    def update(self, value: float, left_rad: float, keep: float) -> bool:
+    def update(self, value: float, left_rad: float, keep: float, elapsed_s: float) -> bool:
         """Take a value and what the step left unexplained; return whether the signal is stuck."""
         if abs(value - self._value) > self._band:
             self._value = value
-            self._sum_rad = 0.0
+            self._sum_rad = self._still_s = 0.0
             return False
         self._sum_rad = keep * (self._sum_rad + left_rad)
-        return abs(self._sum_rad) > self._limit_rad
+        self._still_s += elapsed_s
+        return abs(self._sum_rad) > self._limit_rad and self._still_s > STUCK_S
 
 
 class RollAgainstRate:
@@ -80,7 +83,9 @@ class RollAgainstRate:
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_rad = thresholds.drift_rad
-        self._roll_stuck = Stuck(thresholds.roll_still_rad, thresholds.drift_rad)
+        # with the rate's sign wrong a roll that crosses its band leaves twice the band
+        least_rad = thresholds.drift_rad + 4 * thresholds.roll_still_rad
+        self._roll_stuck = Stuck(thresholds.roll_still_rad, least_rad)
         self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
@@ -90,7 +95,7 @@ class RollAgainstRate:
         """Begin anew after a gap, with the bias that was learned."""
         self._roll_rad = math.nan
         self.unexplained_rad = self.residual_rad = 0.0
-        self._over_s = 0.0
+        self._over_s = self._smooth_rad = 0.0
         self._moved_turned = self._turned_turned = 0.0
 
     def update(
@@ -113,15 +118,19 @@ class RollAgainstRate:
             return 0
         limit_rad = self._limit_rad
         self.residual_rad = left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
+        slow_rad = min(
+            max(left_rad, -limit_rad), limit_rad
+        )  # a jump is neither bias nor standstill
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
-            self._bias_rad_s += min(max(left_rad, -limit_rad), limit_rad) / self._learned_s
+            self._bias_rad_s += slow_rad / self._learned_s
         most_rad = MOST_DRIFT * limit_rad
         keep = 1 - elapsed_s / LEAK_S
         summed_rad = keep * (self.unexplained_rad + left_rad)
         self.unexplained_rad = summed_rad = min(max(summed_rad, -most_rad), most_rad)
-        roll_stuck = self._roll_stuck.update(roll_rad, left_rad, keep)
-        rate_stuck = self._rate_stuck.update(rate_rad_s, left_rad, keep)
+        self._smooth_rad += (summed_rad - self._smooth_rad) * (elapsed_s / SMOOTH_S)
+        roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
+        rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
         keep = 1 - elapsed_s / SIGN_S
         self._moved_turned = keep * self._moved_turned + moved_rad * turned_rad
         self._turned_turned = keep * self._turned_turned + turned_rad * turned_rad
@@ -131,7 +140,7 @@ class RollAgainstRate:
             return 0
         self._over_s += elapsed_s
         found = _DRIFT
-        if self._over_s > DRIFT_LASTS_S or abs(summed_rad) > LARGE_DRIFT * limit_rad:
+        if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
         if self._moved_turned < SIGN_GAIN * self._turned_turned:
             found |= _SIGN

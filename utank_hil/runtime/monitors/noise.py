@@ -1,5 +1,6 @@
 """Noise of a signal: the power of what can't be its motion."""
 
+import math
 from typing import Final
 
 NOISE_S: Final = 0.7
@@ -39,10 +40,14 @@ class SecondDifference:
     """
 
     def __init__(self) -> None:
-        self._last = self._before = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._last = self._before = math.nan
 
     def update(self, value: float) -> float:
-        """Take the next sample; return the second difference."""
+        """Take the next sample; return the second difference, zero as long as there is none."""
         difference = value - 2 * self._last + self._before
         self._before, self._last = self._last, value
-        return difference
+        return difference if difference == difference else 0.0

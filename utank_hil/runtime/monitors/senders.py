@@ -13,7 +13,6 @@ from utank_hil.runtime.monitors.finding import Finding
 
 MOST_PER_CYCLE: Final = 1.25
 MOST_FRAMES: Final = 8.0
-SILENT_S: Final = 1.0
 FOREIGN_SHARE: Final = 0.1
 """Of the bus: so much of it may be used by frames that are not in the catalogue."""
 FOREIGN_FRAMES: Final = 40.0
@@ -26,6 +25,7 @@ _FLOOD: Final = int(Finding.FLOOD)
 class Heard(Protocol):
     """What a receiver counts."""
 
+    can_id: int
     cycle_ns: int
     heard: int
     lost: int
@@ -68,6 +68,8 @@ class Stream:
 class Senders:
     """All messages that the controller hears, and the frames that are none of them.
 
+    Every second message is looked at in one call, the others in the next.
+
     Parameters
     ----------
     streams : sequence of Stream
@@ -76,7 +78,9 @@ class Senders:
     """
 
     def __init__(self, streams: Sequence[Stream], frames_per_s: float) -> None:
-        self._streams = tuple(streams)
+        self._due, self._later = tuple(streams[::2]), tuple(streams[1::2])
+        self._found_before = 0
+        self._elapsed_before_s = 0.0
         self._foreign_per_s = FOREIGN_SHARE * frames_per_s
         self._foreign = 0
         self._excess = 0.0
@@ -84,9 +88,13 @@ class Senders:
     def update(self, foreign: int, elapsed_s: float) -> int:
         """Take the foreign frames so far; return what was found."""
         found = 0
-        for stream in self._streams:
-            found |= stream.update(elapsed_s)
+        both_s = elapsed_s + self._elapsed_before_s
+        for stream in self._due:
+            found |= stream.update(both_s)
+        self._due, self._later = self._later, self._due
+        self._elapsed_before_s = elapsed_s
+        before, self._found_before = self._found_before, found
         excess = self._excess + foreign - self._foreign - self._foreign_per_s * elapsed_s
         self._foreign = foreign
         self._excess = excess = min(max(excess, 0.0), 2 * FOREIGN_FRAMES)
-        return found | _FLOOD if excess > FOREIGN_FRAMES else found
+        return found | before | _FLOOD if excess > FOREIGN_FRAMES else found | before

@@ -2,6 +2,8 @@
 
 from typing import Final
 
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+
 STEP_SAMPLES: Final = 5
 """So many in a row are no spike but a step, which is taken."""
 
@@ -44,15 +46,45 @@ class SpikeGate:
         return False
 
 
+class SpikeGates:
+    """The gates of the motion sensor and of the level gauges.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
+        self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
+        self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+
+    def motion_passes(self, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
+        """Whether a sample of the motion sensor may be used."""
+        # both see every sample
+        return self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
+
+    def levels_pass(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
+        """Whether a sample of the level gauges may be used."""
+        return self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
+
+    @property
+    def discarded(self) -> int:
+        """Samples so far that did not pass."""
+        motion = self._roll.discarded + self._rate.discarded
+        return motion + self._port.discarded + self._starboard.discarded
+
+
 class SpikeCount:
-    """Leaky count of what the gates discarded: one a second is forgotten, five are too many.
+    """Leaky count of what the gates discarded: one a second is forgotten, five in one are too many.
 
     Attributes
     ----------
     found : bool
     """
 
-    MOST: Final = 5.0
+    MOST: Final = 4.0
 
     def __init__(self) -> None:
         self._level = 0.0
@@ -63,7 +95,7 @@ class SpikeCount:
         """Take the number discarded so far; return whether there were too many."""
         new = discarded - self._seen
         self._seen = discarded
-        # what was five stays so for a second
-        self._level = min(max(self._level - elapsed_s, 0.0) + new, self.MOST + 1.0)
-        self.found = self._level >= self.MOST
+        # forgotten two seconds after the last
+        self._level = min(max(self._level - elapsed_s, 0.0) + new, self.MOST + 2.0)
+        self.found = self._level > self.MOST
         return self.found

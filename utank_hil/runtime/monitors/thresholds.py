@@ -134,7 +134,7 @@ def thresholds_of(
         volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
         least_roll_push_m2_s2=roll_push_m2_s2,
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
-        motion_late_s=0.3 / frequency_rad_s,
+        motion_late_s=0.2 / frequency_rad_s,
         pressure_error_pa=0.15 * limits.pressure_pa,
         pressure_limit_pa=limits.pressure_pa,
         amplified_roll_rad=math.radians(0.5),

@@ -1,0 +1,118 @@
+"""All monitors behind the controller node, fed by hand."""
+
+import numpy as np
+import pytest
+from controller_bench import CATALOGUE, VERSION, VESSEL
+
+from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
+from utank_hil.control import DesignPlant
+from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.monitoring import ROUND_TICKS, Monitors
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.thresholds import SensorFigures
+from utank_hil.runtime.observations import Observations
+from utank_hil.tick import TICK_NS, TICK_S
+
+FRESH = dict.fromkeys(("motion_age_ms", "tank_age_ms", "pump_age_ms"), 0.0)
+
+
+class Table:
+    """Monitors and inbox without a node."""
+
+    def __init__(self) -> None:
+        plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+        self.monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+        self.inbox = Inbox(CATALOGUE, VERSION, VESSEL.tank.level_limit_m, self.monitors.gates)
+        self.now_ns = 0
+        self._motion = CATALOGUE.transmitter(SensorMotion)
+        self._tank = CATALOGUE.transmitter(SensorTank)
+
+    def tick(self, seconds: float = TICK_S, **seen: object) -> int:
+        found = 0
+        for _ in range(round(seconds / TICK_S)):
+            self.now_ns += TICK_NS
+            found = self.monitors.update(
+                self.now_ns,
+                self.inbox,
+                Observations(**{**FRESH, **seen}),  # type: ignore[arg-type]
+                0.0,
+                excited=False,
+            )
+        return found
+
+    def say_roll(self, roll_rad: float, rate_rad_s: float = 0.0) -> None:
+        frame = self._motion.frame(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD))
+        self.inbox.receive(frame, self.now_ns)
+
+    def say_levels(self, port_m: float, starboard_m: float) -> None:
+        levels = SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD)
+        self.inbox.receive(self._tank.frame(levels), self.now_ns)
+
+
+def test_spike_of_the_roll_never_reaches_the_law() -> None:
+    table = Table()
+    for roll_rad in (0.01, 0.51, 0.011):
+        table.say_roll(roll_rad)
+        table.tick()
+        assert table.inbox.roll_rad == pytest.approx(0.01, abs=2e-3)
+
+
+def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
+    table = Table()
+    table.say_levels(0.0, 0.0)
+    table.tick()
+    levels = SensorTank(3.0, 0.0, Switch.ON, Switch.OFF, Quality.GOOD)
+    table.inbox.receive(table._tank.frame(levels), table.now_ns)
+    assert table.inbox.port_level_m == 0.0
+    assert table.inbox.high_level
+
+
+def test_five_spikes_in_a_second_are_found() -> None:
+    table = Table()
+    table.say_roll(0.0)
+    for _ in range(5):
+        table.tick(0.15)
+        table.say_roll(0.5)
+        table.tick()
+        table.say_roll(0.0)
+    assert table.tick(0.1) & Finding.SPIKES
+
+
+def test_gap_of_the_motion_sensor_is_no_drift() -> None:
+    table = Table()
+    table.say_roll(0.0)
+    table.tick(1.0)
+    table.tick(5.0, motion_age_ms=1000.0)
+    table.say_roll(0.2)
+    assert not table.tick(1.0) & ~Finding.SPIKES
+
+
+def test_everything_is_looked_at_in_a_round() -> None:
+    """Something wrong for each group is found within one round of ticks or the next."""
+    table = Table()
+    table.say_levels(0.5, 0.5)
+    table.say_roll(0.0)
+    table.tick(2 * ROUND_TICKS * TICK_S)
+    table.inbox.roll_rad = 0.1
+    table.inbox.foreign = 1000
+    found = table.tick(2 * ROUND_TICKS * TICK_S)
+    for finding in (Finding.DRIFT, Finding.VOLUME, Finding.FLOOD):
+        assert found & finding
+
+
+def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not() -> None:
+    table = Table()
+    foreign = min(set(range(100)) - CATALOGUE.can_ids)
+    for can_id in (*CATALOGUE.can_ids, foreign):
+        table.inbox.receive(Frame(can_id, bytes(8)), 0)
+    assert table.inbox.foreign == 1
+
+
+def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
+    table = Table()
+    for k in range(6000):
+        table.inbox.roll_rad = 0.05 * np.sin(0.6 * TICK_S * k)
+        table.tick()
+    twin = table.monitors.twin
+    assert twin.rms_rad == pytest.approx(twin.ship_rms_rad, rel=1e-9)
+    assert table.monitors.twin_message().twin_rms_rad == twin.rms_rad

@@ -1,0 +1,233 @@
+"""All monitors of a controller node, fed once a tick; one of them is due in each tick.
+
+Motion, drive and twin are due every 50 ms, all else every 100 ms. So a tick pays for one of them,
+and the gates and the running integral of the rate are all that is done in every tick.
+"""
+
+import math
+from collections.abc import Collection, Iterable
+from typing import Final
+
+from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
+from utank_hil.canbus import Quality
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.level_stuck import LevelStuck
+from utank_hil.runtime.monitors.motion import RollAgainstRate
+from utank_hil.runtime.monitors.noise import Noise, SecondDifference
+from utank_hil.runtime.monitors.senders import Heard, Senders, Stream
+from utank_hil.runtime.monitors.spikes import SpikeCount, SpikeGates
+from utank_hil.runtime.monitors.tank_equation import TankEquation
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
+from utank_hil.runtime.monitors.volume import Volume
+from utank_hil.runtime.observations import MEAN_FRAME_BITS, Observations
+from utank_hil.runtime.passive_twin import PassiveTwin
+from utank_hil.tick import TICK_S
+
+ROUND_TICKS: Final = 10
+LONG_S: Final = ROUND_TICKS * TICK_S
+SHORT_S: Final = LONG_S / 2
+STALE_MS: Final = 100.0
+"""Older measurements are a gap, after which a comparison begins anew."""
+SILENT_S: Final = 1.0
+LATE_ROUND: Final = 1.2
+"""So many rounds after the last one, ticks were left out: as a gap."""
+
+NOISE_LASTS_S: Final = 2.0
+
+_DRIFT: Final = int(Finding.DRIFT)
+_NOISE: Final = int(Finding.NOISE)
+_SPIKES: Final = int(Finding.SPIKES)
+_AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
+
+
+class Monitors:
+    """The monitors of one ship.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+    roll_limit_rad : float
+        Largest roll under control.
+    sensors : SensorFigures
+    bit_rate : int
+        Of the bus.
+    compares : bool
+        Whether the law is meant to roll the ship less than her passive twin; one that stimulates
+        her is not.
+
+    Attributes
+    ----------
+    thresholds : MonitorThresholds
+    twin : PassiveTwin
+    found : int
+        Bits of `Finding`, of now.
+    """
+
+    def __init__(
+        self,
+        plant: DesignPlant,
+        roll_limit_rad: float,
+        sensors: SensorFigures,
+        bit_rate: int,
+        *,
+        compares: bool = True,
+    ) -> None:
+        self.thresholds: MonitorThresholds = thresholds_of(plant, roll_limit_rad, sensors)
+        thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
+        self.gates = SpikeGates(thresholds)
+        self._spikes = SpikeCount()
+        self._motion = RollAgainstRate(thresholds)
+        self._roll_noise = Noise(math.sqrt(2) * thresholds.roll_noise_rad)
+        self._rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
+        self._rate_bend = SecondDifference()
+        self._drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
+        self._saturation = Saturation(thresholds)
+        self._equation = TankEquation(ship, tank, thresholds, LONG_S)
+        self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
+        self._volume = Volume(thresholds)
+        self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
+        # a valve's loss stands neither in the tank's equation here nor in the twin
+        self._water_free = plant.valve is None
+        self._compares = compares and self._water_free
+        self._frames_per_s = bit_rate / MEAN_FRAME_BITS
+        self._senders = Senders((), self._frames_per_s)
+        self._phase = 0
+        self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
+        self._noisy_s = 0.0
+        self._turned_rad = self._last_rate_rad_s = 0.0
+        self._of_motion = self._of_drive = self._of_water = self._of_volume = 0
+        self._of_senders = self._of_twin = self._of_saturation = 0
+        self.found = 0
+
+    def watch(self, receivers: Iterable[Heard], expected: Collection[int]) -> None:
+        """Watch the pace of messages; of those `expected`, by identifier, the silence too."""
+        streams = [
+            Stream(receiver, silent_s=SILENT_S if receiver.can_id in expected else math.inf)
+            for receiver in receivers
+        ]
+        self._senders = Senders(streams, self._frames_per_s)
+
+    def twin_message(self) -> PassiveTwinMessage:
+        """What the panels are shown of the twin: degraded by what degrades the motion sensor."""
+        twin = self.twin
+        quality = Quality.DEGRADED if self._of_motion else Quality.GOOD
+        return PassiveTwinMessage(quality, twin.roll_rad, twin.rms_rad, twin.ship_rms_rad)
+
+    def update(
+        self,
+        now_ns: int,
+        inbox: Inbox,
+        seen: Observations,
+        level_rate_m_s: float,
+        *,
+        excited: bool,
+    ) -> int:
+        """Look at one tick.
+
+        Parameters
+        ----------
+        now_ns : int
+        inbox : Inbox
+            What was received.
+        seen : Observations
+            Ages, and the pressure commanded last.
+        level_rate_m_s : float
+            As estimated.
+        excited : bool
+            The ship is rolled on purpose at present.
+
+        Returns
+        -------
+        int
+            `found`.
+        """
+        self._turned_rad += inbox.roll_rate_rad_s * ((now_ns - self._last_ns) * 1e-9)
+        self._last_ns = now_ns
+        phase = self._phase
+        self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
+        if phase == 0 or phase == 5:
+            self._look_at_motion(now_ns, inbox, seen)
+        elif phase == 1 or phase == 6:
+            self._of_drive = self._drive.update(
+                seen.command_pa,
+                inbox.pressure_pa,
+                enabled=seen.drive_enabled and seen.pump_age_ms <= STALE_MS,
+                limited=inbox.drive_held_back,
+            )
+        elif phase == 2 or phase == 7:
+            self._look_at_twin(inbox, level_rate_m_s, excited=excited)
+        elif phase == 3:
+            self._look_at_water(now_ns, inbox, seen)
+        elif phase == 4:
+            if seen.tank_age_ms <= STALE_MS:
+                self._of_volume = self._volume.update(
+                    inbox.port_level_m, inbox.starboard_level_m, LONG_S
+                )
+        elif phase == 8:
+            elapsed_s = (now_ns - self._senders_ns) * 1e-9
+            self._senders_ns = now_ns
+            self._of_senders = self._senders.update(inbox.foreign, elapsed_s)
+        else:
+            self._of_saturation = self._saturation.update(
+                seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
+            )
+            if self._spikes.update(self.gates.discarded, LONG_S):
+                self._of_saturation |= _SPIKES
+        self.found = found = (
+            self._of_motion
+            | self._of_drive
+            | self._of_water
+            | self._of_volume
+            | self._of_senders
+            | self._of_twin
+            | self._of_saturation
+        )
+        return found
+
+    def _look_at_motion(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
+        elapsed_s = (now_ns - self._motion_ns) * 1e-9
+        self._motion_ns = now_ns
+        rate_rad_s = inbox.roll_rate_rad_s
+        # the sum holds each rate for a tick: half a tick of the ends makes it a trapezoid
+        turned_rad = self._turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
+        self._turned_rad = 0.0
+        self._last_rate_rad_s = rate_rad_s
+        if seen.motion_age_ms > STALE_MS:
+            self._motion.restart()
+            self._rate_bend.restart()
+            self._of_motion = 0
+            return
+        found = self._motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
+        noisy = self._roll_noise.update(self._motion.residual_rad, elapsed_s)
+        noisy |= self._rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s)
+        if not noisy:
+            self._noisy_s = 0.0
+            self._of_motion = found
+            return
+        # a flip looks like noise at first, and lasting noise like a flip now and then
+        self._noisy_s += elapsed_s
+        self._of_motion = _NOISE | (found & _DRIFT if self._noisy_s > NOISE_LASTS_S else found)
+
+    def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excited: bool) -> None:
+        twin = self.twin
+        if excited:
+            twin.excuse()
+        twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
+        self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
+
+    def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
+        late_s = (now_ns - self._round_ns) * 1e-9
+        self._round_ns = now_ns
+        oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
+        if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S or not self._water_free:
+            self._equation.restart()
+            self._level_stuck.restart()
+            self._of_water = 0
+            return
+        roll_rad, level_m, pressure_pa = inbox.roll_rad, inbox.level_m, inbox.pressure_pa
+        self._of_water = self._equation.update(
+            roll_rad, level_m, pressure_pa
+        ) | self._level_stuck.update(roll_rad, level_m, pressure_pa)

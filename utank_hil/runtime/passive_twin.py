@@ -1,0 +1,162 @@
+"""The passive twin: what the ship would roll in these waves without the pump.
+
+Ship and twin feel the same wave moment K, the twin no pressure. With the state x of the ship and
+x_t of the twin, M the model of roll and tank, f what is not linear in it::
+
+    x'   = M x   + b P + f(x)   + e K
+    x_t' = M x_t       + f(x_t) + e K
+
+so the wave moment need not be known: what the pump has done, d = x - x_t, obeys ::
+
+    d'   = M d   + b P + f(x) - f(x - d)
+
+and the twin's roll is the measured roll minus that of d. A wave moment estimated from the same
+model and fed to the passive ship gives the same answer, by superposition, and adds the estimator's
+lag. f holds the ship's quadratic damping and what her restoring moment has beyond its linear part,
+and the tank's quadratic loss.
+
+The twin's model is the configuration's ship. A ship that was loaded otherwise makes d wrong by as
+much as her answer to the pump differs, and nothing where the pump does nothing.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.restoring import restoring
+from utank_hil.dynamics.sampling import transition_and_step
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+
+MEMORY_PERIODS: Final = 6.0
+"""Roll periods in the running root mean squares."""
+MEAN_PERIODS: Final = 6.0
+"""Roll periods in the mean roll, about which they are taken."""
+AMPLIFIED: Final = 1.25
+RECOVERED: Final = 1.05
+"""Own roll over the twin's at which a law has lost, and at which that is over."""
+LASTS_PERIODS: Final = 1.0
+
+
+class PassiveTwin:
+    """The twin and the comparison with it.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    period_s : float
+        Time between two updates.
+    least_roll_rad : float
+        Own root mean square below which nothing is judged.
+
+    Attributes
+    ----------
+    roll_rad : float
+        The twin's roll.
+    amplified : bool
+        The ship rolls more than her twin, for over a roll period.
+    """
+
+    def __init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float) -> None:
+        a, b = state_matrices(ship, tank)
+        # pressure, moment on the ship, force on the water as a pressure
+        transition, step = transition_and_step(a, np.column_stack([b, b[:, 0]]), period_s)
+        self._step = np.hstack([transition, step])
+        self._made = np.zeros(7)
+        self._effort = self._made[4:]
+        self._damping = ship.quadratic_damping_nms2_rad2
+        self._loss = tank.quadratic_loss_pa_per_m2_s2
+        moment = restoring(ship)
+        self._stiffness = ship.stiffness_nm_rad
+        self._piece_rad = moment.piece_rad
+        # highest power first
+        self._pieces = [tuple(row[::-1]) for row in moment.coefficients_nm.tolist()]
+        self._straight = len(self._pieces) == 1 and not any(self._pieces[0][:-2])
+        self._period_s = period_s
+        roll_period_s = 2 * math.pi / tank.natural_frequency_rad_s
+        self._share = period_s / (MEMORY_PERIODS * roll_period_s)
+        self._mean_share = period_s / (MEAN_PERIODS * roll_period_s)
+        self._patience_s = LASTS_PERIODS * roll_period_s
+        self._least_power = least_roll_rad**2
+        self._pressure_pa = 0.0
+        self._mean_rad = self._twin_mean_rad = 0.0
+        self._power = self._twin_power = 0.0
+        self._losing_s = 0.0
+        self.roll_rad = 0.0
+        self.amplified = False
+
+    @property
+    def ship_rms_rad(self) -> float:
+        """Root mean square of the ship's roll about its mean, over some roll periods."""
+        return math.sqrt(self._power)
+
+    @property
+    def rms_rad(self) -> float:
+        """The same of the twin's."""
+        return math.sqrt(self._twin_power)
+
+    def update(
+        self, roll_rad: float, rate_rad_s: float, level_rate_m_s: float, pressure_pa: float
+    ) -> None:
+        """Take what is measured, once a period.
+
+        Parameters
+        ----------
+        roll_rad, rate_rad_s, level_rate_m_s : float
+            Of the ship and her water.
+        pressure_pa : float
+            Across the pump.
+        """
+        made, effort = self._made, self._effort
+        effort[0] = 0.5 * (pressure_pa + self._pressure_pa)
+        self._pressure_pa = pressure_pa
+        if self._damping or not self._straight:
+            effort[1] = self._moment_beside_nm(roll_rad, rate_rad_s)
+        if self._loss:
+            other = level_rate_m_s - float(made[3])
+            effort[2] = -self._loss * (abs(level_rate_m_s) * level_rate_m_s - abs(other) * other)
+        made[:4] = self._step @ made
+        self.roll_rad = twin_rad = roll_rad - float(made[0])
+        self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
+        self._twin_mean_rad += self._mean_share * (twin_rad - self._twin_mean_rad)
+        own_rad, twin_rad = roll_rad - self._mean_rad, twin_rad - self._twin_mean_rad
+        self._power += self._share * (own_rad * own_rad - self._power)
+        self._twin_power += self._share * (twin_rad * twin_rad - self._twin_power)
+        self._judge()
+
+    def excuse(self) -> None:
+        """Roll that is caused on purpose: not judged until it is forgotten."""
+        self._losing_s = -self._patience_s * MEMORY_PERIODS / LASTS_PERIODS
+
+    def _judge(self) -> None:
+        ratio = RECOVERED if self.amplified else AMPLIFIED
+        least_power = max(self._least_power, ratio * ratio * self._twin_power)
+        if self._losing_s < 0 or self._power > least_power:
+            self._losing_s += self._period_s
+        else:
+            self._losing_s = 0.0
+        self.amplified = self._losing_s > self._patience_s
+
+    def _moment_beside_nm(self, roll_rad: float, rate_rad_s: float) -> float:
+        """Moment on the ship that is not linear, less that on the twin."""
+        made_rad, made_rad_s = float(self._made[0]), float(self._made[1])
+        other_rad_s = rate_rad_s - made_rad_s
+        moment_nm = -self._damping * (abs(rate_rad_s) * rate_rad_s - abs(other_rad_s) * other_rad_s)
+        if self._straight:
+            return moment_nm
+        righting_nm = self._righting_nm(roll_rad) - self._righting_nm(roll_rad - made_rad)
+        return moment_nm - righting_nm + self._stiffness * made_rad
+
+    def _righting_nm(self, roll_rad: float) -> float:
+        since = heel = abs(roll_rad)
+        piece = self._pieces[0]
+        if heel > self._piece_rad:
+            index = min(int(heel / self._piece_rad), len(self._pieces) - 1)
+            piece, since = self._pieces[index], heel - index * self._piece_rad
+        value = 0.0
+        for coefficient in piece:
+            value = value * since + coefficient
+        return math.copysign(value, roll_rad)
