@@ -91,11 +91,18 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     scenario = load_config(STORM, Scenario)
-    speeds = [slice_speed(scenario, arguments.seconds) for _ in range(arguments.rounds)]
+    linear = scenario.model_copy(update={"plant": "linear"})
+    # in turns, so that what else the machine does falls on both
+    turns = [
+        tuple(slice_speed(each, arguments.seconds) for each in (scenario, linear))
+        for _ in range(arguments.rounds)
+    ]
+    speeds = [nonlinear for nonlinear, _ in turns]
     ticks, frames = controller_costs_us(scenario, arguments.seconds)
     result = {
         "ship_seconds_per_cpu_second": median(speeds),
         "fastest_ship_seconds_per_cpu_second": max(speeds),
+        "speed_against_linear_plant": median(one / other for one, other in turns),
         "frame_p50_us": frames[len(frames) // 2],
         "tick_p50_us": ticks[len(ticks) // 2],
         "tick_p99_us": ticks[len(ticks) * 99 // 100],
@@ -109,6 +116,9 @@ def main() -> None:
     table.add_column("value", justify="right")
     table.add_row("ship seconds per processor second (aim 300)", f"{median(speeds):.0f}")
     table.add_row(f"  the fastest of {len(speeds)} rounds", f"{max(speeds):.0f}")
+    table.add_row(
+        "  its speed against a linear plant", f"{result['speed_against_linear_plant']:.3f}"
+    )
     table.add_row("controller, one frame heard, p50", f"{result['frame_p50_us']:.1f} µs")
     table.add_row("controller tick and its frames, p50", f"{result['tick_p50_us']:.0f} µs")
     table.add_row("controller tick and its frames, p99", f"{result['tick_p99_us']:.0f} µs")
