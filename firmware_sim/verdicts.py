@@ -53,7 +53,7 @@ def mark_of(result: BenchResult, run: Run) -> Mark | None:
     if run.capsized_s < result.end_s:
         return Mark("capsized", f"the ship capsized at {run.capsized_s:.1f} s")
     mode, fault = (int(run.column(name)[-1]) for name in ("mode", "fault"))
-    if mode == Mode.FAULT or fault != Fault.NONE:
+    if fault != Fault.NONE:
         words = fault_text(Fault(fault))
         return Mark("fault", f"the controller ended in {Mode(mode).name}, fault {words}")
     share, wanted = _obeyed_share(result, run), _wanted(run)

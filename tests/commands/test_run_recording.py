@@ -13,7 +13,7 @@ import pytest
 from utank_hil.commands import recording as module
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderError, RecorderReport, read_recording
+from utank_hil.telemetry import RecorderError, RecorderReport, Rotation, read_recording
 
 SHM = Path("/dev/shm")
 
@@ -51,6 +51,7 @@ class Instant:
         live: bool = False,
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
+        rotation: Rotation | None = None,
     ) -> None:
         file.write_text(ring)
 

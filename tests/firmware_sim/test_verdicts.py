@@ -173,6 +173,19 @@ def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> Non
     )
 
 
+def test_operators_clock_starts_when_the_controller_is_ready() -> None:
+    slow = with_column(run("a", 0.03, from_s=46.0), "mode", Mode.INIT, slice(0, 800))
+    assert mark_of(result_of(PASSIVE_RUN, slow), slow) is None
+    late = run("a", 0.03, from_s=46.0)
+    assert mark_of(result_of(PASSIVE_RUN, late), late) is not None
+
+
+def test_a_run_without_a_row_is_said_by_the_exit_code() -> None:
+    result = dataclasses.replace(result_of(PASSIVE_RUN, run("a", 0.03)), not_run=("b",))
+    assert endings(result) == ["not run: b"]
+    assert exit_code(result) is ExitCode.NOT_RANKED
+
+
 def test_ninety_percent_in_charge_is_enough_and_less_is_not() -> None:
     for share, counts in ((0.91, True), (0.89, False)):
         late = run("a", 0.03, from_s=END_S - share * (END_S - SETTLE_S))

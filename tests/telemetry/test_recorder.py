@@ -214,7 +214,7 @@ def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
         process.send_signal(stop)
         output, _ = process.communicate(timeout=20)
     assert process.returncode == 0
-    assert output.split() == ['{"rows":', "7,", '"lost":', "0}"]
+    assert output.split() == ['{"rows":', "7,", '"lost":', "0,", '"parts":', "1}"]
     assert len(recorded(file)) == 7
 
 

@@ -9,9 +9,11 @@ from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter
+from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter, Rotation
 
 NAME: Final = "run-{}.rrd"
+PART_S: Final = 3600.0
+"""A recording goes on in another file after so long: 50 MB."""
 RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
 
 
@@ -25,6 +27,8 @@ class RecordingSummary:
         None if there is none.
     rows, lost : int or None
         Rows recorded, and rows that the recorder was too slow for; None if it failed.
+    parts : int or None
+        Files; `file` is the first. None if it failed.
     error : str or None
         Why it did not start, or ended before the run.
     """
@@ -32,6 +36,7 @@ class RecordingSummary:
     file: str | None = None
     rows: int | None = None
     lost: int | None = None
+    parts: int | None = None
     error: str | None = None
 
 
@@ -49,6 +54,8 @@ class RunRecording:
         Name of the run's ring of events, to be recorded beside the rows.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`).
+    keep_bytes : int, optional
+        The folder's oldest recordings are removed beyond so much; without it none are.
 
     Attributes
     ----------
@@ -62,6 +69,7 @@ class RunRecording:
         live: bool = False,
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
+        keep_bytes: int | None = None,
     ) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
@@ -78,7 +86,12 @@ class RunRecording:
         try:
             self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
             self._recorder = RecorderProcess(
-                self._ring.name, file, live=live, events=events, about=about
+                self._ring.name,
+                file,
+                live=live,
+                events=events,
+                about=about,
+                rotation=Rotation(PART_S, keep_bytes),
             )
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
@@ -111,3 +124,4 @@ class RunRecording:
                 self.summary.error = str(error)
             else:
                 self.summary.rows, self.summary.lost = report.rows, report.lost
+                self.summary.parts = report.parts

@@ -49,13 +49,22 @@ def run(
             "without it there are none."
         ),
     ] = None,
+    keep: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MB",
+            min=0,
+            help="Remove the folder's oldest recordings beyond so much; without it none are.",
+        ),
+    ] = None,
     json_: Json = False,
     view: View = False,
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
     It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
-    (UTC) of their start; a recording that fails is reported, and the controller runs without. A
+    (UTC) of their start and go on in another file every hour; one that fails is reported, and the
+    controller runs without. A
     controller that retunes itself prints each step with its reasons when it happens; so does one
     that meets a fault. A fault that is latched at the end, or a lost bus, has an exit code of its
     own (docs/exit-codes.md).
@@ -93,6 +102,7 @@ def run(
                 live=view,
                 events=None if announcer is None else announcer.ring,
                 about=describe("run", loaded, folder, options=context.params),
+                keep_bytes=None if keep is None else round(keep * 1e6),
             )
             stack.callback(recording.stop)
             if recording.summary.error is not None:
@@ -209,6 +219,8 @@ def _tell(console: Console, recording: RecordingSummary) -> None:
         said = f"recording: {shown(Path(recording.file))}"
         if recording.rows is not None:
             said += f", {recording.rows} rows, {recording.lost} lost"
+        if recording.parts is not None and recording.parts > 1:
+            said += f", in {recording.parts} files"
         console.print(escape(said), soft_wrap=True)
     if recording.error is not None:
         console.print(f"[red]recording failed:[/red] {escape(recording.error)}", soft_wrap=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from utank_hil.telemetry.event_ring import EventReader, EventWriter, event_text
 from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
+from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.viewer import Viewer, open_viewer
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ __all__ = [
     "RingError",
     "RingReader",
     "RingWriter",
+    "Rotation",
     "Viewer",
     "event_text",
     "open_viewer",

@@ -19,25 +19,18 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from utank_hil.closing import Closing
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.ring import RingReader
-from utank_hil.telemetry.viewer import LOOPBACK, free_tcp_port, live_url, rerun_environment
-
-if TYPE_CHECKING:
-    import rerun as rr
+from utank_hil.telemetry.rotation import Rotation
+from utank_hil.telemetry.viewer import free_tcp_port, live_url, rerun_environment
 
 BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
-LIVE_RUN: Final = "live"
-_LIVE_MEMORY: Final = "64MiB"  # history for a viewer that connects late; bounds the memory
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
-_FLUSH_TIMEOUT_S: Final = 5.0
 _NICENESS: Final = 5
-_RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
-_FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
 
 
 class RecorderError(RuntimeError):
@@ -54,10 +47,13 @@ class RecorderReport:
         Rows recorded.
     lost : int
         Rows the ring overwrote before they were read.
+    parts : int
+        Files.
     """
 
     rows: int
     lost: int
+    parts: int = 1
 
 
 def record_ring(
@@ -66,6 +62,7 @@ def record_ring(
     live_port: int | None = None,
     events: str | None = None,
     about: Mapping[str, Any] | None = None,
+    rotation: Rotation | None = None,
 ) -> RecorderReport:
     """Record a ring until it ends or a signal stops it; main function of the process.
 
@@ -81,6 +78,8 @@ def record_ring(
         Name of the ring of events (`EventWriter`) that belongs to it.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`).
+    rotation : Rotation, optional
+        Where it goes on in another file; without it there is one.
 
     Raises
     ------
@@ -91,53 +90,37 @@ def record_ring(
     RuntimeError
         If the file can't be finished.
     """
-    import rerun as rr
-
-    from utank_hil.telemetry.blueprint import make_blueprint
-    from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, write_about
+    from utank_hil.telemetry.parts import RecordingParts
 
     stop = _stop_pipe()
     with ExitStack() as stack:
         reader = stack.enter_context(RingReader(ring))
         event_reader = None if events is None else stack.enter_context(EventReader(events))
-        _reserve_file(file)
-        sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(file)]
-        if live_port is not None:
-            sinks.append(rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY))
-        recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
-        recording.set_sinks(*sinks, default_blueprint=make_blueprint(reader.columns, [LIVE_RUN]))
-        if about is not None:
-            write_about(recording, about)
-        log = RunLog(recording, run_paths([LIVE_RUN])[0], reader.columns)
+        parts = RecordingParts(file, reader.columns, rotation, live_port, about)
         _print_json({"ready": 1})
         recorded = reported_rows = reported_events = 0
         while True:
             last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
             rows = reader.read()
             if reader.lost > reported_rows:
-                log.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
+                parts.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
                 reported_rows = reader.lost
             if len(rows):
-                log.write(rows)
+                parts.write(rows)
                 recorded += len(rows)
             new_events = [] if event_reader is None else event_reader.read()
-            log.write_events(new_events)
+            parts.write_events(new_events)
             if event_reader is not None and event_reader.lost > reported_events:
-                log.note(
+                parts.note(
                     f"{event_reader.lost - reported_events} events lost: the recorder was too slow"
                 )
                 reported_events = event_reader.lost
             if len(rows) or new_events:
-                _flush(recording)  # so that a kill does not lose it
+                parts.flush()
             if last:
                 break
-        _flush(recording)
-        recording.disconnect()  # writes the footer; reports no error
-        if not _is_finished(file):
-            raise RuntimeError(
-                f"its {recorded} rows are written, but not the end of the file: is the disk full?"
-            )
-        return RecorderReport(recorded, reader.lost)
+        parts.close()
+        return RecorderReport(recorded, reader.lost, parts.count)
 
 
 class RecorderProcess(Closing):
@@ -158,6 +141,8 @@ class RecorderProcess(Closing):
         Name of the ring of events (`EventWriter`) that belongs to it.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`).
+    rotation : Rotation, optional
+        Where it goes on in another file; without it there is one.
 
     Attributes
     ----------
@@ -177,6 +162,7 @@ class RecorderProcess(Closing):
         live: bool = False,
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
+        rotation: Rotation | None = None,
     ) -> None:
         if find_spec("rerun") is None:
             raise RecorderError("it needs rerun-sdk: pip install 'utank-hil[viewer]'")
@@ -185,6 +171,10 @@ class RecorderProcess(Closing):
             command += ["--events", events]
         if about is not None:
             command += ["--about"]
+        if rotation is not None:
+            command += ["--part-s", str(rotation.part_s)]
+            if rotation.keep_bytes is not None:
+                command += ["--keep-bytes", str(rotation.keep_bytes)]
         self.url: str | None = None
         if live:
             port = free_tcp_port()
@@ -254,24 +244,26 @@ def _main() -> None:
     parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
     parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
     parser.add_argument("--about", action="store_true", help="its origin is JSON on standard input")
+    parser.add_argument("--part-s", type=float, help="begin another file after so long")
+    parser.add_argument("--keep-bytes", type=int, help="remove the oldest files beyond so much")
     arguments = parser.parse_args()
     about = json.load(sys.stdin) if arguments.about else None
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
         report = record_ring(
-            arguments.ring, arguments.file, arguments.live_port, arguments.events, about
+            arguments.ring,
+            arguments.file,
+            arguments.live_port,
+            arguments.events,
+            about,
+            None if arguments.part_s is None else Rotation(arguments.part_s, arguments.keep_bytes),
         )
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
         _print_json({"error": str(error)})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
-
-
-def _flush(recording: "rr.RecordingStream") -> None:
-    """Flush with a timeout: without one it would wait forever on a full disk."""
-    recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
 
 
 def _stop_pipe() -> int:
@@ -282,21 +274,6 @@ def _stop_pipe() -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda _number, _frame: None)  # the wake-up descriptor does the work
     return readable
-
-
-def _reserve_file(file: Path) -> None:
-    """Reserve the first bytes, or raise: Rerun would wait forever on a full disk."""
-    with file.open("wb") as begun:
-        os.posix_fallocate(begun.fileno(), 0, _RESERVED_BYTES)
-
-
-def _is_finished(file: Path) -> bool:
-    """Return whether a recording has its footer; a truncated one has none."""
-    mark, length = _FOOTER
-    with file.open("rb") as content:
-        content.seek(0, os.SEEK_END)
-        content.seek(max(0, content.tell() - length))
-        return mark in content.read()
 
 
 def _print_json(message: Mapping[str, int | str]) -> None:
