@@ -83,7 +83,7 @@ def test_bisection_agrees_with_the_scan_for_the_passive_tank_and_its_capsize_tim
         return math.isinf(controlled_run(PATTI_B, controller, wave, 120.0).capsized_s)
 
     found = largest_survivable_wave(survives, 3e5, tolerance=0.005)
-    threshold = capsize_threshold(PATTI_B, WAVE_RAD_S, 3e5, duration_s=120.0)
+    threshold = capsize_threshold(PATTI_B, WAVE_RAD_S, 3e5, duration_s=120.0, cells=300)
     assert survives(found)
     assert not survives(found / (1 - 0.006))
     assert found > 0.99 * threshold.safe_nm

@@ -17,7 +17,7 @@ from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
 from utank_hil.dynamics.tank import negligible
 
-SCAN = 64  # amplitudes tried at once in the search for a threshold
+BLOCK = 256  # amplitudes tried at once in the search for a threshold
 
 
 class Equilibrium(NamedTuple):
@@ -123,13 +123,16 @@ def capsize_threshold(
     *,
     duration_s: float = 300.0,
     phase_rad: float = 0.0,
+    cells: int = 4000,
     tolerance: float = 1e-3,
     capsize_rad: float = math.pi / 2,
 ) -> Threshold:
     """Smallest amplitude of a regular wave moment that capsizes a ship initially at rest.
 
-    The safe amplitudes need not form one interval (their boundary is fractal beyond a certain
-    forcing). So a uniform scan finds the first capsize, and finer scans refine below it.
+    The safe amplitudes need not form one interval: their boundary is fractal beyond a certain
+    forcing, and windows in which she capsizes lie far below the amplitudes that always capsize
+    her. So the whole range is searched upwards in steps of 1 / `cells` of it, and finer steps
+    refine the first capsize. A window narrower than a step may be missed.
 
     Parameters
     ----------
@@ -140,6 +143,8 @@ def capsize_threshold(
     duration_s : float
     phase_rad : float
         Phase in ``amplitude cos(frequency t + phase)``.
+    cells : int
+        Steps of the search up to `highest_nm`.
     tolerance : float
         Relative width of the bracket.
     capsize_rad : float
@@ -148,19 +153,22 @@ def capsize_threshold(
     -------
     Threshold
     """
-    low, high = 0.0, highest_nm
-    while True:
-        amplitude = np.linspace(low, high, SCAN + 1)[1:]
-        wave = WaveMoment(amplitude[:, None], [[frequency_rad_s]], [[phase_rad]])
+
+    def first_capsize(amplitude: FloatArray) -> Threshold | None:
+        """The first of rising amplitudes that capsizes her, and the one before."""
+        wave = WaveMoment(amplitude[1:, None], [[frequency_rad_s]], [[phase_rad]])
         result = simulate_batch(model, duration_s, wave=wave, capsize_rad=capsize_rad)
         over = np.flatnonzero(np.isfinite(result.capsized_s))
-        if not over.size:
-            return Threshold(highest_nm, math.inf)
-        first = int(over[0])
-        high = float(amplitude[first])
-        low = float(amplitude[first - 1]) if first else low
-        if high - low <= tolerance * high:
-            return Threshold(low, high)
+        return Threshold(*amplitude[over[0] : over[0] + 2].tolist()) if over.size else None
+
+    steps = np.linspace(0, highest_nm, cells + 1)
+    blocks = (steps[start : start + BLOCK + 1] for start in range(0, cells, BLOCK))
+    found = next(filter(None, map(first_capsize, blocks)), None)
+    if found is None:
+        return Threshold(highest_nm, math.inf)
+    while found.capsizing_nm - found.safe_nm > tolerance * found.capsizing_nm:
+        found = first_capsize(np.linspace(found.safe_nm, found.capsizing_nm, BLOCK + 1)) or found
+    return found
 
 
 def safe_basin(
