@@ -77,6 +77,12 @@ PARTS = (
         60,
     ),
     Part(
+        "starter_ships",
+        "python -m tools.studies.starter_ships --json",
+        "from a ship's dimensions to the bench: tank, pump and law of `utank-hil init`",
+        3,
+    ),
+    Part(
         "identification_bound",
         "python -m tools.studies.identification_bound --json",
         "identification in a storm against the Cramer-Rao bound",
