@@ -127,6 +127,12 @@ class Scenario(Section):
                 )
             if "operator" not in self.model_fields_set:
                 problems.append(("operator", "is required but missing: who arms the controllers"))
+        if self.plant == "linear" and self.vessel.valve is not None:
+            reason = (
+                "is linear, but the loss of the vessel's valve is quadratic and would change "
+                "nothing: leave it out, or take a vessel without a valve"
+            )
+            problems.append(("plant", reason))
         if PASSIVE in self.controllers:
             reason = (
                 "names one 'passive', the run without a controller that is always made: rename it"

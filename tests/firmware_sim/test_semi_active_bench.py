@@ -72,6 +72,18 @@ def test_valve_law_moves_the_valve_and_the_pump_rests(controller: str) -> None:
     assert bench.controller.mode is Mode.ACTIVE
 
 
+def test_pump_and_valve_work_together() -> None:
+    bench = Bench("pump_with_valve")
+    bench.run(30.0)
+    assert np.ptp(bench.column("valve_opening")) > 0.5
+    assert np.ptp(bench.column("pressure_command_pa")) > 10e3
+    assert bench.controller.mode is Mode.ACTIVE
+    bench.valve.powered = False
+    bench.run(0.5)
+    assert bench.controller.fault is Fault.VALVE_SILENT
+    assert bench.column("pressure_command_pa")[-1] == 0
+
+
 def test_a_valve_stuck_shut_is_found_as_soon_as_it_is_to_open() -> None:
     bench = Bench("on_off")
     bench.run_until_shut()

@@ -355,6 +355,8 @@ def ship_line(vessel: Vessel) -> str:
             f"the pump presses {figures['pump_head_m']:.2g} m of water, moves up to "
             f"{figures['pump_flow_m3_s']:.3g} m³/s and has {_power(figures['pump_power_w'])}"
         )
+    if vessel.valve is not None:
+        pump += f"; a valve in the {vessel.valve.kind} opens in {vessel.valve.opening_time_s:g} s"
     periods = " and ".join(f"{mode['period_s']:.3g}" for mode in figures["modes"])
     return (
         f"She rolls in {figures['roll_period_s']:.3g} s, with the water in {periods} s; "

@@ -84,7 +84,7 @@ def judge(
         return JudgedLaw(config, law, None, step_s)
     try:
         found = robustness(
-            law.linear, config.plant, law.measured, with_delay_margin=with_delay_margin
+            law.linear, config.plant, law.linear_measured, with_delay_margin=with_delay_margin
         )
     except (ValueError, ArithmeticError) as error:
         fail(f"{config.name}: law: its margins can't be computed: {error}")

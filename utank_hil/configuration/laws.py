@@ -16,6 +16,7 @@ from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.interface import LawDesign
+from utank_hil.control.pump_with_valve import PumpWithValveDesign
 from utank_hil.control.registry import LAWS
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.control.state_space import StateSpaceDesign
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     PumpLaw = LawDesign
 else:
     _installed = tuple(point.load() for point in entry_points(group=GROUP))
-    _of_a_valve = (OnOffValveDesign, ClippedValveDesign)
+    _of_a_valve = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
     _of_a_pump = tuple(
         _FROM_FILE.get(law, law) for law in (*LAWS, *_installed) if law not in _of_a_valve
     )
@@ -60,10 +61,17 @@ class ClippedValveFromFile(ClippedValveDesign):
     pump: PumpLaw
 
 
+@dataclass(frozen=True, slots=True)
+class PumpWithValveFromFile(PumpWithValveDesign):
+    """A law of pump and valve that holds a pump's law."""
+
+    pump: PumpLaw
+
+
 if TYPE_CHECKING:
     Law = LawDesign
 else:
-    _kinds = (*_of_a_pump, OnOffValveDesign, ClippedValveFromFile)
+    _kinds = (*_of_a_pump, OnOffValveDesign, ClippedValveFromFile, PumpWithValveFromFile)
     Law = Annotated[reduce(or_, _kinds), Field(discriminator="kind")]
 
 

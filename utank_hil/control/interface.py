@@ -111,7 +111,7 @@ class BuiltLaw:
     measured : tuple of str
         What the controller measures, in order; names of `STATES`.
     linear : LinearLaw or None
-        The law for the analysis of its loop.
+        The law for the analysis of its loop, from `linear_measured` to the pressure.
     at_rest : bool
         The law is not linear, and `linear` is its slope at rest.
     adapts : bool
@@ -134,6 +134,12 @@ class BuiltLaw:
     closes_loop: bool = True
     unjudged: str = ""
     commands: tuple[str, ...] = (PRESSURE,)
+
+    @property
+    def linear_measured(self) -> tuple[str, ...]:
+        """The measurements that `linear` takes: the first ones, as many as it has inputs."""
+        inputs = 0 if self.linear is None else self.linear.matrices().B.shape[1]
+        return self.measured[:inputs]
 
     @property
     def dissipates(self) -> bool:

@@ -15,6 +15,7 @@ from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.passive import PassiveDesign
 from utank_hil.control.pd import PDDesign
 from utank_hil.control.predictive.design import PredictiveDesign
+from utank_hil.control.pump_with_valve import PumpWithValveDesign
 from utank_hil.control.python_law import PythonDesign
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.control.state_space import StateSpaceDesign
@@ -35,4 +36,5 @@ LAWS: Final[tuple[type[LawDesign], ...]] = (
     PythonDesign,
     OnOffValveDesign,
     ClippedValveDesign,
+    PumpWithValveDesign,
 )

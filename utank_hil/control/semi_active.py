@@ -35,7 +35,29 @@ from utank_hil.parameters import (
     refuse,
 )
 
-_FLOW: Final = "level_rate_m_s"
+FLOW: Final = "level_rate_m_s"
+
+
+def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
+    """Loss with which a valve makes what it can of a pump's pressure.
+
+    Parameters
+    ----------
+    valve : ValveRange
+    pressure_pa : float
+    flow_m_s : float
+        Level rate dh/dt.
+
+    Returns
+    -------
+    float
+        Pa per (m/s)^2 of dh/dt: the least where the pressure would push the water on.
+    """
+    if pressure_pa * flow_m_s >= 0:
+        return valve.open_loss
+    if abs(pressure_pa) >= valve.shut_loss * flow_m_s**2:  # also where the water stands still
+        return valve.shut_loss
+    return max(abs(pressure_pa) / flow_m_s**2, valve.open_loss)
 
 
 @dataclass(slots=True, eq=False)
@@ -104,12 +126,7 @@ class ClippedValve:
         flow = float(y[-1])
         pressure = float(self._pump.step(y[: self._measured], reference)[0])
         self._flow = abs(flow) * flow
-        least, greatest = self._valve.open_loss, self._valve.shut_loss
-        if pressure * flow >= 0:
-            return np.array([least])
-        if abs(pressure) >= greatest * abs(self._flow):  # also where the water stands still
-            return np.array([greatest])
-        return np.array([max(abs(pressure / self._flow), least)])
+        return np.array([throttled(self._valve, pressure, flow)])
 
     def applied(self, u: FloatArray) -> None:
         """Tell the pump's law the pressure of the valve that was really set."""
@@ -131,7 +148,7 @@ class OnOffValveDesign:
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
-        make = partial(OnOffValve, _range(plant), self.threshold_rad_m_s2, self.sample_time_s)
+        make = partial(OnOffValve, valve_range(plant), self.threshold_rad_m_s2, self.sample_time_s)
         return BuiltLaw(make, STATES, commands=(VALVE,))
 
 
@@ -150,17 +167,9 @@ class ClippedValveDesign:
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design both laws for a plant."""
-        valve = _range(plant)
-        try:
-            pump = self.pump.build(plant)
-        except ParameterError as error:
-            problems = [(f"pump.{name}".rstrip("."), reason) for name, reason in error.problems]
-            raise ParameterError("", problems) from error
-        if pump.commands != (PRESSURE,):
-            raise ParameterError("", [("pump", "must be a law that drives a pump")])
-
+        valve, pump = valve_range(plant), built_pump_law(self.pump, plant)
         make = partial(_clipped, valve, pump)
-        return BuiltLaw(make, (*pump.measured, _FLOW), commands=(VALVE,))
+        return BuiltLaw(make, (*pump.measured, FLOW), commands=(VALVE,))
 
 
 def _clipped(valve: ValveRange, pump: BuiltLaw) -> Controller:
@@ -168,7 +177,20 @@ def _clipped(valve: ValveRange, pump: BuiltLaw) -> Controller:
     return ClippedValve(valve, pump.controller(), len(pump.measured))
 
 
-def _range(plant: DesignPlant) -> ValveRange:
+def built_pump_law(design: LawDesign, plant: DesignPlant) -> BuiltLaw:
+    """Design the law of a pump that stands under the key `pump` of another law."""
+    try:
+        pump = design.build(plant)
+    except ParameterError as error:
+        problems = [(f"pump.{name}".rstrip("."), reason) for name, reason in error.problems]
+        raise ParameterError("", problems) from error
+    if pump.commands != (PRESSURE,):
+        raise ParameterError("", [("pump", "must be a law that drives a pump")])
+    return pump
+
+
+def valve_range(plant: DesignPlant) -> ValveRange:
+    """What the plant's valve can do."""
     if plant.valve is None:
         raise ParameterError("", [("kind", "throttles a valve, but the vessel has none")])
     return plant.valve

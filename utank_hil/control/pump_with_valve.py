@@ -1,0 +1,95 @@
+"""Pump and valve of one tank: the valve makes what a throttle can, the pump the rest.
+
+Where a pump law's pressure P takes power from the water, P h' < 0, a throttle can make it in the
+pump's stead. So the valve's loss zeta is that of `ClippedValve`, and the pump makes what is
+missing::
+
+    P + zeta abs(h') h'  where P h' < 0,  P elsewhere
+
+In slow water the valve makes next to nothing, and the pump all of P: the slope at rest is the pump
+law's, and so are the margins.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
+from utank_hil.control.semi_active import FLOW, built_pump_law, throttled, valve_range
+from utank_hil.dynamics.valves import ValveRange
+from utank_hil.parameters import ParameterError
+
+
+class PumpWithValve:
+    """A pump law whose pressure pump and valve make together.
+
+    Parameters
+    ----------
+    valve : ValveRange
+    pump : Controller
+        One input. Its `applied` gets the pressure that both really made.
+    measured : int
+        How many of the measurements, the last of which is the level rate, are the pump law's own.
+    """
+
+    def __init__(self, valve: ValveRange, pump: Controller, measured: int) -> None:
+        self.sample_time_s = pump.sample_time_s
+        self._valve = valve
+        self._pump = pump
+        self._measured = measured
+        self._flow = 0.0
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Pressure and loss, shape (2,), for the pump law's measurements and the level rate."""
+        flow = float(y[-1])
+        pressure = float(self._pump.step(y[: self._measured], reference)[0])
+        loss = throttled(self._valve, pressure, flow)
+        self._flow = abs(flow) * flow
+        if pressure * flow < 0:
+            pressure += loss * self._flow
+        return np.array([pressure, loss])
+
+    def applied(self, u: FloatArray) -> None:
+        """Tell the pump's law the pressure that pump and valve made together."""
+        self._pump.applied(np.array([float(u[0]) - float(u[1]) * self._flow]))
+
+    def reset(self) -> None:
+        """Forget the past."""
+        self._flow = 0.0
+        self._pump.reset()
+
+
+@dataclass(frozen=True, slots=True)
+class PumpWithValveDesign:
+    """Pump and valve together, as a law of a configuration.
+
+    Parameters
+    ----------
+    pump : LawDesign
+        The law whose pressure they make; one with a linear form, by which it is judged.
+    """
+
+    pump: LawDesign
+    kind: Literal["pump_with_valve"] = "pump_with_valve"
+
+    def build(self, plant: DesignPlant) -> BuiltLaw:
+        """Design the pump's law for a plant."""
+        valve, pump = valve_range(plant), built_pump_law(self.pump, plant)
+        if pump.linear is None:
+            raise ParameterError("", [("pump.kind", "must be of a linear law, as lqg or gpc")])
+        return replace(
+            pump,
+            controller=partial(_together, valve, pump),
+            measured=(*pump.measured, FLOW),
+            commands=(PRESSURE, VALVE),
+            at_rest=True,
+        )
+
+
+def _together(valve: ValveRange, pump: BuiltLaw) -> Controller:
+    """A new controller; a function of the module, so that it can go to another process."""
+    return PumpWithValve(valve, pump.controller(), len(pump.measured))
