@@ -22,7 +22,7 @@ class Table:
     def __init__(self) -> None:
         plant = DesignPlant(VESSEL.ship, VESSEL.tank)
         self.monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
-        self.inbox = Inbox(CATALOGUE, VERSION, VESSEL.tank.level_limit_m, self.monitors.gates)
+        self.inbox = Inbox(CATALOGUE, VERSION, gates=self.monitors.gates)
         self.now_ns = 0
         self._motion = CATALOGUE.transmitter(SensorMotion)
         self._tank = CATALOGUE.transmitter(SensorTank)

@@ -123,6 +123,7 @@ class ControllerNode:
     seen : Observations
         What the supervisor judges.
     supervisor : Supervisor
+    monitors : Monitors or None
         As given.
     alarms : AlarmList
     command_pa : float
@@ -180,7 +181,7 @@ class ControllerNode:
         self._law_commands = commands
         self._pump = pump
         self._valve = valve
-        self._monitors = monitors
+        self.monitors = monitors
         self.inbox = Inbox(
             catalogue,
             settings.configuration_version,
@@ -253,17 +254,17 @@ class ControllerNode:
     @property
     def twin_roll_rad(self) -> float:
         """Roll of the passive twin; NaN without monitors."""
-        return math.nan if self._monitors is None else self._monitors.twin.roll_rad
+        return math.nan if self.monitors is None else self.monitors.twin.roll_rad
 
     @property
     def twin_roll_rms_rad(self) -> float:
         """Root mean square of it over some roll periods."""
-        return math.nan if self._monitors is None else self._monitors.twin.rms_rad
+        return math.nan if self.monitors is None else self.monitors.twin.rms_rad
 
     @property
     def roll_rms_rad(self) -> float:
         """Root mean square of the measured roll over some roll periods."""
-        return math.nan if self._monitors is None else self._monitors.twin.ship_rms_rad
+        return math.nan if self.monitors is None else self.monitors.twin.ship_rms_rad
 
     @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:
@@ -319,8 +320,8 @@ class ControllerNode:
         seen = self.seen
         self._observer.observe(now_ns, self._frames_sent)
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
-        if self._monitors is not None:
-            seen.found = self._monitors.update(
+        if self.monitors is not None:
+            seen.found = self.monitors.update(
                 now_ns,
                 self.inbox,
                 seen,
@@ -446,8 +447,8 @@ class ControllerNode:
                     )
                 )
             )
-            if self._monitors is not None:
-                frames.append(self._twin.frame(self._monitors.twin_message()))
+            if self.monitors is not None:
+                frames.append(self._twin.frame(self.monitors.twin_message()))
         return frames
 
     def _update_alarms(self, now_ns: int) -> None:

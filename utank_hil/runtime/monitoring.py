@@ -62,6 +62,12 @@ class Monitors:
     ----------
     thresholds : MonitorThresholds
     twin : PassiveTwin
+    motion : RollAgainstRate
+    roll_noise, rate_noise : Noise
+    drive : DriveFollowing
+    equation : TankEquation
+    volume : Volume
+        The monitors whose statistics are of interest.
     found : int
         Bits of `Finding`, of now.
     """
@@ -79,15 +85,15 @@ class Monitors:
         thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
         self.gates = SpikeGates(thresholds)
         self._spikes = SpikeCount()
-        self._motion = RollAgainstRate(thresholds)
-        self._roll_noise = Noise(math.sqrt(2) * thresholds.roll_noise_rad)
-        self._rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
+        self.motion = RollAgainstRate(thresholds)
+        self.roll_noise = Noise(math.sqrt(2) * thresholds.roll_noise_rad)
+        self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
-        self._drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
+        self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
         self._saturation = Saturation(thresholds)
-        self._equation = TankEquation(ship, tank, thresholds, LONG_S)
+        self.equation = TankEquation(ship, tank, thresholds, LONG_S)
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
-        self._volume = Volume(thresholds)
+        self.volume = Volume(thresholds)
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
         # a valve's loss stands neither in the tank's equation here nor in the twin
         self._water_free = plant.valve is None
@@ -151,7 +157,7 @@ class Monitors:
         if phase == 0 or phase == 5:
             self._look_at_motion(now_ns, inbox, seen)
         elif phase == 1 or phase == 6:
-            self._of_drive = self._drive.update(
+            self._of_drive = self.drive.update(
                 seen.command_pa,
                 inbox.pressure_pa,
                 enabled=seen.drive_enabled and seen.pump_age_ms <= STALE_MS,
@@ -163,7 +169,7 @@ class Monitors:
             self._look_at_water(now_ns, inbox, seen)
         elif phase == 4:
             if seen.tank_age_ms <= STALE_MS:
-                self._of_volume = self._volume.update(
+                self._of_volume = self.volume.update(
                     inbox.port_level_m, inbox.starboard_level_m, LONG_S
                 )
         elif phase == 8:
@@ -196,13 +202,13 @@ class Monitors:
         self._turned_rad = 0.0
         self._last_rate_rad_s = rate_rad_s
         if seen.motion_age_ms > STALE_MS:
-            self._motion.restart()
+            self.motion.restart()
             self._rate_bend.restart()
             self._of_motion = 0
             return
-        found = self._motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
-        noisy = self._roll_noise.update(self._motion.residual_rad, elapsed_s)
-        noisy |= self._rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s)
+        found = self.motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
+        noisy = self.roll_noise.update(self.motion.residual_rad, elapsed_s)
+        noisy |= self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s)
         if not noisy:
             self._noisy_s = 0.0
             self._of_motion = found
@@ -223,11 +229,11 @@ class Monitors:
         self._round_ns = now_ns
         oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
         if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S or not self._water_free:
-            self._equation.restart()
+            self.equation.restart()
             self._level_stuck.restart()
             self._of_water = 0
             return
         roll_rad, level_m, pressure_pa = inbox.roll_rad, inbox.level_m, inbox.pressure_pa
-        self._of_water = self._equation.update(
+        self._of_water = self.equation.update(
             roll_rad, level_m, pressure_pa
         ) | self._level_stuck.update(roll_rad, level_m, pressure_pa)

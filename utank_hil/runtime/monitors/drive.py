@@ -42,6 +42,8 @@ class DriveFollowing:
     ----------
     expected_pa : float
         Pressure by the model.
+    late_pa : float
+        Distance of the measured pressure from it, where it is judged.
     """
 
     def __init__(self, lag_s: float, thresholds: MonitorThresholds, period_s: float) -> None:
@@ -49,7 +51,7 @@ class DriveFollowing:
         self._limit_pa = thresholds.pressure_error_pa
         self._period_s = period_s
         self._command_pa = 0.0
-        self.expected_pa = 0.0
+        self.expected_pa = self.late_pa = 0.0
         self._enabled_s = self._behind_s = self._reversed_s = 0.0
 
     def update(self, command_pa: float, pressure_pa: float, *, enabled: bool, limited: bool) -> int:
@@ -64,7 +66,7 @@ class DriveFollowing:
             Whether it says that its power or its speed is at the limit.
         """
         if not enabled:
-            self.expected_pa = self._command_pa = 0.0
+            self.expected_pa = self.late_pa = self._command_pa = 0.0
             self._enabled_s = self._behind_s = self._reversed_s = 0.0
             return 0
         self.expected_pa = expected_pa = self.expected_pa + self._share * (
@@ -81,7 +83,8 @@ class DriveFollowing:
         else:
             self._reversed_s = 0.0
         excused = limited and -limit_pa < along_pa < abs(expected_pa) + limit_pa
-        if abs(pressure_pa - expected_pa) > limit_pa and not excused:
+        self.late_pa = 0.0 if excused else abs(pressure_pa - expected_pa)
+        if self.late_pa > limit_pa:
             self._behind_s += self._period_s
         else:
             self._behind_s = 0.0

@@ -26,6 +26,11 @@ class Noise:
         self.power = 0.0
         self.found = False
 
+    @property
+    def share(self) -> float:
+        """Noise over the limit."""
+        return float((self.power / self._limit_power) ** 0.5)
+
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
         self.power += (residual * residual - self.power) * (elapsed_s / NOISE_S)

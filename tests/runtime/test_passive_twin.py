@@ -1,0 +1,126 @@
+"""The twin beside ships that were integrated without it."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
+from utank_hil.runtime.passive_twin import LASTS_PERIODS, MEMORY_PERIODS, PassiveTwin
+
+STEP_S = 0.05
+FIRST = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
+PATTI = load_config(Path("configs/ships/patti_b.yaml"), Vessel)
+LEAST_RAD = math.radians(0.5)
+
+
+def motion(ship: RollShip, tank: Tank, moment_nm, pressure_pa, seconds: float):
+    """Roll, rate, level and its rate at every step, by fourth-order Runge-Kutta; shape (n, 4)."""
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    inverse = np.linalg.inv(mass)
+    quadratic = np.array([
+        ship.quadratic_damping_nms2_rad2,
+        tank.reservoir_area_m2 * tank.quadratic_loss_pa_per_m2_s2,
+    ])  # fmt: skip
+
+    def rates(t, x):
+        q, v = x[:2], x[2:]
+        effort = -damping @ v - stiffness @ q - quadratic * np.abs(v) * v
+        effort[0] += moment_nm(t) - sum(
+            k * q[0] ** (3 + 2 * n) for n, k in enumerate(ship.restoring_odd_nm)
+        )
+        effort[1] += tank.reservoir_area_m2 * pressure_pa(t)
+        return np.concatenate([v, inverse @ effort])
+
+    x, rows, h = np.zeros(4), [], STEP_S
+    for k in range(round(seconds / h)):
+        t = k * h
+        rows.append(x[[0, 2, 1, 3]])
+        k1 = rates(t, x)
+        k2 = rates(t + h / 2, x + h / 2 * k1)
+        k3 = rates(t + h / 2, x + h / 2 * k2)
+        k4 = rates(t + h, x + h * k3)
+        x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return h * np.arange(len(rows)), np.array(rows)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vessel", "moment_nm", "pressure_pa"),
+    [(FIRST, 2e7, 30e3), (PATTI, 8e3, 2e3)],
+    ids=["linear", "quadratic damping and softening"],
+)
+def test_twin_rolls_as_the_passive_ship_in_the_same_waves(
+    vessel: Vessel, moment_nm: float, pressure_pa: float
+) -> None:
+    ship = vessel.ship
+    tank = replace(vessel.tank, quadratic_loss=0.5)
+
+    def waves(t):
+        return moment_nm * (math.sin(0.55 * t) + 0.7 * math.sin(0.8 * t + 1))
+
+    def pump(t):
+        return pressure_pa * (math.sin(0.6 * t) + 0.5 * math.sin(0.3 * t))
+
+    t, driven = motion(ship, tank, waves, pump, 120.0)
+    _, passive = motion(ship, tank, waves, lambda _: 0.0, 120.0)
+    twin = PassiveTwin(ship, tank, STEP_S, LEAST_RAD)
+    rolls = []
+    for time_s, (roll, rate, _, level_rate) in zip(t, driven, strict=True):
+        twin.update(roll, rate, level_rate, pump(time_s))
+        rolls.append(twin.roll_rad)
+    scale = passive[:, 0].std()
+    assert np.abs(driven[:, 0] - passive[:, 0]).max() > 0.5 * scale
+    assert np.abs(np.array(rolls) - passive[:, 0]).max() < 0.03 * scale
+
+
+def rolled(
+    own: float, twin_too: float, seconds: float, excused: bool = False
+) -> list[tuple[float, bool]]:
+    """Judgements over time of a ship that the pump rolls `own` and the waves `twin_too`."""
+    ship, tank = FIRST.ship, FIRST.tank
+    twin = PassiveTwin(ship, tank, STEP_S, LEAST_RAD)
+    # the pressure whose roll is `own` at 0.6 rad/s, by the model's own response
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    w = 0.6
+    response = np.linalg.solve(
+        stiffness - w**2 * mass + 1j * w * damping, [0.0, tank.reservoir_area_m2]
+    )[0]
+    judged = []
+    for k in range(round(seconds / STEP_S)):
+        t = k * STEP_S
+        roll = twin_too * math.sin(w * t) + own * math.sin(w * t + np.angle(response))
+        if excused:
+            twin.excuse()
+        twin.update(roll, 0.0, 0.0, own / abs(response) * math.sin(w * t))
+        judged.append((t, twin.amplified))
+    return judged
+
+
+PERIOD_S = 2 * math.pi / FIRST.tank.natural_frequency_rad_s
+
+
+def test_law_that_rolls_the_ship_is_found_and_not_before_a_period() -> None:
+    judged = rolled(0.1, 0.02, 40 * PERIOD_S)
+    first = next(t for t, amplified in judged if amplified)
+    assert LASTS_PERIODS * PERIOD_S <= first <= 12 * PERIOD_S
+    assert judged[-1][1]
+
+
+def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
+    assert not any(amplified for _, amplified in rolled(0.005, 0.0, 20 * PERIOD_S))
+    assert not any(amplified for _, amplified in rolled(0.0, 0.1, 20 * PERIOD_S))
+    assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
+
+
+def test_mean_squares_are_those_of_some_roll_periods() -> None:
+    twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
+    for k in range(round(5 * MEMORY_PERIODS * PERIOD_S / STEP_S)):
+        twin.update(0.1 + 0.05 * math.sin(0.6 * k * STEP_S), 0.0, 0.0, 0.0)
+    assert twin.ship_rms_rad == pytest.approx(0.05 / math.sqrt(2), rel=0.05)
+    assert twin.rms_rad == twin.ship_rms_rad

@@ -1,0 +1,145 @@
+"""How near the monitors come to a false alarm: largest statistic over threshold, run by run.
+
+    python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --hours 50
+    python -m tools.studies.monitor_margins configs/scenarios/*.yaml --minutes 10
+
+In lockstep, with bus, nodes, sensors, retuning and the scenario's operator. One is the threshold. A
+gain's margin is its distance from 1 over the distance at which it is found.
+"""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from firmware_sim.run import SECOND_NS
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.canbus import Frame
+from utank_hil.configuration import ConfigError, load_config
+from utank_hil.retuning import SimulatedRetuner
+from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runtime.controller_node import ControllerNode
+from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.tank_equation import SIGN_GAIN, STUCK_GAIN
+from utank_hil.runtime.passive_twin import AMPLIFIED
+from utank_hil.tick import TICK_NS
+
+LOOK_TICKS = 5
+
+
+def shares(monitors: Monitors) -> dict[str, float]:
+    """Each statistic of now over its threshold; NaN where it can't be told."""
+    limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
+    judged = twin.ship_rms_rad > limits.amplified_roll_rad and twin.rms_rad > 0
+    return {
+        "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
+        "roll noise": monitors.roll_noise.share,
+        "rate noise": monitors.rate_noise.share,
+        "volume": abs(monitors.volume.sum_m) / limits.volume_m,
+        "roll sign": (1 - equation.roll_gain) / (1 - SIGN_GAIN),
+        "pump sign": (1 - equation.pump_gain) / (1 - SIGN_GAIN),
+        "level stuck": (1 - equation.level_gain) / (1 - STUCK_GAIN),
+        "motion late": equation.late_s / limits.motion_late_s,
+        "drive": monitors.drive.late_pa / limits.pressure_error_pa,
+        "roll over twin": twin.ship_rms_rad / twin.rms_rad / AMPLIFIED if judged else math.nan,
+    }
+
+
+class Onlooker:
+    """Keeps the largest share of each monitor, and when each finding came first."""
+
+    name = "onlooker"
+    period_ns = LOOK_TICKS * TICK_NS
+
+    def __init__(self, node: ControllerNode) -> None:
+        assert node.monitors is not None
+        self._monitors = node.monitors
+        self.largest: dict[str, float] = {}
+        self.found_s: dict[str, float] = {}
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Nothing on the bus is of interest."""
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Look at the monitors."""
+        for name, share in shares(self._monitors).items():
+            if share > self.largest.get(name, 0.0):
+                self.largest[name] = share
+        if self._monitors.found:
+            for finding in Finding(self._monitors.found):
+                self.found_s.setdefault(str(finding.name), now_ns / SECOND_NS)
+        return ()
+
+
+def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
+    """Margins of one run."""
+    config = scenario.controllers[name]
+    work = retuner_work(config)
+    retuner = None if work is None else SimulatedRetuner(work[0], scenario.retuner_latency_s)
+    node = build_controller_node(config, retuner=retuner)
+    onlooker = Onlooker(node)
+    ship = build_ship_side(scenario, seed, scenario.operator)
+    lockstep = Lockstep([*ship.nodes, node, onlooker], SimulatedBus(bit_rate=config.bit_rate))
+    lockstep.run_until(round(seconds * SECOND_NS))
+    return {
+        "scenario": scenario.name,
+        "controller": name,
+        "seed": seed,
+        "seconds": seconds,
+        "mode": node.mode.name,
+        "fault": node.fault.name,
+        "found_s": onlooker.found_s,
+        "largest": onlooker.largest,
+    }
+
+
+def main() -> int:
+    """Run the study."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("scenarios", type=Path, nargs="+")
+    length = parser.add_mutually_exclusive_group(required=True)
+    length.add_argument("--hours", type=float)
+    length.add_argument("--minutes", type=float)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    seconds = options.hours * 3600 if options.hours else options.minutes * 60
+    try:
+        scenarios = [load_config(path, Scenario) for path in options.scenarios]
+    except ConfigError as error:
+        parser.error(str(error))
+    runs = [
+        margins(scenario, name, options.seed, seconds)
+        for scenario in scenarios
+        for name in scenario.controllers
+    ]
+    if options.json:
+        json.dump({"runs": runs}, sys.stdout)
+        return 0
+    names = list(dict.fromkeys(name for run in runs for name in run["largest"]))  # type: ignore[attr-defined]
+    table = Table("scenario", "controller", *names, "found, s", "end")
+    for run in runs:
+        largest, found_s = run["largest"], run["found_s"]
+        assert isinstance(largest, dict)
+        assert isinstance(found_s, dict)
+        table.add_row(
+            str(run["scenario"]),
+            str(run["controller"]),
+            *(f"{largest[name]:.2f}" if name in largest else "" for name in names),
+            ", ".join(f"{name} {at_s:.0f}" for name, at_s in found_s.items()),
+            f"{run['mode']} {run['fault']}",
+        )
+    Console().print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
