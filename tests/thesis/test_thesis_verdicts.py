@@ -47,6 +47,7 @@ LONG = {
     "4.10": "-~++",
     "4.11": "~",
     "capsize": "+~+",
+    "contest": "+-",
     "4.14": "-+",
     "4.15": "+",
     "damping": "~~-~",
@@ -114,6 +115,7 @@ def test_no_figure_of_chapters_2_to_4_is_missing() -> None:
         "capsize",
         "damping",
         "magnification",
+        "contest",
     }
     assert set(keys) - set(numbered) == named
 

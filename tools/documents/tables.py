@@ -174,6 +174,12 @@ def scenarios(result: dict[str, dict[str, Any]]) -> Rows:
     ]
 
 
+def thesis_contest(result: dict[str, Any]) -> Rows:
+    """Who capsizes, a row a law and pump."""
+    (table,) = (figure["table"] for figure in result["figures"] if figure["key"] == "contest")
+    return [table["headings"], *table["rows"]]
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -185,6 +191,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "errata terms": ("thesis_derivation", errata_terms),
     "thesis figures": ("thesis_figures", thesis_figures),
     "thesis numbers": ("thesis_figures", thesis_numbers),
+    "thesis contest": ("thesis_figures", thesis_contest),
     "thesis statements": ("thesis_figures", thesis_statements),
 }
 

@@ -96,12 +96,6 @@ PARTS = (
         10,
     ),
     Part(
-        "thesis_contest",
-        "python -m tools.thesis.chapter4_contest --json",
-        "thesis 4.5: who capsizes, and in what wave",
-        2,
-    ),
-    Part(
         "thesis_capsize",
         "python -m tools.thesis.capsize_study --json",
         "capsizing: thresholds and probability",
@@ -111,7 +105,7 @@ PARTS = (
         "thesis_figures",
         "python -m tools.thesis.figures",
         "every figure and printed number of the source, and what its text says of them",
-        2,
+        4,
     ),
     Part(
         "thesis_derivation",

@@ -8,7 +8,7 @@
 * valves: roll of the first ship, tank damping 3 %, with each valve law and the best fixed opening.
 * stimulation: roll amplitude reached on still water, on the ship it was made for and another.
 
-Thesis 4.5 is tools/thesis/chapter4_contest.py. Takes about five minutes on one core.
+Thesis 4.5 is `utank-hil reproduce contest`. Takes about five minutes on one core.
 """
 
 import argparse

@@ -101,6 +101,11 @@ def _section(figure: Figure, folder: Path) -> Iterator[str]:
         yield f'<img alt="{escape(told)}" src="data:image/png;base64,{data}">'
     yield f"<p><b>How ours was made:</b> {escape(figure.method)}.</p>"
     yield f'<p class="open"><b>Left open by the source:</b> {escape(figure.open_points)}</p>'
+    if figure.table is not None:
+        yield '<div class="wide"><table>'
+        yield _cells("th", figure.table.headings)
+        yield from (_cells("td", row) for row in figure.table.rows)
+        yield "</table></div>"
     if figure.rows:
         yield '<div class="wide"><table><tr><th>number</th><th>printed</th><th>ours</th><th></th>'
         yield "<th>deviation</th><th>reason</th></tr>"
@@ -110,6 +115,10 @@ def _section(figure: Figure, folder: Path) -> Iterator[str]:
         yield '<div class="wide"><table><tr><th>the text says</th><th></th><th>measured</th></tr>'
         yield from map(_check_row, figure.checks)
         yield "</table></div>"
+
+
+def _cells(tag: str, cells: Sequence[str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
 def _number_row(row: Row) -> str:

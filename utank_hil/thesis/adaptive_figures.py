@@ -108,7 +108,7 @@ def _over_waves(curves: Mapping[str, FloatArray]) -> Panel:
             *(Curve(name, _WAVES_RAD_S, y) for name, y in curves.items()),
             Curve("printed: about 40 %", [0.4, 1.4], [PRINTED_GAIN] * 2),
         ),
-        y_limits=(-150.0, 100.0),
+        y_limits=(-250.0, 100.0),
     )
 
 

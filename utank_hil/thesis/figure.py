@@ -144,6 +144,22 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True)
+class Table:
+    """What is told better by cells than by curves.
+
+    Attributes
+    ----------
+    headings : tuple of str
+        Units included.
+    rows : tuple of tuple of str
+        As many cells each as there are headings.
+    """
+
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Figure:
     """A figure, or a group of printed numbers, made anew.
 
@@ -161,6 +177,7 @@ class Figure:
     checks : tuple of Check
     columns : int
         Panels side by side.
+    table : Table, optional
     """
 
     key: str
@@ -171,10 +188,11 @@ class Figure:
     rows: tuple[Row, ...] = ()
     checks: tuple[Check, ...] = ()
     columns: int = 2
+    table: Table | None = None
 
 
 def as_json(figure: Figure) -> dict[str, Any]:
-    """Numbers and judgements of a figure, without its curves."""
+    """Numbers, judgements and table of a figure, without its curves."""
     return {
         "key": figure.key,
         "title": figure.title,
@@ -200,6 +218,9 @@ def as_json(figure: Figure) -> dict[str, Any]:
             }
             for check in figure.checks
         ],
+        "table": None
+        if figure.table is None
+        else {"headings": list(figure.table.headings), "rows": list(map(list, figure.table.rows))},
     }
 
 

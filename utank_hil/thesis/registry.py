@@ -12,6 +12,7 @@ from utank_hil.thesis.adaptive_figures import (
     figure_3_15,
 )
 from utank_hil.thesis.capsize_amplitudes import figure_capsize
+from utank_hil.thesis.contest_table import figure_contest
 from utank_hil.thesis.damping import figure_damping
 from utank_hil.thesis.figure import Figure
 from utank_hil.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
@@ -108,6 +109,7 @@ ENTRIES: Final = (
     Entry("4.10", "Roll over time, the greatest waves", figure_4_10),
     Entry("4.11", "Roll rate over roll, the greatest waves", figure_4_11),
     Entry("capsize", "Wave moments that capsize Patti-B (4.5)", figure_capsize),
+    Entry("contest", "Who capsizes, and in what wave (4.5)", figure_contest),
     Entry("4.12", "Parameter λ of (4.23)", figure_4_12),
     Entry("4.13", "Parameter θ of (4.23)", figure_4_13),
     Entry("4.14", "Roll over time with (4.20)", figure_4_14),

@@ -27,6 +27,7 @@ from utank_hil.thesis.patti_b import (
 )
 
 SHOWN_S: Final = 120.0
+SHOWN_DEG: Final = 40.0
 PUMP_PA: Final = 20e3
 LAWS: Final = {
     "no tank": NO_TANK,
@@ -53,7 +54,7 @@ def _history(title: str, runs: dict[str, Run]) -> Panel:
             Curve(name, each.time_s[each.time_s <= SHOWN_S], each.roll_deg[each.time_s <= SHOWN_S])
             for name, each in runs.items()
         ),
-        y_limits=(-60.0, 60.0) if _any_capsizes(runs) else None,
+        y_limits=(-SHOWN_DEG, SHOWN_DEG) if _any_capsizes(runs) else None,
     )
 
 
@@ -65,7 +66,7 @@ def _plane(title: str, runs: dict[str, Run]) -> Panel:
         tuple(
             Curve(name, each.roll_deg[shown], each.rate_deg_s[shown])
             for name, each in runs.items()
-            for shown in [(each.time_s <= SHOWN_S) & (np.abs(each.roll_deg) < 60)]
+            for shown in [(each.time_s <= SHOWN_S) & (np.abs(each.roll_deg) < SHOWN_DEG)]
         ),
     )
 
