@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.valve import ValveNode
@@ -29,6 +30,7 @@ class Bench:
         assert isinstance(ship.valve, ValveNode)
         self.valve: ValveNode = ship.valve
         self.panel: OperatorPanel = ship.panel
+        self.plant: Plant = ship.plant
         self.rows: list[np.ndarray] = []
         self.controller: ControllerNode = build_controller_node(
             scenario.controllers[controller], sink=lambda row: self.rows.append(row.copy())
@@ -82,6 +84,19 @@ def test_pump_and_valve_work_together() -> None:
     bench.run(0.5)
     assert bench.controller.fault is Fault.VALVE_SILENT
     assert bench.column("pressure_command_pa")[-1] == 0
+
+
+def test_the_level_s_rate_is_known_while_the_valve_works() -> None:
+    bench = Bench("pump_with_valve")
+    bench.run(30.0)
+    errors, rates = [], []
+    for _ in range(3000):
+        bench.lockstep.run_until(bench.lockstep.now_ns + TICK_NS)
+        rate = bench.plant.flow_m3_s / SCENARIO.vessel.tank.reservoir_area_m2
+        errors.append(bench.controller.level_rate_m_s - rate)
+        rates.append(rate)
+    assert np.std(rates) > 0.3
+    assert np.sqrt(np.mean(np.square(errors))) < 0.04 * np.std(rates)
 
 
 def test_a_valve_stuck_shut_is_found_as_soon_as_it_is_to_open() -> None:

@@ -222,6 +222,11 @@ class ControllerNode:
         self.command_pa = 0.0
 
     @property
+    def level_rate_m_s(self) -> float:
+        """Rate of the tank level, as it is estimated."""
+        return self._level.rate_m_s
+
+    @property
     def time_s(self) -> float:
         """Time from the first tick to the last."""
         return (self.last_ns - self.start_ns) * NANOSECONDS
@@ -309,11 +314,14 @@ class ControllerNode:
         """Level and its rate from measurements, or from the model while one is missing."""
         inbox, level = self.inbox, self._level
         cycles = inbox.tank_cycles - self._observed_cycles
+        pressure_pa = inbox.pressure_pa
+        if self._valve is not None:
+            pressure_pa -= self._valve.held_pa(inbox, level.rate_m_s)
         if cycles:
-            level.update(inbox.level_m, inbox.pressure_pa, cycles)
+            level.update(inbox.level_m, pressure_pa, cycles)
             self._observed_cycles = inbox.tank_cycles
         elif (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s:
-            level.predict(inbox.pressure_pa)
+            level.predict(pressure_pa)
 
     def _observe(self, now_ns: int) -> None:
         """Ages, states and operator's edges, for the supervisor."""

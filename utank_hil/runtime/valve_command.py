@@ -2,7 +2,14 @@
 
 from typing import Final
 
-from utank_hil.canbus import Catalogue, Frame, ValveCommand, ValveControl, ValveState
+from utank_hil.canbus import (
+    Catalogue,
+    Frame,
+    SensorTank,
+    ValveCommand,
+    ValveControl,
+    ValveState,
+)
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 from utank_hil.runtime.inbox import Inbox
@@ -37,6 +44,8 @@ class ValveCommander:
         self._sender = catalogue.transmitter(ValveCommand)
         self._timeout_s = timeout_s
         self._most_step = TICK_S / valve.opening_time_s
+        self._level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
+        self._inertia_pa_s2_m = tank.density_kg_m3 * tank.effective_length_m
         self._asked = valve.fail_opening
         self._told = valve.fail_opening
         self._expected = valve.fail_opening
@@ -51,6 +60,16 @@ class ValveCommander:
     def applied_loss(self, inbox: Inbox) -> float:
         """The loss of the valve as it stands."""
         return self._valve.loss(self._tank, inbox.valve_opening)
+
+    def held_pa(self, inbox: Inbox, rate_m_s: float) -> float:
+        """Pressure that the valve takes from water at a level rate, for the level's observer.
+
+        It is that of the rate at the end of a gauge's cycle: a step with the rate at its beginning
+        is unstable where a valve slows the water faster than that.
+        """
+        damping_pa_s_m = self.applied_loss(inbox) * abs(rate_m_s)
+        slowed = 1.0 + damping_pa_s_m * self._level_period_s / self._inertia_pa_s2_m
+        return damping_pa_s_m * rate_m_s / slowed
 
     def request_reset(self) -> None:
         """Reset the valve's fault with the next commands; only ever on an operator's order."""
