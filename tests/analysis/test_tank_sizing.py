@@ -118,6 +118,14 @@ def test_ship_without_stability_to_spare_is_told_so() -> None:
         size_tank(ship_of(1900, 0.152, 20), ROOM)
 
 
+def test_ship_with_little_stability_to_spare_keeps_what_she_must() -> None:
+    ship = ship_of(1900, 0.165, 22)
+    sized = size_tank(ship, ROOM)
+    gm_left_m = 0.165 * (1 - stability_taken(ship, sized.tank))
+    assert gm_left_m == pytest.approx(LEAST_GM_M, abs=1e-4)
+    assert "GM: 0.15 m must be left" in sized.bound_by
+
+
 def test_room_that_is_too_small_is_told() -> None:
     with pytest.raises(TankImpossibleError, match=r"room's length, 0\.5 m, lets a tank take"):
         size_tank(PATROL, dataclasses.replace(ROOM, length_m=0.5))
@@ -189,5 +197,7 @@ def test_pump_has_the_power_for_pressure_and_flow_at_once() -> None:
     hydraulic_w = pump.max_pressure_pa * demand.flow_m3_s
     shaft_w = hydraulic_w + pump_losses(speed, demand.flow_m3_s, pump.coefficients)
     assert speed <= pump.max_speed_rad_s
+    # as fast in the duct for its pressure as the first ship's pump, or slower
+    assert demand.duct_speed_m_s <= 45 / 6.22 * math.sqrt(pump.max_pressure_pa / 50e3) + 1e-9
     assert 0.6 < hydraulic_w / shaft_w < 0.75
     assert shaft_w <= pump.max_power_w

@@ -397,3 +397,19 @@ def test_shipped_nonlinear_law_has_the_margins_that_are_required(shipped: str) -
     assert report["failures"] == []
     assert report["robustness"]["nominal"]["radius"] < 1
     assert ("parameters it starts from" in report["at_rest"]) == (shipped == "fuzzy_robust")
+
+
+def test_a_period_by_formula_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "hull.yaml"
+    path.write_text(
+        "name: hull\n"
+        "ship: {displacement_t: 1900, gm_m: 0.9, beam_m: 10, draught_m: 3.2, length_m: 60}\n"
+        "tank: {width_m: 8, height_m: 1.6, reservoir_area_m2: 6, duct_area_m2: 1.2, "
+        "damping_ratio: 0.1}\n"
+    )
+    done = CliRunner().invoke(app, ["check", str(path)])
+    assert done.exit_code == 0, done.output
+    assert "Assumed: ship: roll period 8.8 s by the weather criterion" in done.stdout
+    told = json.loads(CliRunner().invoke(app, ["check", str(path), "--json"]).stdout)
+    assert told["pump_heel_rad"] is None
+    assert told["assumptions"][0].startswith("ship: roll period 8.8 s")

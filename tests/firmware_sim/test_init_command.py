@@ -11,6 +11,7 @@ from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.commands.init import init
 from firmware_sim.report import figures
 from firmware_sim.scenario import Scenario
+from utank_hil.analysis.tank_sizing import usable_level_m
 from utank_hil.commands.common import new_app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
@@ -47,6 +48,9 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     judged = judge(controller, tmp_path / "controller.yaml")
     assert judged.accepted
     assert judged.robustness is not None
+    # the slow ship's water would be too fast in the duct before it is at the roof
+    most_m = usable_level_m(vessel.ship, vessel.tank)
+    assert controller.limits.level_m == pytest.approx(most_m, rel=0.01)
     peak = judged.robustness.nominal.peak_sensitivity
     assert told["law"]["peak_sensitivity"] == pytest.approx(peak)
     scenario = load_config(tmp_path / "scenario.yaml", Scenario)
