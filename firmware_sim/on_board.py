@@ -96,8 +96,9 @@ def on_board_table(result: BenchResult) -> Table:
     ):
         table.add_column(heading, justify="right", no_wrap=True)
     table.caption = (
-        "shares of the roll's amplitudes; interruptions of who stands,\n"
-        f"motion sickness, NORDFORSK 1987, at {place.height_m:.1f} m above and\n"
+        "shares of the roll's amplitudes; interruptions of who stands; motion\n"
+        "sickness incidence by McCauley et al. 1976 (ISO 2631-1 gives more,\n"
+        f"from the dose in the JSON); NORDFORSK 1987; at {place.height_m:.1f} m above and\n"
         f"{place.starboard_m:.1f} m to starboard of the centre of gravity, by roll alone"
     )
     for name, each in judged_runs(result).items():

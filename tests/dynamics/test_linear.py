@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from utank_hil.dynamics import RollShip, Tank, coupled_model, harmonic_response
+from utank_hil.dynamics import (
+    RollModel,
+    RollShip,
+    Tank,
+    coupled_model,
+    harmonic_response,
+    simulate,
+)
 from utank_hil.dynamics.linear import coupled_matrices
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
@@ -112,3 +119,16 @@ def test_zero_dynamics_swing_with_g_over_height_plus_depth():
     zeros = roll_by_pump.zeros()
     np.testing.assert_allclose(np.abs(zeros), np.sqrt(9.80665 / (4.88 + 1.83)), rtol=1e-6)
     np.testing.assert_allclose(zeros.real, 0, atol=1e-6)
+
+
+def test_water_in_a_ship_held_still_swings_down_by_its_damping_ratio():
+    """Each half swing is exp(-pi zeta / sqrt(1 - zeta^2)) of the one before, to the other side."""
+    held = RollShip(1e16, 1e16)  # too heavy for the water to move her
+    frequency = np.sqrt(2 * 9.80665 / (2 * 4.88 + 17.1 * 17.11 / 6.22))
+    half_s = np.pi / (frequency * np.sqrt(1 - 0.1**2))
+    run = simulate(
+        RollModel(held, TANK), 3 * half_s, (0.0, 0.0, 0.05, 0.0), step_s=half_s / 500,
+        record_every=500,
+    )  # fmt: skip
+    expected = 0.05 * (-np.exp(-np.pi * 0.1 / np.sqrt(1 - 0.1**2))) ** np.arange(4)
+    np.testing.assert_allclose(run.state[:, 2], expected, rtol=1e-3)

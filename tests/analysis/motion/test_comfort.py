@@ -93,3 +93,32 @@ def test_work_is_limited_by_the_worst_of_three_motions():
     )
     assert allowed_work(gentle[0], 0.08 * G, gentle[2]) == ("light manual work",)
     assert allowed_work(*gentle[:2], 0.3 * G) == ()
+
+
+# NORDFORSK 1987 as printed: roll in degrees, lateral and vertical acceleration in g, RMS
+PRINTED = {
+    "light manual work": (6.0, 0.10, 0.20),
+    "heavy manual work": (4.0, 0.07, 0.15),
+    "intellectual work": (3.0, 0.05, 0.10),
+    "transit passengers": (2.5, 0.04, 0.05),
+    "cruise liner": (2.0, 0.03, 0.02),
+}
+
+
+@pytest.mark.parametrize("work", PRINTED)
+@pytest.mark.parametrize("motion", range(3))
+def test_work_ends_at_each_printed_limit(work: str, motion: int) -> None:
+    roll_deg, lateral_g, vertical_g = PRINTED[work]
+    limits = [math.radians(roll_deg), lateral_g * G, vertical_g * G]
+    for share, allowed in ((0.99, True), (1.01, False)):
+        rms = [0.0, 0.0, 0.0]
+        rms[motion] = share * limits[motion]
+        assert (work in allowed_work(*rms)) == allowed
+
+
+def test_sickness_is_of_the_same_exposure_however_long_the_record() -> None:
+    roll, rate = rolling(5.0)
+    long = comfort(roll, rate, STEP_S, height_m=0.0, starboard_m=8.0)
+    short = comfort(*(x[: len(x) // 4] for x in (roll, rate)), STEP_S, 0.0, 8.0)
+    assert short.sickness_dose_m_s15 == pytest.approx(long.sickness_dose_m_s15, rel=0.12)
+    assert short.sickness_percent == pytest.approx(long.sickness_percent, rel=0.12)

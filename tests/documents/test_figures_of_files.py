@@ -1,0 +1,65 @@
+"""Figures that documents give for shipped files and laws are those of the files and laws."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tools.studies.share_of_possible import STORM_HOUR, entrants, expecting, measured_hour, shipped
+from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.control import ConstrainedDesign
+from utank_hil.sea import jonswap
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "constrained-control.md").read_text()
+ROWS = {
+    "constrained, white slope": "expects no particular sea",
+    "constrained, 3 h before": "expects the sea of 3 h before",
+    "constrained, JONSWAP": "expects JONSWAP of the hour's Hs and Tp",
+    "constrained, 1 h before": "expects the sea of 1 h before",
+    "constrained, the hour": "expects the hour's spectrum",
+    "GPC, roll": "(`gpc.yaml`)",
+    "DPC, roll and level": "(`dpc.yaml`)",
+    "LQG": "(`lqg.yaml`)",
+}
+
+
+def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
+    text = " ".join((ROOT / "docs" / "pump.md").read_text().split())
+    pattern = r"is the similar one of ([\d.]+) m² for (\d+) kPa: (\d+) rad/s and ([\d.]+) kW"
+    found = re.search(pattern, text)
+    assert found is not None
+    pump = load_config(ROOT / "configs" / "ships" / "patti_b.yaml", Vessel).pump
+    assert pump is not None
+    values = (pump.duct_area_m2, pump.max_pressure_pa / 1e3, pump.max_speed_rad_s,
+              pump.max_power_w / 1e3)  # fmt: skip
+    for written, value in zip(found.groups(), values, strict=True):
+        assert float(written) == pytest.approx(value, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_laws_that_check_refuses_are_marked_in_the_table_and_no_others() -> None:
+    plant = shipped("gpc").plant
+    lines = [line for line in PAGE.splitlines() if line.startswith("|")]
+    for entrant in entrants(shipped("constrained_gpc").limits):
+        if entrant.name not in ROWS:
+            continue
+        (line,) = (line for line in lines if ROWS[entrant.name] in line)
+        report = robustness(entrant.law, plant, entrant.measured, with_delay_margin=False)
+        assert (", refused |" in line) == bool(report.failures()), entrant.name
+
+
+@pytest.mark.slow
+def test_height_and_period_alone_pass_with_the_weight_that_the_page_names() -> None:
+    weight = float(re.search(r"`pressure_weight_rad2: ([\d.e-]+)`: with", PAGE)[1])  # type: ignore[index]
+    hour = measured_hour(STORM_HOUR)
+    config = expecting(shipped("constrained_gpc"), jonswap(hour.hs_m, hour.tp_s))
+    assert isinstance(config.law, ConstrainedDesign)
+    for scale, passes in ((1.0, True), (0.5, False)):
+        law = replace(config.law, pressure_weight_rad2=scale * weight)
+        report = robustness(
+            law.law(config.plant), config.plant, law.measured, with_delay_margin=False
+        )
+        assert (not report.failures()) == passes
