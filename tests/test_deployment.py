@@ -94,7 +94,7 @@ def test_commands_of_the_unit_are_those_of_the_program() -> None:
     codes = {}
     for key in ("ExecStartPre", "ExecStart"):
         program, *words = shlex.split(value(key))
-        assert program == INSTALLED
+        assert program == {"ExecStartPre": f"-{INSTALLED}", "ExecStart": INSTALLED}[key]
         shown = [
             {"/etc/utank-hil/controller.yaml": GPC, "can0": "nowhere0"}.get(w, w) for w in words
         ]
@@ -138,5 +138,20 @@ def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows(
 def test_group_of_the_device_is_that_of_the_service() -> None:
     rules = (DEPLOY / "90-utank-hil.rules").read_text()
     assert f'GROUP="{value("SupplementaryGroups")}"' in rules
+    assert value("SupplementaryGroups") != UNIT.stem  # else DynamicUser could not make its user
     assert 'KERNEL=="cpu_dma_latency"' in rules
     assert value("DeviceAllow") == "/dev/cpu_dma_latency rw"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "code"),
+    [("law: {kind: gpc", ExitCode.USAGE), ("law: {kind: nothing}", ExitCode.USAGE)],
+)
+def test_what_the_check_refuses_the_run_refuses_with_the_code_that_is_not_tried_again(
+    wrong: str, code: ExitCode, tmp_path: Path
+) -> None:
+    path = tmp_path / "controller.yaml"
+    ship = Path("configs/ships/thesis_first.yaml").resolve()
+    path.write_text(f"name: wrong\nvessel: {ship}\n{wrong}\n", encoding="utf-8")
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code != ExitCode.OK
+    assert CliRunner().invoke(app, ["run", str(path), "--bus", "nowhere0"]).exit_code == code
