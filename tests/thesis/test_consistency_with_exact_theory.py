@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 
 from utank_hil.analysis.capsize.contest import PATTI_B, WAVE_RAD_S
-from utank_hil.analysis.capsize.threshold import without_tank
 from utank_hil.control.optimal_tank import ship_ratios
-from utank_hil.dynamics import WaveMoment, simulate
 from utank_hil.thesis import pump_power
 from utank_hil.thesis.adaptive_figures import OWN_WAVE, _pair, dpc_both
-from utank_hil.thesis.capsize_amplitudes import least_capsizing
 from utank_hil.thesis.damping import START_RAD, _damping
 from utank_hil.thesis.fuzzy_parameters import _settled_s
 from utank_hil.thesis.linear_contest import PASSIVE, entrants, regular_wave_run, responses
@@ -61,20 +58,6 @@ def test_a_tuned_pump_works_against_friction_alone() -> None:
     assert pump_nm == pytest.approx(loss * 0.5, rel=1e-12)
     faster = replace(tuned, duct_area_m2=2 * tuned.duct_area_m2)
     assert pump_power._per_angle(ship, faster)[2] > 2 * pump_nm
-
-
-def test_the_least_capsizing_amplitude_is_the_first_of_single_runs_that_capsizes() -> None:
-    bare = without_tank(PATTI_B)
-    grid = np.arange(40e3, 43e3, 250.0)
-    phase = 90.0
-
-    def capsizes(nm: float) -> bool:
-        wave = WaveMoment([nm], [WAVE_RAD_S], [math.radians(phase)])
-        return math.isfinite(simulate(bare, 300.0, wave=wave).capsized_s)
-
-    (found,) = least_capsizing(bare, grid, np.array([phase]))
-    assert found == next(nm for nm in grid if capsizes(nm))
-    assert np.isnan(least_capsizing(bare, grid[:1] / 2, np.array([phase]))).all()
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.03])

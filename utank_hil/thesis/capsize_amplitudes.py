@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.capsize.contest import PATTI_B, WAVE_RAD_S
-from utank_hil.analysis.capsize.threshold import without_tank
+from utank_hil.analysis.capsize.threshold import capsize_threshold, without_tank
 from utank_hil.arrays import FloatArray
-from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
+from utank_hil.dynamics import RollModel
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from utank_hil.thesis.patti_b import MIDDLE_NM, PASSIVE_NM, STRONG_NM, WEAK_NM
 
@@ -17,36 +17,26 @@ PHASES_DEG: Final = np.arange(0.0, 180.0, 7.5)
 COARSE_DEG: Final = np.arange(0.0, 180.0, 15.0)
 PLACES_M: Final = (-1.0, -0.5, 0.0, 0.5)
 FRICTIONS: Final = (0.05, 0.1, 0.2, 0.5)
-_FINE_NM: Final = np.arange(30e3, 60e3, 50.0)
-_WIDE_NM: Final = np.arange(30e3, 180e3, 500.0)
+HIGHEST_NM: Final = 200e3
+FINE_NM, COARSE_NM = 100.0, 500.0
 
 
-def least_capsizing(
-    model: RollModel, amplitude_nm: FloatArray, phases_deg: FloatArray
-) -> FloatArray:
-    """Least amplitude of M cos(0.6 t + phase) on a grid that capsizes her from rest, N m.
-
-    Every amplitude is tried: those that capsize her need not form one interval.
-
-    Parameters
-    ----------
-    model : RollModel
-    amplitude_nm : ndarray, shape (a,)
-        Rising.
-    phases_deg : ndarray, shape (p,)
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        NaN where none of them capsizes her.
-    """
-    found = np.full(len(phases_deg), np.nan)
-    for n, phase in enumerate(np.radians(phases_deg)):
-        wave = WaveMoment(amplitude_nm[:, None], [[WAVE_RAD_S]], [[phase]])
-        capsized = np.isfinite(simulate_batch(model, DURATION_S, wave=wave).capsized_s)
-        if capsized.any():
-            found[n] = amplitude_nm[int(capsized.argmax())]
-    return found
+def _thresholds(model: RollModel, phases_deg: FloatArray, step_nm: float) -> FloatArray:
+    """Least amplitude of M cos(0.6 t + phase) that capsizes her from rest, N m, at each phase."""
+    return np.array(
+        [
+            capsize_threshold(
+                model,
+                WAVE_RAD_S,
+                HIGHEST_NM,
+                duration_s=DURATION_S,
+                phase_rad=float(phase),
+                cells=round(HIGHEST_NM / step_nm),
+                tolerance=0.01,  # a step is less
+            ).capsizing_nm
+            for phase in np.radians(phases_deg)
+        ]
+    )
 
 
 def _with(lz_m: float, friction: float) -> RollModel:
@@ -55,29 +45,29 @@ def _with(lz_m: float, friction: float) -> RollModel:
 
 def figure_capsize() -> Figure:
     """Thresholds over phase, Lz and friction."""
-    bare = least_capsizing(without_tank(PATTI_B), _FINE_NM, PHASES_DEG)
-    by_place = {z: least_capsizing(_with(z, 0.1), _WIDE_NM, COARSE_DEG) for z in PLACES_M}
+    bare = _thresholds(without_tank(PATTI_B), PHASES_DEG, FINE_NM)
+    by_place = {z: _thresholds(_with(z, 0.1), COARSE_DEG, COARSE_NM) for z in PLACES_M}
     by_friction = {
         friction: by_place[0.0]
         if friction == 0.1
-        else least_capsizing(_with(0.0, friction), _WIDE_NM, COARSE_DEG)
+        else _thresholds(_with(0.0, friction), COARSE_DEG, COARSE_NM)
         for friction in FRICTIONS
     }
     cases = {f"Lz {z:g} m": y for z, y in by_place.items()}
     cases |= {f"friction {f:g}": y for f, y in by_friction.items() if f != 0.1}
-    fits = [name for name, y in cases.items() if np.nanmin(y) <= PASSIVE_NM <= np.nanmax(y)]
-    survives = [name for name, y in cases.items() if np.nanmax(y) > MIDDLE_NM]
+    fits = [name for name, y in cases.items() if np.min(y) <= PASSIVE_NM <= np.max(y)]
+    survives = [name for name, y in cases.items() if np.max(y) > MIDDLE_NM]
     between = [
         name for name, y in cases.items() if bool(((y > MIDDLE_NM) & (y <= PASSIVE_NM)).any())
     ]
-    least_deg = float(PHASES_DEG[int(np.nanargmin(np.abs(bare - WEAK_NM)))])
-    closest = float(bare[int(np.nanargmin(np.abs(bare - WEAK_NM)))])
-    nearest = by_place[0.0][int(np.nanargmin(np.abs(by_place[0.0] - PASSIVE_NM)))]
+    least_deg = float(PHASES_DEG[int(np.argmin(np.abs(bare - WEAK_NM)))])
+    closest = float(bare[int(np.argmin(np.abs(bare - WEAK_NM)))])
+    nearest = by_place[0.0][int(np.argmin(np.abs(by_place[0.0] - PASSIVE_NM)))]
     return Figure(
         "capsize",
         "Wave moments that capsize Patti-B (4.5)",
-        f"nonlinear model, every amplitude on a grid (50 N m without a tank, 500 N m with it), "
-        f"{DURATION_S:.0f} s each",
+        "nonlinear model; the least capsizing amplitude, searched upwards in steps of "
+        f"{FINE_NM:g} N m without a tank and {COARSE_NM:g} with it, {DURATION_S:.0f} s each",
         "The phase at which the wave starts, Lz, the friction and how long she must survive are "
         "not given: phases over half a turn (the other half is to the other side), Lz from -1 to "
         "0.5 m, damping ratio of the water from 0.05 to 0.5.",
@@ -118,7 +108,7 @@ def figure_capsize() -> Figure:
                 "the same over all phases, least",
                 "N m",
                 WEAK_NM,
-                float(np.nanmin(bare)),
+                float(np.min(bare)),
                 "as above",
             ),
             Row(
@@ -147,7 +137,7 @@ def figure_capsize() -> Figure:
                     f"the same over all phases, {name}, least",
                     "N m",
                     PASSIVE_NM,
-                    float(np.nanmin(y)),
+                    float(np.min(y)),
                     "varied",
                 )
                 for name, y in cases.items()
@@ -171,8 +161,8 @@ def figure_capsize() -> Figure:
             Check(
                 "the ship without tank capsizes at 5.0860e4 N m",
                 Verdict.of(bool((bare <= WEAK_NM).mean() > 0.5)),
-                f"the least capsizing moment is {np.nanmin(bare) / 1e3:.1f} to "
-                f"{np.nanmax(bare) / 1e3:.1f} kN m over the phase; it is the printed one at about "
+                f"the least capsizing moment is {np.min(bare) / 1e3:.1f} to "
+                f"{np.max(bare) / 1e3:.1f} kN m over the phase; it is the printed one at about "
                 f"{least_deg:g}° only, elsewhere she capsizes before",
             ),
             Check(
@@ -185,9 +175,9 @@ def figure_capsize() -> Figure:
             ),
             Check(
                 "the tank reduces capsizing in rough seas",
-                Verdict.of(float(np.nanmin(by_place[0.0])) > float(np.nanmax(bare))),
-                f"Lz = 0, friction 0.1: {np.nanmin(by_place[0.0]) / 1e3:.0f} to "
-                f"{np.nanmax(by_place[0.0]) / 1e3:.0f} kN m",
+                Verdict.of(float(np.min(by_place[0.0])) > float(np.max(bare))),
+                f"Lz = 0, friction 0.1: {np.min(by_place[0.0]) / 1e3:.0f} to "
+                f"{np.max(by_place[0.0]) / 1e3:.0f} kN m",
             ),
         ),
     )
