@@ -1,5 +1,6 @@
 """What retuning does is told while it happens, by a process that outlives the loop's."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.commands import announcer as module
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import ModelSummary, RetuningEvent
+from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.telemetry import EventReader, RingError
 
 pytestmark = pytest.mark.slow
@@ -131,6 +133,39 @@ def test_broken_pipe_keeps_no_ship_from_being_kept(tmp_path: Path) -> None:
     announcer.stop()
     assert announcer.error is None
     assert len(list(tmp_path.glob("identified_vessel-*.yaml"))) == 1
+
+
+def test_events_are_logged_and_alarms_are_left_to_the_run_to_print(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log.jsonl"
+    announcer = Announcer(log=log)
+    alarm = AlarmEvent(3 * SECOND_NS, Fault.LEVEL_LIMIT, AlarmState.NORMAL, Mode.STANDBY)
+    announcer.write(alarm, 2 * SECOND_NS)
+    announcer.write(REFUSED, 2 * SECOND_NS)
+    announcer.stop()
+    assert announcer.error is None
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [(line["event"], line["monotonic_ns"]) for line in lines] == [
+        ("alarm", 3 * SECOND_NS),
+        ("retuning", 40 * SECOND_NS),
+    ]
+    said = capfd.readouterr().err
+    assert "LEVEL_LIMIT" not in said
+    assert "too [short]" in said
+
+
+def test_a_log_that_can_not_be_written_is_said_and_the_rest_goes_on(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for log in (tmp_path / "missing" / "log.jsonl", Path("/dev/full")):
+        announcer = Announcer(log=log)
+        announcer.write(REFUSED, 0)
+        announcer.stop()
+        assert announcer.error is None
+        said = capfd.readouterr().err
+        assert "log" in said
+        assert "too [short]" in said
 
 
 def test_a_ship_that_no_file_may_hold_is_told_and_leaves_no_file(

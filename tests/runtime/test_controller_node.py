@@ -200,12 +200,12 @@ def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
 def test_bus_load_is_what_was_heard_and_said_over_the_time_it_took() -> None:
     bench = ControllerBench(START_NS)
     bench.run(2000)
-    # sent a second: 100 + 50 + 50 + 50 + 10 + 3 x 10 + 5 by the others, 50 + 10 + 10 by the node
-    assert bench.column("bus_load")[-1] == pytest.approx(365 * 143 / 250e3, rel=0.02)
+    # sent a second: 100 + 50 + 50 + 50 + 10 + 3 x 10 + 5 by the others, 50 + 3 x 10 by the node
+    assert bench.column("bus_load")[-1] == pytest.approx(375 * 143 / 250e3, rel=0.02)
     # every other tick is lost to both: the others send half as often, the node still in time
     for _ in range(110):
         bench.tick(late_ticks=1)
-    heard_and_said = 295 / 2 + 70
+    heard_and_said = 295 / 2 + 80
     assert bench.column("bus_load")[-1] == pytest.approx(heard_and_said * 143 / 250e3, rel=0.02)
 
 

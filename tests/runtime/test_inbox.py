@@ -27,6 +27,7 @@ from utank_hil.canbus import (
     SensorMotion,
     SensorPump,
     SensorTank,
+    Station,
     Switch,
 )
 from utank_hil.configuration import load_config
@@ -50,7 +51,7 @@ TIMES = {
     SensorTank: "tank_ns",
     SensorPump: "pump_ns",
     DriveStatus1: "drive_ns",
-    OperatorCommand: "orders.heard_ns",
+    OperatorCommand: "stations.heard_ns",
 }
 # what a law may measure: attribute of the emulated ship, and how far noise and delay may be off it
 TRUE = {
@@ -91,14 +92,14 @@ class Line:
             "foreign",
             "watched",
             "expected",
-            "orders",
+            "stations",
         }
         return {
             **{name: getattr(self.inbox, name) for name in shown | {"level_m"}},
             **{
                 name: value
-                for name, value in vars(self.inbox.orders).items()
-                if name != "_receiver"
+                for name, value in vars(self.inbox.stations.orders[Station.OPERATOR]).items()
+                if name != "receiver"
             },
         }
 
@@ -114,7 +115,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert inbox.pressure_pa == 8e3
     assert inbox.power_w == pytest.approx(20e3)
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
-    assert inbox.orders.requested_mode is Mode.ACTIVE
+    assert inbox.stations.requested_mode is Mode.ACTIVE
     came_ns = {kind: 1010 + 10 * index for index, kind in enumerate(GOOD)}
     assert {kind: attrgetter(name)(inbox) for kind, name in TIMES.items()} == {
         kind: came_ns[kind] for kind in TIMES
@@ -273,9 +274,9 @@ def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
     line = Line()
-    assert line.inbox.orders.requested_mode is Mode.STANDBY
+    assert line.inbox.stations.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
-    assert line.inbox.orders.requested_mode is Mode.STANDBY
+    assert line.inbox.stations.requested_mode is Mode.STANDBY
 
 
 class Listener:

@@ -6,12 +6,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.retuning import ModelSummary, RetuningEvent
+from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.telemetry import EventReader, EventWriter, RingError, event_text
+from utank_hil.telemetry.event_ring import Event, warns
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
-events = st.builds(
+alarms = st.builds(
+    AlarmEvent,
+    st.integers(0, 1 << 62),
+    st.sampled_from(Fault),
+    st.none() | st.sampled_from(AlarmState),
+    st.sampled_from(Mode),
+)
+events = alarms | st.builds(
     RetuningEvent,
     st.integers(0, 1 << 62),
     st.sampled_from(RetuningState),
@@ -22,13 +31,14 @@ events = st.builds(
 
 @given(st.lists(events, max_size=20), st.integers(0, 1 << 62))
 def test_events_come_out_as_they_went_in_at_times_since_the_start(
-    told: list[RetuningEvent], start_ns: int
+    told: list[Event], start_ns: int
 ) -> None:
     with EventWriter() as writer, EventReader(writer.name) as reader:
         for event in told:
             writer.write(event, start_ns)
         assert reader.read() == [replace(e, time_ns=e.time_ns - start_ns) for e in told]
         assert reader.read() == []
+        assert not told or reader.start_ns == start_ns
         assert not reader.ended
         assert reader.lost == 0
 
@@ -73,3 +83,15 @@ def test_text_of_an_event_is_its_state_and_its_reasons() -> None:
     event = RetuningEvent(0, RetuningState.REFUSED, ("too short", "no pulses"))
     assert event_text(event) == "retuning REFUSED: too short; no pulses"
     assert event_text(RetuningEvent(0, RetuningState.DESIGN, ())) == "retuning DESIGN"
+
+
+def test_alarms_and_refusals_warn_and_the_rest_is_news() -> None:
+    def alarm(state: AlarmState | None) -> AlarmEvent:
+        return AlarmEvent(0, Fault.LEVEL_LIMIT, state, Mode.FAULT)
+
+    assert [state for state in (*AlarmState, None) if warns(alarm(state))] == [
+        AlarmState.ACTIVE_UNACKNOWLEDGED, None,
+    ]  # fmt: skip
+    assert [state for state in RetuningState if warns(RetuningEvent(0, state, ()))] == [
+        RetuningState.REFUSED, RetuningState.UNDONE,
+    ]  # fmt: skip

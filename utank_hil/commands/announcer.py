@@ -1,7 +1,7 @@
-"""Tells what retuning does while the loop goes on: a process of its own, as the loop has no time.
+"""Tells what happens while the loop goes on: a process of its own, as the loop has no time.
 
-The loop writes an event into shared memory; this process prints it, and keeps the ship that was
-found in files. It reads what is left when the loop was killed, too.
+The loop writes an event into shared memory. This process logs it, prints it if retuning made it,
+and keeps the ship that was found in files. It reads what is left when the loop was killed, too.
 """
 
 import contextlib
@@ -10,17 +10,21 @@ import os
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 from typing import Final
 
 from rich.markup import escape
 
 from utank_hil.canbus import RetuningState
 from utank_hil.commands.common import notes, shown
+from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.retuning import RetuningEvent
 from utank_hil.telemetry import EventReader, EventWriter, event_text
+from utank_hil.telemetry.event_ring import Event
 
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5
@@ -36,6 +40,8 @@ class Announcer:
     ----------
     ships : IdentifiedShips, optional
         Where a ship that a law was retuned for is kept.
+    log : Path, optional
+        File of the log.
 
     Attributes
     ----------
@@ -45,7 +51,7 @@ class Announcer:
         Why events are not printed; the controller runs all the same.
     """
 
-    def __init__(self, ships: IdentifiedShips | None = None) -> None:
+    def __init__(self, ships: IdentifiedShips | None = None, log: Path | None = None) -> None:
         self.ring: str | None = None
         self.error: str | None = None
         self._writer: EventWriter | None = None
@@ -60,7 +66,7 @@ class Announcer:
             return
         with heard:
             try:
-                process = context.Process(target=announce, args=(self.ring, ships, says))
+                process = context.Process(target=announce, args=(self.ring, ships, log, says))
                 with _signals_waiting():
                     process.start()
             except OSError as error:
@@ -74,7 +80,7 @@ class Announcer:
                 process.join()
                 self.error = f"the process that tells events did not start ({process.exitcode})"
 
-    def write(self, event: RetuningEvent, start_ns: int) -> None:
+    def write(self, event: Event, start_ns: int) -> None:
         """Take one event; never waits."""
         if self._writer is not None:
             self._writer.write(event, start_ns)
@@ -96,9 +102,17 @@ class Announcer:
             self.error = f"the process that tells events ended with code {self._process.exitcode}"
 
 
-def announce(ring: str, ships: IdentifiedShips | None, ready: Connection) -> None:
+def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
     """Tell events until their writer ends or dies; the whole life of the process."""
-    with EventReader(ring) as reader:
+    with EventReader(ring) as reader, ExitStack() as stack:
+        events = None
+        if log is not None:
+            try:
+                events = EventLog(log)
+            except OSError as error:
+                _print(f"[red]no log of events:[/red] {escape(str(error))}")
+            else:
+                stack.callback(events.close)
         ready.send_bytes(b"ready")
         ready.close()
         # what ends it is the end of the ring, not Ctrl-C, a closed terminal or a stopped service
@@ -109,12 +123,15 @@ def announce(ring: str, ships: IdentifiedShips | None, ready: Connection) -> Non
         while True:
             last = reader.ended
             for event in reader.read():
-                _tell(event, ships)
+                if events is not None:
+                    _log(events, event, reader.start_ns)
+                if isinstance(event, RetuningEvent):  # alarms are printed at once, by the run
+                    _tell(event, ships)
             if last:
                 break
             time.sleep(LOOK_S)
         if reader.lost:
-            _print(f"[red]{reader.lost} events of retuning were lost[/red]")
+            _print(f"[red]{reader.lost} events were lost[/red]")
 
 
 def _ready(heard: Connection) -> bool:
@@ -133,6 +150,13 @@ def _signals_waiting() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _log(events: EventLog, event: Event, start_ns: int) -> None:
+    try:
+        events.write(event, start_ns)
+    except OSError as error:  # a full disk is no reason to end
+        _print(f"[red]an event was not logged:[/red] {escape(str(error))}")
 
 
 def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:

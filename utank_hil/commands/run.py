@@ -13,14 +13,16 @@ from rich.markup import escape
 
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
+from utank_hil.commands import event_log
+from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.fault_lines import FaultLines
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
+from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
@@ -32,9 +34,11 @@ from utank_hil.runtime import (
     real_time_scheduling,
     stop_on_signals,
 )
+from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
+from utank_hil.telemetry.event_ring import Event
 
 
 def run(
@@ -45,7 +49,7 @@ def run(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for the recording, and for configurations of ships that retuning finds; "
+            help="Folder for recording, log, and configurations of ships that retuning finds; "
             "without it there are none."
         ),
     ] = None,
@@ -66,8 +70,8 @@ def run(
     (UTC) of their start and go on in another file every hour; one that fails is reported, and the
     controller runs without. A
     controller that retunes itself prints each step with its reasons when it happens; so does one
-    that meets a fault. A fault that is latched at the end, or a lost bus, has an exit code of its
-    own (docs/exit-codes.md).
+    that raises an alarm, and both are logged in the folder of --out. A fault that is latched at the
+    end, or a lost bus, has an exit code of its own (docs/exit-codes.md).
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
@@ -90,11 +94,11 @@ def run(
         folder = OUT if out is None and view else out
         work = retuner_work(loaded)
         announcer = None
-        if work is not None:
+        if work is not None or folder is not None:
             announcer = _announcer(config, loaded, folder)
             stack.callback(announcer.stop)
             if announcer.error is not None:
-                notes.print(f"[red]no word of retuning:[/red] {escape(announcer.error)}")
+                notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
         recording = None
         if folder is not None:
             recording = RunRecording(
@@ -114,22 +118,28 @@ def run(
         retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
         if retuner is not None and not retuner.alive:
             notes.print("[red]the retuner did not start:[/red] nothing will be retuned")
+        try:
+            alarms = AlarmLines()
+        except OSError as error:
+            fail(f"no process to print alarms: {error}")
+        stack.callback(alarms.close)
+
+        def told(event: Event, start_ns: int) -> None:
+            if isinstance(event, AlarmEvent):
+                alarms.tell(event, start_ns)
+            if announcer is not None:
+                announcer.write(event, start_ns)
+
         node = build_controller_node(
             loaded,
             law,
             retuner=retuner,
             statistics=statistics,
             sink=None if recording is None else recording.write,
-            event_sink=None if announcer is None else announcer.write,
+            event_sink=told,
         )
-        try:
-            faults = FaultLines()
-        except OSError as error:
-            fail(f"no process to print faults: {error}")
-        stack.callback(faults.close)
 
         def ended() -> bool:
-            faults.look(node)
             manager.progress(statistics.ticks)
             return stop()
 
@@ -144,9 +154,8 @@ def run(
                 ended, None if duration is None else round(duration * 1e9)
             )
         manager.stopping()
-        faults.look(node)
     if announcer is not None and announcer.error is not None:
-        notes.print(f"[red]retuning was not told:[/red] {escape(announcer.error)}", soft_wrap=True)
+        notes.print(f"[red]events were not logged:[/red] {escape(announcer.error)}", soft_wrap=True)
     code = _code(node)
     if json_:
         summary = {
@@ -196,11 +205,16 @@ def _print_summary(
 
 
 def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
-    """What prints the events of retuning, and keeps in `folder` the ships it found."""
-    ships = None
-    if folder is not None:
-        ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))
-    return Announcer(ships)
+    """What tells of events, and keeps in `folder` their log and the ships that retuning found."""
+    if folder is None:
+        return Announcer()
+    log = None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (log,) = claimed_files(folder.resolve(), event_log.NAME)
+    except OSError as error:
+        notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
+    return Announcer(IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config)), log)
 
 
 def _show(url: str, stack: ExitStack) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import (
     Address,
+    Alarm,
     Catalogue,
     ControllerStatus,
     ControlWord,
@@ -24,6 +25,7 @@ from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, Star
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
+from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
@@ -50,8 +52,11 @@ _IDENTIFY: Final = RetuningState.IDENTIFY
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
+QUIET_START_NS: Final = 10_000_000_000
+"""What is awaited at the start is an alarm only when it has not come by then."""
+
 Measure = Callable[[Inbox, LevelObserver], FloatArray]
-EventSink = Callable[[RetuningEvent, int], None]
+EventSink = Callable[[RetuningEvent | AlarmEvent, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +111,8 @@ class ControllerNode:
     sink : callable, optional
         Takes one telemetry row (columns `SIGNALS`) every tick; must copy it and not wait.
     event_sink : callable, optional
-        Takes each `RetuningEvent`, with the time of the first tick, as it happens; must not wait.
+        Takes each event of retuning and alarms, with the time of the first tick, as it happens;
+        must not wait.
 
     Attributes
     ----------
@@ -118,6 +124,7 @@ class ControllerNode:
         What the supervisor judges.
     supervisor : Supervisor
         As given.
+    alarms : AlarmList
     command_pa : float
         Pressure commanded.
     statistics : LoopStatistics
@@ -193,6 +200,10 @@ class ControllerNode:
         self._commands = catalogue.transmitter(PumpCommand)
         self._status = catalogue.transmitter(ControllerStatus)
         self._twin = catalogue.transmitter(PassiveTwin)
+        self._alarm_frames = catalogue.transmitter(Alarm)
+        self.alarms = AlarmList()
+        self._alarming = False
+        self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
         self._row = np.zeros(len(SIGNALS))
@@ -382,7 +393,7 @@ class ControllerNode:
             seen = self.seen
             self._retuning.update(
                 now_ns,
-                self.inbox.orders.take_retuning(),
+                self.inbox.stations.take_retuning(),
                 engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
             )
@@ -415,13 +426,15 @@ class ControllerNode:
             )
             frames += self._command_frames(word, follow=supervisor.demand is _CONTROL)
         if self._status_schedule.due(now_ns):
+            self._update_alarms(now_ns)
+            frames.append(self._alarm_frames.frame(self.alarms.next_message(now_ns)))
             frames.append(
                 self._status.frame(
                     ControllerStatus(
                         mode=supervisor.mode,
                         fault=self.fault,
                         armed=supervisor.mode is Mode.ACTIVE,
-                        alarm=supervisor.mode is _FAULT or bool(self._law_fault),
+                        alarm=self.alarms.unaccepted,
                         degraded=supervisor.degraded,
                         saturated=self._limiter.limiting,
                         not_realtime=not self.statistics.real_time,
@@ -429,12 +442,34 @@ class ControllerNode:
                         catalogue_version=self._catalogue_version,
                         configuration_version=self._settings.configuration_version,
                         retuning=None if self._retuning is None else self._retuning.state,
+                        station=self.inbox.stations.in_command,
                     )
                 )
             )
             if self._monitors is not None:
                 frames.append(self._twin.frame(self._monitors.twin_message()))
         return frames
+
+    def _update_alarms(self, now_ns: int) -> None:
+        """Raise, accept and rectify alarms, and hand on what became of them."""
+        supervisor, alarms = self.supervisor, self.alarms
+        mode = supervisor.mode
+        self._alarming = (
+            self._alarming or mode is not Mode.INIT or now_ns - self.start_ns >= QUIET_START_NS
+        )
+        if self._alarming:
+            active = active_faults(supervisor, self.seen, self._law_fault)
+            alarms.update(active, mode, now_ns)
+        for code in self.inbox.stations.take_accepted():
+            alarms.accept(code, mode, now_ns)
+        refused_by = supervisor.reset_refused_by
+        if refused_by is not self._refused_by:
+            self._refused_by = refused_by
+            if refused_by is not _NO_FAULT:
+                alarms.reset_refused(refused_by, mode, now_ns)
+        for event in alarms.take_events():
+            if self._event_sink is not None:
+                self._event_sink(event, self.start_ns)
 
     def _command_frames(self, word: ControlWord, *, follow: bool) -> list[Frame]:
         """The next commands of what is on board."""

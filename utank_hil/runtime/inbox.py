@@ -18,19 +18,20 @@ from utank_hil.canbus import (
     DriveStatus2,
     Frame,
     Heartbeat,
-    OperatorCommand,
     Quality,
     Receiver,
     SensorMotion,
     SensorPump,
     SensorTank,
+    Station,
     Switch,
     ValveState,
     ValveStatus,
 )
 from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.runtime.monitors.spikes import SpikeGates
-from utank_hil.runtime.orders import NEVER_HEARD_NS, Orders
+from utank_hil.runtime.orders import NEVER_HEARD_NS
+from utank_hil.runtime.stations import ADDRESSES, Stations
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 """Attributes of the inbox that a law may measure."""
@@ -87,12 +88,10 @@ class Inbox:
         As the valve last measured it, at `valve_ns`; 1, open, before and where there is none.
     valve_state : ValveState or None
         State the valve last reported; the echo of a new command came at `valve_echo_ns`.
-    orders : Orders
-        What the operator wants.
+    stations : Stations
+        What the operators want.
     versions_match : bool
         Drive, sensors and valve run the controller's catalogue and configuration.
-    panel_matches : bool
-        So does the operator's panel.
     conflict_ns : int
         When somebody else last sent with the controller's address.
     frames, foreign : int
@@ -132,18 +131,20 @@ class Inbox:
         if valve:
             matched.append(Address.VALVE)
             self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
-        panel = catalogue.receiver(OperatorCommand)
-        self.orders = Orders(panel)
-        self._subscriptions[self.orders.can_id] = self.orders.accept, self.orders.obey
-        self.watched.append(panel)
+        self.stations = Stations(catalogue)
+        for orders in self.stations.orders.values():
+            self._subscriptions[orders.can_id] = orders.accept, orders.obey
+            self.watched.append(orders.receiver)
         self._matching: dict[int, bool] = {}
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
         self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
-        panel_beat = catalogue.receiver(Heartbeat, Address.OPERATOR)
-        self._subscribe(panel_beat, self._on_panel_heartbeat)
+        self._panels_match = dict.fromkeys(ADDRESSES, False)
+        for station, address in ADDRESSES.items():
+            beats = catalogue.receiver(Heartbeat, address)
+            self._subscribe(beats, partial(self._on_panel_heartbeat, station))
         self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
@@ -156,7 +157,7 @@ class Inbox:
         self._valve_echo: int | None = None
         self.drive_state = None if pump else _ENABLED
         self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.versions_match = self.panel_matches = False
+        self.versions_match = False
         self.motion_ns = self.tank_ns = NEVER_HEARD_NS
         self.pump_ns = self.drive_ns = self.echo_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
         self._echo: int | None = None
@@ -171,6 +172,11 @@ class Inbox:
     def level_m(self) -> float:
         """Tank level, starboard up: half the difference of the two gauges."""
         return (self.starboard_level_m - self.port_level_m) / 2
+
+    @property
+    def panel_matches(self) -> bool:
+        """Whether the station in command runs the controller's catalogue and configuration."""
+        return self._panels_match[self.stations.in_command]
 
     @property
     def protection_valid(self) -> bool:
@@ -264,6 +270,11 @@ class Inbox:
         self._matching[can_id] = versions == self._versions
         self.versions_match = all(self._matching.values())
 
-    def _on_panel_heartbeat(self, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
+    def _on_panel_heartbeat(
+        self,
+        station: Station,
+        beat: Heartbeat,
+        now_ns: int,  # noqa: ARG002
+    ) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)
-        self.panel_matches = versions == self._versions
+        self._panels_match[station] = versions == self._versions

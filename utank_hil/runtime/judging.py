@@ -11,6 +11,8 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 Coded: TypeAlias = tuple[Fault, Condition]
 First: TypeAlias = Callable[[Observations, SafetyLimits], Coded | None]
 """Finds the first condition that holds."""
+All: TypeAlias = Callable[[Observations, SafetyLimits], set[Fault]]
+"""Finds the faults of all conditions that hold; slower, for now and then."""
 
 _ALL: Final = tuple((row.code, condition) for row in FAULTS for condition in row.conditions)
 
@@ -37,6 +39,12 @@ def _first_of(conditions: tuple[Coded, ...]) -> First:
     return first
 
 
+def _all_of(conditions: tuple[Coded, ...]) -> All:
+    return lambda seen, limits: {
+        code for code, condition in conditions if condition.holds(seen, limits)
+    }
+
+
 _STOPPING: Final = _with(Reaction.STOP)
 _ENDING: Final = _STOPPING + _with(Reaction.RAMP)
 _AWAITED: Final = sorted(
@@ -55,3 +63,5 @@ first_lasting: Final = _first_of(_ENDING + tuple(c for c in _AWAITED if c not in
 first_giving_up: Final = _first_of(_with(Reaction.GIVE_UP))
 first_halving: Final = _first_of(_with(Reaction.HALVE))
 first_awaited: Final = _first_of(tuple(_AWAITED))
+all_stopping: Final = _all_of(_STOPPING)
+all_harming: Final = _all_of(_ENDING + _with(Reaction.HALVE))

@@ -162,7 +162,7 @@ class Observer:
     def observe(self, now_ns: int, frames_sent: int) -> None:
         """Overwrite `seen`, once a tick; `frames_sent` by the node since its start."""
         inbox, seen = self._inbox, self.seen
-        orders = inbox.orders
+        stations = inbox.stations
         if self._last_ns is None:
             self._last_ns = self._load_since_ns = now_ns
         late_ns = max(0, now_ns - self._last_ns - TICK_NS)
@@ -172,12 +172,15 @@ class Observer:
         self._late_history = (self._late_history << max(1, missed) | late) & _ALL_LATE
         seen.tick_late_ms = late_ns / MILLISECOND_NS
         seen.overruns_in_ten = self._late_history.bit_count()
+        # first of all: who is in command may change
+        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = stations.take()
+        seen.requested_mode = stations.requested_mode
         seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
         seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
         seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
         seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
         seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
-        seen.panel_age_ms = (now_ns - orders.heard_ns) / MILLISECOND_NS
+        seen.panel_age_ms = (now_ns - stations.heard_ns) / MILLISECOND_NS
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (
             inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
@@ -194,8 +197,6 @@ class Observer:
         seen.heel_rad += HEEL_SHARE * (inbox.roll_rad - seen.heel_rad)
         if self._load_schedule.due(now_ns):
             self._count_load(now_ns, inbox.frames + frames_sent)
-        seen.requested_mode = orders.requested_mode
-        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = orders.take()
 
     def _count_load(self, now_ns: int, frames: int) -> None:
         # at the first tick only a backlog was received

@@ -48,17 +48,23 @@ class Orders:
 
     Attributes
     ----------
+    receiver : Receiver of OperatorCommand
+        As given.
     requested_mode : Mode
         Mode the operator wants; STANDBY as long as none was asked for.
     last : OperatorCommand or None
         Latest accepted frame.
     heard_ns : int
         When it came.
+    news : bool
+        Whether a frame has come since the last `take`.
+    takes_command : bool
+        Rising edge of the wish for the command since the last `take`.
     """
 
     def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
         self.can_id = receiver.can_id
-        self._receiver = receiver
+        self.receiver = receiver
         self._gap_ns = (MAX_LOST + 1) * receiver.cycle_ns
         self.requested_mode = Mode.STANDBY
         self.last: OperatorCommand | None = None
@@ -66,12 +72,15 @@ class Orders:
         self._stop_heard = self._disarm_heard = False
         self._arm_edge = self._reset_edge = False
         self._retuning = _NOTHING
+        self._accepted: list[int | None] = []
+        self.news = self.takes_command = False
 
     def accept(self, frame: Frame) -> OperatorCommand | None:
         """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
-        order = self._receiver.accept(frame)
-        heard = order or self._receiver.intact(frame)
+        order = self.receiver.accept(frame)
+        heard = order or self.receiver.intact(frame)
         if heard is not None:
+            self.news = True
             self._stop_heard |= heard.stop
             self._disarm_heard |= not heard.arm
         return order
@@ -83,6 +92,9 @@ class Orders:
             before = order
         self._arm_edge |= order.arm and not before.arm
         self._reset_edge |= order.reset and not before.reset
+        self.takes_command |= order.take_command and not before.take_command
+        if order.acknowledge and not before.acknowledge:
+            self._accepted.append(order.acknowledge_code)
         retune, undo, forbidden = self._retuning
         self._retuning = RetuningOrder(
             retune or (order.retune and not before.retune),
@@ -103,6 +115,7 @@ class Orders:
             self._reset_edge,
         )
         self._stop_heard = self._disarm_heard = self._arm_edge = self._reset_edge = False
+        self.news = self.takes_command = False
         return wishes
 
     def take_retuning(self) -> RetuningOrder:
@@ -112,3 +125,8 @@ class Orders:
         if last is not None and last.forbid_retuning:
             return order._replace(forbidden=True)
         return order
+
+    def take_accepted(self) -> list[int | None]:
+        """Return the codes of the alarms that were accepted since the last call; None for all."""
+        accepted, self._accepted = self._accepted, []
+        return accepted

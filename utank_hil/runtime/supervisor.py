@@ -39,6 +39,8 @@ class Supervisor:
 
     Attributes
     ----------
+    limits : SafetyLimits
+        As given.
     mode : Mode
     fault : Fault
         Why the mode is FAULT (latched until reset); in INIT, what is still missing; else NONE, or
@@ -53,7 +55,7 @@ class Supervisor:
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
-        self._limits = limits
+        self.limits = limits
         self.mode = Mode.INIT
         self.fault = Fault.NONE
         self.demand = Demand.ZERO
@@ -81,8 +83,8 @@ class Supervisor:
 
     def _while_active(self, seen: Observations, now_ns: int) -> None:
         self._note_drive(seen, now_ns)
-        self.degraded = judging.first_halving(seen, self._limits) is not None
-        found = judging.first_ending(seen, self._limits)
+        self.degraded = judging.first_halving(seen, self.limits) is not None
+        found = judging.first_ending(seen, self.limits)
         if found is not None:
             self._latch(*found, seen, now_ns)
         elif seen.stop:
@@ -96,11 +98,7 @@ class Supervisor:
         if self.demand is Demand.RAMP:
             self._note_drive(seen, now_ns)
             self._ramp(seen, now_ns)
-            if (
-                now_ns >= self._zero_at_ns
-                or seen.stop
-                or judging.first_stopping(seen, self._limits)
-            ):
+            if now_ns >= self._zero_at_ns or seen.stop or judging.first_stopping(seen, self.limits):
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
         if seen.reset_edge and self.demand is Demand.ZERO:
@@ -110,7 +108,7 @@ class Supervisor:
 
     def _continue_reset(self, seen: Observations, now_ns: int, until_ns: int) -> None:
         seen.drive_out_ms = 0.0  # off, as it should be
-        lasts = judging.first_lasting(seen, self._limits)
+        lasts = judging.first_lasting(seen, self.limits)
         if lasts is None:
             self._disarm(Mode.STANDBY)
         elif now_ns >= until_ns:
@@ -121,13 +119,13 @@ class Supervisor:
         if self.mode is Mode.PASSIVE and seen.command_pa != 0.0:
             # still ramping down, so what ends ACTIVE ends this
             self._note_drive(seen, now_ns)
-            found = judging.first_ending(seen, self._limits)
+            found = judging.first_ending(seen, self.limits)
             if found is not None:
                 self._latch(*found, seen, now_ns)
                 return
             if now_ns >= self._zero_at_ns:
                 self.demand = Demand.ZERO
-        missing = judging.first_awaited(seen, self._limits)
+        missing = judging.first_awaited(seen, self.limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
             return
@@ -147,7 +145,7 @@ class Supervisor:
             seen.requested_mode is Mode.PASSIVE
             and self.mode is Mode.STANDBY
             # an old order says nothing of now
-            and seen.panel_age_ms <= self._limits.panel_age_to_arm_ms
+            and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms
         ):
             self._disarm(Mode.PASSIVE)
 
@@ -155,7 +153,7 @@ class Supervisor:
         # being out of operation enabled counts from here on
         self._drive_enabled_ns = now_ns
         seen.drive_out_ms = 0.0
-        refusal = judging.first_refusing(seen, self._limits)
+        refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
             self.fault = refusal[0]
         else:
@@ -168,7 +166,7 @@ class Supervisor:
             self._disarm(Mode.STANDBY)
             return
         # being out of operation enabled does not count yet; all else counts until ACTIVE
-        refusal = judging.first_refusing(seen, self._limits)
+        refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
             self._disarm(Mode.STANDBY, refusal[0])
         elif seen.drive_enabled:
@@ -179,7 +177,7 @@ class Supervisor:
             self.fault = Fault.NONE
             self._zero_at_ns = _NEVER_NS
         else:
-            found = judging.first_giving_up(seen, self._limits)
+            found = judging.first_giving_up(seen, self.limits)
             if found is not None:
                 self._disarm(Mode.STANDBY, found[0])
 
@@ -206,7 +204,7 @@ class Supervisor:
 
     def _ramp(self, seen: Observations, now_ns: int) -> None:
         """Shorten the ramp to the earliest end that a condition asks for."""
-        found = judging.soonest_ramp(seen, self._limits)
+        found = judging.soonest_ramp(seen, self.limits)
         if found is not None:
             zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
             self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)

@@ -1,4 +1,6 @@
-"""Transport of retuning events out of the loop: a telemetry ring whose rows hold JSON text.
+"""Transport of events out of the loop: a telemetry ring whose rows hold JSON text.
+
+Events are those of retuning and of the alarm list.
 
 As with the ring itself, a write takes microseconds and never blocks, several processes can read,
 and events survive a killed writer.
@@ -6,15 +8,16 @@ and events survive a killed writer.
 
 import json
 from dataclasses import asdict
-from typing import Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
-from utank_hil.canbus.enumerations import RetuningState
+from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
 from utank_hil.closing import Closing
 from utank_hil.retuning.adaptive import RetuningEvent
 from utank_hil.retuning.answer import ModelSummary
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry.ring import RingReader, RingWriter
 
 _TEXT_WORDS: Final = 1024
@@ -23,6 +26,24 @@ _CAPACITY: Final = 64  # a retuning has four events in four minutes; readers pol
 _LONGEST_BYTES: Final = 8 * _TEXT_WORDS
 _MOST_BYTES_A_CHARACTER: Final = 6  # of an escaped character in JSON
 _CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
+
+
+Event: TypeAlias = RetuningEvent | AlarmEvent
+
+_ALARM_WORDS: Final = {
+    AlarmState.ACTIVE_UNACKNOWLEDGED: "ALARM",
+    AlarmState.ACTIVE_ACKNOWLEDGED: "alarm accepted",
+    AlarmState.RECTIFIED_UNACKNOWLEDGED: "cause of an alarm gone",
+    AlarmState.NORMAL: "alarm over",
+    None: "reset REFUSED while this lasts,",
+}
+
+
+def warns(event: Event) -> bool:
+    """Return whether an event is more than news."""
+    if isinstance(event, AlarmEvent):
+        return event.state in (AlarmState.ACTIVE_UNACKNOWLEDGED, None)
+    return event.state in (RetuningState.REFUSED, RetuningState.UNDONE)
 
 
 class EventWriter(Closing):
@@ -45,21 +66,27 @@ class EventWriter(Closing):
         self._row = np.zeros(len(_WORDS))
         self._text = self._row[1:].view(np.uint8)
 
-    def write(self, event: RetuningEvent, start_ns: int) -> None:
+    def write(self, event: Event, start_ns: int) -> None:
         """Append one event; never blocks. Reasons too long for a row are cut.
 
         Parameters
         ----------
-        event : RetuningEvent
+        event : RetuningEvent or AlarmEvent
         start_ns : int
             Time of the first telemetry row; readers get the time since then.
         """
+        if isinstance(event, AlarmEvent):
+            self._append(_encoded_alarm(event, start_ns))
+            return
         reasons = event.reasons
         if sum(map(len, reasons)) > _LONGEST_BYTES:
             reasons = _cut(reasons)  # first: encoding takes long for what would be thrown away
         data = _encoded(event, reasons, start_ns)
         if len(data) > _LONGEST_BYTES:
             data = _encoded(event, _cut(reasons), start_ns)
+        self._append(data)
+
+    def _append(self, data: bytes) -> None:
         self._row[0] = len(data)
         self._text[: len(data)] = np.frombuffer(data, dtype=np.uint8)
         self._ring.write(self._row)
@@ -81,14 +108,23 @@ class EventReader(Closing):
     ------
     RingError
         If there is no such ring.
+
+    Attributes
+    ----------
+    start_ns : int
+        Time of the first telemetry row on the writer's monotonic clock, once there was an event.
     """
 
     def __init__(self, name: str) -> None:
         self._ring = RingReader(name)
+        self.start_ns = 0
 
-    def read(self) -> list[RetuningEvent]:
+    def read(self) -> list[Event]:
         """Events since the last call, oldest first, `time_ns` since the start; never blocks."""
-        return [_decoded(row) for row in self._ring.read()]
+        contents = [json.loads(row[1:].tobytes()[: int(row[0])]) for row in self._ring.read()]
+        if contents:
+            self.start_ns = contents[-1]["start_ns"]
+        return [_decoded(content) for content in contents]
 
     @property
     def ended(self) -> bool:
@@ -105,8 +141,10 @@ class EventReader(Closing):
         self._ring.close()
 
 
-def event_text(event: RetuningEvent) -> str:
+def event_text(event: Event) -> str:
     """Text of an event, such as `retuning REFUSED: the record is too short`."""
+    if isinstance(event, AlarmEvent):
+        return f"{_ALARM_WORDS[event.state]} in {event.mode.name}: {fault_text(event.code)}"
     text = f"retuning {event.state.name}"
     return f"{text}: {'; '.join(event.reasons)}" if event.reasons else text
 
@@ -119,6 +157,7 @@ def _cut(reasons: tuple[str, ...]) -> tuple[str]:
 def _encoded(event: RetuningEvent, reasons: tuple[str, ...], start_ns: int) -> bytes:
     content = {
         "time_ns": event.time_ns - start_ns,
+        "start_ns": start_ns,
         "state": int(event.state),
         "reasons": reasons,
         "found": None if event.found is None else asdict(event.found),
@@ -126,8 +165,26 @@ def _encoded(event: RetuningEvent, reasons: tuple[str, ...], start_ns: int) -> b
     return json.dumps(content, ensure_ascii=False).encode(errors="replace")
 
 
-def _decoded(row: FloatArray) -> RetuningEvent:
-    content = json.loads(row[1:].tobytes()[: int(row[0])])
+def _encoded_alarm(event: AlarmEvent, start_ns: int) -> bytes:
+    content = {
+        "time_ns": event.time_ns - start_ns,
+        "start_ns": start_ns,
+        "code": int(event.code),
+        "alarm": None if event.state is None else int(event.state),
+        "mode": int(event.mode),
+    }
+    return json.dumps(content).encode()
+
+
+def _decoded(content: dict[str, Any]) -> Event:
+    if "code" in content:
+        state = content["alarm"]
+        return AlarmEvent(
+            content["time_ns"],
+            Fault(content["code"]),
+            None if state is None else AlarmState(state),
+            Mode(content["mode"]),
+        )
     found = content["found"]
     return RetuningEvent(
         content["time_ns"],

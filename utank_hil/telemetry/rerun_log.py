@@ -3,7 +3,7 @@
 A run is one entity, `/<number>/<name>`, with one component: a struct with a field for each column.
 One entity for all signals makes the file two to three times smaller at a live recorder's batch
 size. Mode and fault are also logged by name, on change only, to a state lane and to a text log. The
-text log holds the retuning events as well.
+text log holds the events of retuning and alarms as well.
 """
 
 import json
@@ -17,9 +17,8 @@ import pyarrow as pa  # it ships no annotations
 import rerun as rr
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
-from utank_hil.retuning.adaptive import RetuningEvent
-from utank_hil.telemetry.event_ring import event_text
+from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.telemetry.event_ring import Event, event_text, warns
 from utank_hil.telemetry.units import field_of
 
 APPLICATION: Final = "utank-hil"
@@ -121,15 +120,14 @@ class RunLog:
             )
             self._write_text(time_ns[changed], names, [_level(*state) for state in states[changed]])
 
-    def write_events(self, events: Sequence[RetuningEvent]) -> None:
-        """Log retuning events; `time_ns` is on the clock of the rows' `time_s`."""
+    def write_events(self, events: Sequence[Event]) -> None:
+        """Log events of retuning and alarms; `time_ns` is on the clock of the rows' `time_s`."""
         if events:
-            bad = (RetuningState.REFUSED, RetuningState.UNDONE)
             self._write_text(
                 np.array([event.time_ns for event in events], dtype="timedelta64[ns]"),
                 [event_text(event) for event in events],
                 [
-                    rr.TextLogLevel.WARN if event.state in bad else rr.TextLogLevel.INFO
+                    rr.TextLogLevel.WARN if warns(event) else rr.TextLogLevel.INFO
                     for event in events
                 ],
             )

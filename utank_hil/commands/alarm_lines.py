@@ -1,20 +1,19 @@
-"""One plain line for each fault, at once: on standard error, while the loop goes on."""
+"""One plain line for each alarm, at once: on standard error, while the loop goes on."""
 
 import contextlib
 import os
 import subprocess
 from typing import Final
 
-from utank_hil.canbus import Fault, Mode
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.faults import fault_text
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.telemetry import event_text
 
 _END_S: Final = 10.0
 _STANDARD_ERROR: Final = 2
 
 
-class FaultLines:
-    """Prints a line when the controller's fault changes, through a process of its own.
+class AlarmLines:
+    """Prints what becomes of the alarms, through a process of its own.
 
     A terminal or a journal may be held up, and the loop must not wait for it: it writes into a
     pipe, and ``cat`` copies from there. A line is left out when the pipe is full.
@@ -26,7 +25,6 @@ class FaultLines:
     """
 
     def __init__(self) -> None:
-        self._said = (Mode.INIT, Fault.NONE)
         self._process = subprocess.Popen(
             ["cat"],
             stdin=subprocess.PIPE,
@@ -37,15 +35,11 @@ class FaultLines:
         self._pipe = self._process.stdin.fileno()
         os.set_blocking(self._pipe, False)
 
-    def look(self, node: ControllerNode) -> None:
-        """Print the fault if it is new; never waits. What is awaited in INIT is no fault yet."""
-        now = (node.mode, node.fault)
-        if now == self._said:
-            return
-        self._said = now
-        if node.mode is not Mode.INIT and node.fault is not Fault.NONE:
-            with contextlib.suppress(OSError):  # the fault is also the last word of the command
-                os.write(self._pipe, f"{fault_line(node)}\n".encode())
+    def tell(self, event: AlarmEvent, start_ns: int) -> None:
+        """Print an event, with the time since the start; never waits."""
+        time_s = (event.time_ns - start_ns) * 1e-9
+        with contextlib.suppress(OSError):  # the fault is also the last word of the command
+            os.write(self._pipe, f"{time_s:8.1f} s {event_text(event)}\n".encode())
 
     def close(self) -> None:
         """Have the last line printed; idempotent."""
@@ -57,9 +51,3 @@ class FaultLines:
             except subprocess.TimeoutExpired:  # the terminal takes nothing
                 process.kill()
                 process.wait()
-
-
-def fault_line(node: ControllerNode) -> str:
-    """Time, mode, code, what happened and what to do, in one line."""
-    fault = node.fault
-    return f"{node.time_s:8.1f} s {node.mode.name}, fault {fault.value}, {fault_text(fault)}"

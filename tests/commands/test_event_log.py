@@ -1,0 +1,56 @@
+"""The log of a run: JSON lines with both clocks, in plain words."""
+
+import json
+import time
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
+from utank_hil.commands.event_log import EventLog
+from utank_hil.retuning import RetuningEvent
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.faults import FAULTS
+
+
+def test_events_are_lines_with_both_clocks_and_words(tmp_path: Path) -> None:
+    file = tmp_path / "log.jsonl"
+    log = EventLog(file)
+    start_ns = time.monotonic_ns() - 5_000_000_000
+    row = FAULTS[0]
+    log.write(
+        AlarmEvent(2_000_000_000, row.code, AlarmState.ACTIVE_ACKNOWLEDGED, Mode.FAULT), start_ns
+    )
+    log.write(AlarmEvent(3_000_000_000, row.code, None, Mode.FAULT), start_ns)
+    log.write(RetuningEvent(4_000_000_000, RetuningState.REFUSED, ("größer",)), start_ns)
+    lines = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+    log.close()
+    assert [line["event"] for line in lines] == ["alarm", "reset refused", "retuning"]
+    assert [line["time_s"] for line in lines] == [2.0, 3.0, 4.0]
+    assert [line["monotonic_ns"] - start_ns for line in lines] == [2e9, 3e9, 4e9]
+    for line in lines:
+        age = datetime.now(UTC) - datetime.fromisoformat(line["utc"])
+        assert abs(age - timedelta(seconds=5 - line["time_s"])) < timedelta(seconds=1)
+    assert lines[0]["state"] == "ACTIVE_ACKNOWLEDGED"
+    assert (lines[0]["fault"], lines[0]["code"], lines[0]["mode"]) == (
+        row.code.name, int(row.code), "FAULT",
+    )  # fmt: skip
+    assert (lines[0]["happened"], lines[0]["remedy"]) == (row.happened, row.remedy)
+    assert lines[2]["reasons"] == ["größer"]
+    assert lines[2]["state"] == "REFUSED"
+
+
+def test_a_code_without_a_row_is_logged_by_its_name(tmp_path: Path) -> None:
+    without = next(code for code in Fault if code not in {row.code for row in FAULTS})
+    log = EventLog(tmp_path / "log.jsonl")
+    log.write(AlarmEvent(0, without, AlarmState.NORMAL, Mode.STANDBY), 0)
+    log.close()
+    assert json.loads((tmp_path / "log.jsonl").read_text())["fault"] == without.name
+
+
+def test_a_full_disk_is_an_error_for_the_caller() -> None:
+    log = EventLog(Path("/dev/full"))
+    with pytest.raises(OSError, match="No space left"):
+        log.write(AlarmEvent(0, Fault.LEVEL_LIMIT, AlarmState.NORMAL, Mode.STANDBY), 0)
+    log.close()

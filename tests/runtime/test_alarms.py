@@ -1,0 +1,229 @@
+"""An alarm stays until it was accepted and its cause has gone; nothing silences it otherwise."""
+
+from collections.abc import Iterable
+
+import pytest
+from controller_bench import CATALOGUE, ControllerBench
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.canbus import Alarm, AlarmState, DriveFault, Fault, Frame, Mode, Switch
+from utank_hil.runtime.alarms import GONE_NS, AlarmEvent, AlarmList
+
+SECOND_NS = 1_000_000_000
+HIGH, SILENT = Fault.LEVEL_LIMIT, Fault.TANK_SILENT
+ACTIVE, ACCEPTED, RECTIFIED, NORMAL = AlarmState
+
+
+class Table:
+    """An alarm list that is looked at ten times a second."""
+
+    def __init__(self) -> None:
+        self.list = AlarmList()
+        self.now_ns = 0
+
+    def run(self, seconds: float, *active: Fault) -> None:
+        for _ in range(round(10 * seconds)):
+            self.list.update(active, Mode.STANDBY, self.now_ns)
+            self.now_ns += SECOND_NS // 10
+
+    def accept(self, code: Fault | None = None) -> None:
+        self.list.accept(code, Mode.STANDBY, self.now_ns)
+
+    @property
+    def states(self) -> list[AlarmState]:
+        return [event.state for event in self.list.take_events() if event.state is not None]
+
+    @property
+    def shown(self) -> list[tuple[Fault | None, AlarmState | None]]:
+        first = self.list.next_message(self.now_ns)
+        assert first.alarms is not None
+        rest = [self.list.next_message(self.now_ns) for _ in range(first.alarms - 1)]
+        messages = sorted([first, *rest], key=lambda message: message.place or 0)
+        assert [message.place for message in messages] == list(range(len(messages)))
+        return [(message.code, message.state) for message in messages]
+
+
+def test_accepted_first_it_goes_with_its_cause() -> None:
+    table = Table()
+    table.run(1, HIGH)
+    assert table.list.unaccepted
+    table.accept()
+    assert not table.list.unaccepted
+    assert table.shown == [(HIGH, ACCEPTED)]
+    table.run(5, HIGH)
+    table.run(9)
+    assert table.shown == [(HIGH, ACCEPTED)]
+    table.run(2)
+    assert table.shown == [(Fault.NONE, NORMAL)]
+    assert table.states == [ACTIVE, ACCEPTED, NORMAL]
+
+
+def test_gone_first_it_stays_until_it_is_accepted() -> None:
+    table = Table()
+    table.run(1, HIGH)
+    table.run(3600)
+    assert table.list.unaccepted
+    assert table.shown == [(HIGH, RECTIFIED)]
+    table.accept()
+    assert not table.list.unaccepted
+    assert table.states == [ACTIVE, RECTIFIED, NORMAL]
+
+
+def test_a_cause_that_comes_back_alarms_again() -> None:
+    table = Table()
+    for _ in range(3):
+        table.run(1, HIGH)
+        table.run(11)
+    message = table.list.next_message(table.now_ns)
+    assert (message.times_raised, message.state) == (3, RECTIFIED)
+    assert message.age_s == pytest.approx(12.0, abs=0.11)
+    table.accept()
+    table.run(1, HIGH)
+    assert table.list.unaccepted
+    assert table.list.next_message(table.now_ns).times_raised == 1
+
+
+def test_a_cause_that_comes_with_each_roll_alarms_once() -> None:
+    table = Table()
+    for _ in range(100):
+        table.run(1, HIGH)
+        table.run(8)
+    assert table.states == [ACTIVE]
+
+
+def test_a_second_fault_alarms_though_the_first_is_accepted_the_urgent_one_first() -> None:
+    table = Table()
+    table.run(1, SILENT)
+    table.accept()
+    table.run(1, SILENT, HIGH)
+    assert table.list.unaccepted
+    assert table.shown == [(HIGH, ACTIVE), (SILENT, ACCEPTED)]
+    table.accept(SILENT)
+    assert table.list.unaccepted
+    table.accept(HIGH)
+    assert not table.list.unaccepted
+
+
+steps = st.lists(
+    st.tuples(
+        st.sets(st.sampled_from([HIGH, SILENT, Fault.DRIVE_FAULT])),
+        st.sampled_from([None, HIGH, SILENT, Fault.NONE]) | st.just("no"),
+        st.integers(1, 150),
+    ),
+    max_size=20,
+)
+
+
+@given(steps)
+def test_no_alarm_leaves_the_list_unaccepted_or_with_its_cause(
+    history: list[tuple[set[Fault], Fault | str | None, int]],
+) -> None:
+    table = Table()
+    waiting: set[Fault | None] = set()
+    for active, accepted, ticks in history:
+        for _ in range(ticks):
+            table.run(0.1, *active)
+        shown = dict(table.shown)
+        for event in table.list.take_events():
+            if event.state is ACTIVE:
+                waiting.add(event.code)
+        assert active <= shown.keys()
+        assert waiting <= shown.keys()
+        assert table.list.unaccepted == bool(
+            {code for code, state in shown.items() if state in (ACTIVE, RECTIFIED)}
+        )
+        if accepted != "no":
+            assert accepted is None or isinstance(accepted, Fault)
+            table.accept(accepted)
+            waiting -= {accepted} if accepted is not None else waiting
+    table.run(GONE_NS / SECOND_NS + 1)
+    table.accept()
+    assert table.shown == [(Fault.NONE, NORMAL)]
+
+
+def alarms_in(frames: Iterable[Frame]) -> list[Alarm]:
+    receiver = CATALOGUE.receiver(Alarm)
+    heard = [receiver.accept(frame) for frame in frames if frame.can_id == receiver.can_id]
+    return [alarm for alarm in heard if alarm is not None]
+
+
+def codes(bench: ControllerBench) -> set[Fault | None]:
+    """Alarms that the node sends within half a second."""
+    before = len(bench.sent)
+    bench.run(500)
+    return {alarm.code for alarm in alarms_in(bench.sent[before:])}
+
+
+def test_a_quiet_start_alarms_of_nothing_and_a_long_wait_of_what_is_missing() -> None:
+    bench = ControllerBench()
+    bench.run(2000)
+    assert codes(bench) == {Fault.NONE}
+    bench = ControllerBench()
+    bench.silent.add(type(bench.tank))
+    bench.run(9000)
+    assert codes(bench) == {Fault.NONE}
+    bench.run(1000)
+    assert codes(bench) == {Fault.TANK_SILENT}
+
+
+def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted() -> None:
+    bench = ControllerBench()
+    bench.drive_at(20e3)
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(300)
+    assert bench.node.fault is HIGH
+    bench.tank = bench.tank._replace(port_high=Switch.OFF)
+    bench.order_is(arm=False, mode_request=Mode.STANDBY, reset=True)
+    bench.run(11_000)
+    assert bench.node.mode is Mode.STANDBY
+    assert bench.status is not None
+    assert bench.status.alarm
+    assert codes(bench) == {HIGH}
+    bench.order_is(acknowledge=True, acknowledge_code=SILENT)
+    bench.run(200)
+    assert codes(bench) == {HIGH}
+    bench.order_is(acknowledge=False)
+    bench.order_is(acknowledge=True, acknowledge_code=HIGH)
+    bench.run(200)
+    assert not bench.status.alarm
+    assert codes(bench) == {Fault.NONE}
+
+
+def test_second_fault_while_the_first_is_latched_alarms_again() -> None:
+    bench = ControllerBench()
+    bench.drive_at(20e3)
+    bench.drive_fault = DriveFault.STALL
+    bench.run(300)
+    bench.order_is(acknowledge=True)
+    bench.run(300)
+    assert bench.status is not None
+    assert not bench.status.alarm
+    bench.tank = bench.tank._replace(starboard_high=None)
+    bench.run(200)
+    assert bench.node.fault is Fault.DRIVE_FAULT
+    assert bench.status.alarm
+    assert codes(bench) == {Fault.DRIVE_FAULT, HIGH}
+
+
+def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
+    told: list[AlarmEvent] = []
+    bench = ControllerBench()
+    bench.node._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(400)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(400)
+    assert [(event.code, event.state) for event in told] == [(HIGH, ACTIVE)]
+    bench = ControllerBench()
+    told.clear()
+    bench.drive_at(20e3)
+    bench.node._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
+    bench.drive_fault = DriveFault.STALL
+    bench.run(300)
+    bench.order_is(reset=True)
+    bench.run(1000)
+    assert [(event.code, event.state, event.mode) for event in told] == [
+        (Fault.DRIVE_FAULT, ACTIVE, Mode.FAULT),
+        (Fault.DRIVE_FAULT, None, Mode.FAULT),
+    ]

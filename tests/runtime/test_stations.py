@@ -1,0 +1,132 @@
+"""One station is in command at a time; every one can stop."""
+
+import pytest
+from controller_bench import CATALOGUE, ControllerBench
+
+from utank_hil.canbus import Address, Heartbeat, Mode, OperatorCommand, Station
+
+IDLE = OperatorCommand(Mode.STANDBY, False, False, False, False)
+
+
+class Bench(ControllerBench):
+    """A controller with a second panel."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.second: OperatorCommand | None = None
+        self._second = CATALOGUE.transmitter(OperatorCommand, Address.OPERATOR_2)
+        self._second_beats = CATALOGUE.transmitter(Heartbeat, Address.OPERATOR_2)
+
+    def tick(self, late_ticks: int = 0) -> None:
+        if self._tick_index % 20 == 0 and self.second is not None:
+            self.second_is()
+            nan = float("nan")
+            beat = Heartbeat(None, None, 0.0, *self.versions, nan, nan)
+            self.send(self._second_beats.frame(beat))
+        super().tick(late_ticks)
+
+    def second_is(self, **changes: object) -> None:
+        self.second = (self.second or IDLE)._replace(**changes)  # type: ignore[arg-type]
+        self.send(self._second.frame(self.second))
+
+    @property
+    def station(self) -> Station | None:
+        self.run(100)
+        assert self.status is not None
+        return self.status.station
+
+
+def active_bench() -> Bench:
+    bench = Bench()
+    bench.second = IDLE
+    bench.drive_at(20e3)
+    assert bench.station is Station.OPERATOR
+    return bench
+
+
+def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets() -> None:
+    bench = active_bench()
+    bench.run(2000)  # its arm bit is not set all the time
+    assert bench.node.mode is Mode.ACTIVE
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(arm=True, mode_request=Mode.ACTIVE, reset=True, retune=True)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    assert not bench.node.inbox.stations.take_retuning().retune
+
+
+@pytest.mark.parametrize("taken", [False, True])
+def test_stop_counts_from_any_station(taken: bool) -> None:
+    for first in (False, True):
+        bench = active_bench()
+        if taken:
+            bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True)
+            bench.run(300)
+            assert bench.node.mode is Mode.ACTIVE
+        (bench.order_is if first else bench.second_is)(stop=True)
+        bench.tick()
+        bench.tick()
+        assert bench.pressure_pa == 0.0
+        assert bench.node.mode is Mode.STANDBY
+
+
+def test_command_is_taken_without_a_bump_and_given_back() -> None:
+    bench = active_bench()
+    bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True)
+    assert bench.station is Station.OPERATOR_2
+    bench.run(500)
+    assert (bench.node.mode, bench.pressure_pa) == (Mode.ACTIVE, 20e3)
+    bench.order_is(arm=False, mode_request=Mode.STANDBY)  # has no say any more
+    bench.run(500)
+    assert bench.node.mode is Mode.ACTIVE
+    bench.silent.add(OperatorCommand)  # nor is it missed
+    bench.run(6000)
+    assert bench.node.mode is Mode.ACTIVE
+    bench.second_is(arm=False, mode_request=Mode.PASSIVE)
+    bench.run(500)
+    assert bench.node.mode is Mode.PASSIVE
+    bench.silent.clear()
+    bench.run(1000)
+    bench.order_is(take_command=True)
+    assert bench.station is Station.OPERATOR
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(500)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True, retune=True)
+    bench.run(1000)
+    assert bench.station is Station.OPERATOR_2
+    assert bench.node.mode is Mode.STANDBY
+    assert not bench.node.inbox.stations.take_retuning().retune
+
+
+def test_a_station_that_takes_the_command_without_the_arm_bit_disarms() -> None:
+    bench = active_bench()
+    bench.second_is(take_command=True)
+    bench.run(100)
+    assert bench.node.mode is Mode.PASSIVE
+
+
+def test_a_take_that_was_held_since_before_its_first_frame_is_none() -> None:
+    bench = Bench()
+    bench.second = IDLE._replace(take_command=True)
+    bench.run(400)
+    assert bench.station is Station.OPERATOR
+
+
+def test_alarms_are_accepted_at_any_station() -> None:
+    bench = active_bench()
+    bench.silent.add(type(bench.motion))
+    bench.run(500)
+    assert bench.status is not None
+    assert bench.status.alarm
+    bench.second_is(acknowledge=True)
+    bench.run(200)
+    assert not bench.status.alarm

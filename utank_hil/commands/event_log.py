@@ -1,0 +1,69 @@
+"""The log of a run: one JSON object a line for each event, with monotonic time and UTC."""
+
+import json
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.faults import FAULTS
+from utank_hil.telemetry.event_ring import Event
+
+NAME: Final = "log-{}.jsonl"
+
+_WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
+
+
+class EventLog:
+    """Appends events to a file, each one at once.
+
+    Parameters
+    ----------
+    file : Path
+
+    Raises
+    ------
+    OSError
+        If the file can't be opened.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file.open("ab", buffering=0)  # what does not fit now is not tried again
+
+    def write(self, event: Event, start_ns: int) -> None:
+        """Append an event whose `time_ns` counts from `start_ns` on this machine's monotonic clock.
+
+        Raises
+        ------
+        OSError
+            If there is no room.
+        """
+        monotonic_ns = start_ns + event.time_ns
+        utc_ns = time.time_ns() - time.monotonic_ns() + monotonic_ns
+        line = {
+            "utc": datetime.fromtimestamp(utc_ns * 1e-9, UTC).isoformat(timespec="milliseconds"),
+            "monotonic_ns": monotonic_ns,
+            "time_s": event.time_ns * 1e-9,
+            **_content(event),
+        }
+        self._file.write((json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace"))
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        self._file.close()
+
+
+def _content(event: Event) -> dict[str, Any]:
+    if not isinstance(event, AlarmEvent):
+        return {"event": "retuning", **{k: v for k, v in event.as_json().items() if k != "time_s"}}
+    happened, remedy = _WORDS.get(event.code, ("", ""))
+    return {
+        "event": "reset refused" if event.state is None else "alarm",
+        "state": None if event.state is None else event.state.name,
+        "code": int(event.code),
+        "fault": event.code.name,
+        "mode": event.mode.name,
+        "happened": happened,
+        "remedy": remedy,
+    }
