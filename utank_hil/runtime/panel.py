@@ -5,21 +5,26 @@ from dataclasses import dataclass
 from enum import Enum
 
 from utank_hil.canbus import (
-    Address,
+    Alarm,
     Catalogue,
     ControllerStatus,
+    Fault,
     Frame,
     Mode,
     OperatorCommand,
+    Station,
 )
 from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.runtime.stations import ADDRESSES
 from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
 """How long an edge-triggered button stays pressed: longer than two lost messages."""
 _UNDER_POWER = (Mode.ACTIVE, Mode.PASSIVE, None)
 """Modes that a stop has not ended yet."""
+_SPARE_ALARMS = 5
+"""Frames of ALARM that may be missing before one that is not repeated counts as over."""
 
 
 class Action(Enum):
@@ -31,13 +36,15 @@ class Action(Enum):
     DISARM = "disarm"
     STOP = "stop"
     RESET = "reset"
+    ACCEPT = "accept"
+    TAKE = "take"
     RETUNE = "retune"
     UNDO = "undo"
     FORBID = "forbid"
     PERMIT = "permit"
 
 
-_EDGES = (Action.RESET, Action.RETUNE, Action.UNDO)
+_EDGES = (Action.RESET, Action.ACCEPT, Action.TAKE, Action.RETUNE, Action.UNDO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,8 @@ class OperatorPanel:
         Sent in the heartbeat.
     script : iterable of TimedAction
         Scheduled button presses, for benches.
+    station : Station
+        Which of the two stations it is.
 
     Attributes
     ----------
@@ -80,6 +89,8 @@ class OperatorPanel:
         Latest status of the controller.
     stopping : bool
         Whether stop is held.
+    heard_ns : int or None
+        When that status came.
     """
 
     name = "panel"
@@ -91,12 +102,17 @@ class OperatorPanel:
         *,
         configuration_version: int,
         script: Iterable[TimedAction] = (),
+        station: Station = Station.OPERATOR,
     ) -> None:
-        self._sender = catalogue.transmitter(OperatorCommand)
+        address = ADDRESSES[station]
+        self.station = station
+        self._sender = catalogue.transmitter(OperatorCommand, address)
         self._cycle_ticks = self._sender.cycle_ns // self.period_ns
         self._listener = catalogue.receiver(ControllerStatus)
-        self.hears = frozenset([self._listener.can_id])
-        self._housekeeping = Housekeeping(Address.OPERATOR, catalogue, configuration_version)
+        self._alarm_listener = catalogue.receiver(Alarm)
+        self.hears = frozenset([self._listener.can_id, self._alarm_listener.can_id])
+        self._housekeeping = Housekeeping(address, catalogue, configuration_version)
+        self._alarms: dict[Fault, tuple[Alarm, int]] = {}
         # the next one last; of several at a time, the first given comes first
         self._script = sorted(script, key=lambda timed: timed.time_s)[::-1]
         self._start_ns: int | None = None
@@ -110,19 +126,42 @@ class OperatorPanel:
         self._sent: OperatorCommand | None = None
         self._ticks = 0
         self.status: ControllerStatus | None = None
+        self.heard_ns: int | None = None
+
+    @property
+    def in_command(self) -> bool:
+        """Whether the controller says that this station has the command."""
+        return self.status is not None and self.status.station is self.station
+
+    @property
+    def busy(self) -> bool:
+        """Whether a press has not been sent yet, or a stop not been answered."""
+        return bool(self._pressed) or self.stopping
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """The controller's alarms, the most urgent first."""
+        return tuple(
+            sorted((alarm for alarm, _ in self._alarms.values()), key=lambda each: each.place or 0)
+        )
 
     def press(self, action: Action) -> None:
         """Press a button; it takes effect with the next tick."""
         self._pressed.append(action)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take the controller's status."""
+        """Take the controller's status and alarms."""
+        if frame.can_id == self._alarm_listener.can_id:
+            alarm = self._alarm_listener.accept(frame)
+            if alarm is not None and alarm.code is not None:
+                self._note_alarm(alarm, alarm.code, now_ns)
+            return
         if frame.can_id != self._listener.can_id:
             return
         status = self._listener.accept(frame)
         if status is None:
             return
-        self.status = status
+        self.status, self.heard_ns = status, now_ns
         # an earlier one may have been on its way when stop was pressed
         if now_ns - self._stopped_ns >= EDGE_NS and status.mode not in _UNDER_POWER:
             self.stopping = False
@@ -142,10 +181,11 @@ class OperatorPanel:
             arm=self._armed,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
-            acknowledge=False,
+            acknowledge=now_ns < self._pressed_until_ns[Action.ACCEPT],
             retune=now_ns < self._pressed_until_ns[Action.RETUNE],
             undo=now_ns < self._pressed_until_ns[Action.UNDO],
             forbid_retuning=self._forbidden,
+            take_command=now_ns < self._pressed_until_ns[Action.TAKE],
         )
         frames = []
         if command != self._sent or self._ticks % self._cycle_ticks == 0:
@@ -155,6 +195,16 @@ class OperatorPanel:
         self._ticks += 1
         return frames
 
+    def _note_alarm(self, alarm: Alarm, code: Fault, now_ns: int) -> None:
+        """Keep an alarm, and forget those that the controller no longer repeats."""
+        alarms = alarm.alarms or 0
+        if alarms:
+            self._alarms[code] = (alarm, now_ns)
+        oldest_ns = now_ns - (alarms + _SPARE_ALARMS) * self._alarm_listener.cycle_ns
+        self._alarms = {
+            code: kept for code, kept in self._alarms.items() if alarms and kept[1] >= oldest_ns
+        }
+
     def _controller_is_ready(self) -> bool:
         return self.status is not None and self.status.mode not in (None, Mode.INIT)
 
@@ -163,6 +213,8 @@ class OperatorPanel:
             self._pressed_until_ns[action] = now_ns + EDGE_NS
         if action is Action.STOP:
             self.stopping, self._stopped_ns = True, now_ns
+        if action is Action.TAKE:
+            self._adopt()
         if action is Action.ARM:
             if not self.stopping:
                 self._mode, self._armed = Mode.ACTIVE, True
@@ -172,3 +224,13 @@ class OperatorPanel:
             self._mode, self._armed = Mode.PASSIVE, False
         elif action in (Action.STANDBY, Action.STOP):
             self._mode, self._armed = Mode.STANDBY, False
+
+    def _adopt(self) -> None:
+        """Take over what the controller does: who takes the command is not to change it."""
+        status = self.status
+        self._armed = status is not None and status.mode is Mode.ACTIVE and not self.stopping
+        if self._armed:
+            self._mode = Mode.ACTIVE
+        else:
+            passive = status is not None and status.mode is Mode.PASSIVE
+            self._mode = Mode.PASSIVE if passive else Mode.STANDBY

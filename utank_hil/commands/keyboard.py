@@ -1,0 +1,146 @@
+"""The keyboard of ``utank-hil panel``: words to actions, and what the controller says in words."""
+
+import os
+import select
+from collections.abc import Callable
+from typing import Final
+
+from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Station
+from utank_hil.runtime.faults import fault_text
+from utank_hil.runtime.panel import Action, OperatorPanel
+
+SILENT_NS: Final = 1_000_000_000
+"""So long without a status the controller is called silent."""
+LEAVE_NS: Final = 3_000_000_000
+"""So long a panel that is left waits for the answer to a stop."""
+HELP: Final = """\
+  arm, disarm          take charge; ramp to zero, pump enabled and passive
+  stop                 zero at once; on a terminal Enter alone does it
+  standby, passive     pump off; pump enabled at zero pressure
+  accept, reset        accept the alarms; leave FAULT when its cause is gone
+  take                 take the command from the other station
+  retune, undo         identify the ship and design anew; back to the law before
+  forbid, permit       no retuning; retuning again
+  help, quit           Words may be cut short: d for disarm."""
+
+_READ_BYTES: Final = 4096
+_WORDS: Final = (*(action.value for action in Action), "help", "quit")
+_UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
+
+
+class Keyboard:
+    """Reads words from a terminal or a pipe between two ticks, and shows what has changed.
+
+    Parameters
+    ----------
+    node : OperatorPanel
+    descriptor : int
+        To read from. A pipe that is closed only ends the typing.
+    say : callable
+        Shows a line.
+    terminal : bool
+        Whether somebody sits there: then Enter alone stops, and a new alarm rings.
+    """
+
+    def __init__(
+        self, node: OperatorPanel, descriptor: int, say: Callable[[str], None], *, terminal: bool
+    ) -> None:
+        self._node = node
+        self._descriptor = descriptor
+        self._say = say
+        self._terminal = terminal
+        self._open = True
+        self._typed = b""
+        self._shown = ""
+        self._leave_ns: int | None = None
+        self._alarms: dict[Fault | None, AlarmState | None] = {}
+
+    def look(self, now_ns: int) -> bool:
+        """Obey every line that has come and show what is new; whether to leave."""
+        for line in self._lines():
+            if self._obey(line) and self._leave_ns is None:
+                self._leave_ns = now_ns + LEAVE_NS
+        self._show(now_ns)
+        # what was pressed last is to be heard: a stop until it is answered
+        return self._leave_ns is not None and (not self._node.busy or now_ns >= self._leave_ns)
+
+    def _lines(self) -> list[str]:
+        """Whole lines that have come; what comes with the end of a pipe is one, too.
+
+        Python's own buffer would keep a line back until there is something to read again.
+        """
+        while self._open and select.select([self._descriptor], [], [], 0)[0]:
+            data = os.read(self._descriptor, _READ_BYTES)
+            self._open = bool(data)
+            self._typed += data
+        *lines, begun = self._typed.split(b"\n")
+        self._typed = begun if self._open else b""
+        if begun and not self._open:
+            lines.append(begun)
+        return [line.decode(errors="replace").strip().lower() for line in lines]
+
+    def _obey(self, word: str) -> bool:
+        """Do what a line says; whether that is to leave."""
+        if not word:
+            if self._terminal:
+                self._press(Action.STOP)
+            return False
+        found = [word] if word in _WORDS else [each for each in _WORDS if each.startswith(word)]
+        if len(found) != 1:
+            self._say(f"{word!r} is {' or '.join(found) or 'no action; help lists them'}")
+        elif found[0] == "help":
+            self._say(HELP)
+        elif found[0] == "quit":
+            return True
+        else:
+            self._press(Action(found[0]))
+        return False
+
+    def _press(self, action: Action) -> None:
+        node = self._node
+        if action is Action.ARM and node.stopping:
+            self._say("not armed: the controller has not answered the stop yet")
+        elif action not in (Action.STOP, Action.ACCEPT, Action.TAKE) and self._elsewhere:
+            self._say("the other station has the command: take")
+        else:
+            node.press(action)
+            self._say(action.value)
+
+    @property
+    def _elsewhere(self) -> bool:
+        status = self._node.status
+        return status is not None and status.station not in (None, self._node.station)
+
+    def _show(self, now_ns: int) -> None:
+        node = self._node
+        heard_ns = node.heard_ns
+        if node.status is not None and heard_ns is not None:
+            silent = now_ns - heard_ns > SILENT_NS
+            said = "controller: SILENT" if silent else _status_text(node.status, node.station)
+            if said != self._shown:
+                self._say(said)
+                self._shown = said
+        alarms = {alarm.code: alarm.state for alarm in node.alarms}
+        for code, state in alarms.items():
+            if code is not None and state in _UNACCEPTED and self._alarms.get(code) is not state:
+                there = state is AlarmState.ACTIVE_UNACKNOWLEDGED
+                bell = "\a" if self._terminal and there else ""
+                what = "ALARM" if there else "alarm, its cause gone,"
+                self._say(f"{bell}{what} {fault_text(code)} accept?")
+        for code in self._alarms.keys() - alarms.keys():
+            if code is not None:
+                self._say(f"alarm over: {code.name}")
+        self._alarms = alarms
+
+
+def _status_text(status: ControllerStatus, own: Station) -> str:
+    parts = [f"controller: {'unknown mode' if status.mode is None else status.mode.name}"]
+    if status.fault:
+        parts.append(fault_text(status.fault))
+    if status.degraded:
+        parts.append("degraded")
+    if status.retuning is not None:
+        parts.append(f"retuning {status.retuning.name}")
+    if status.station not in (None, own):
+        parts.append("the other station has the command")
+    return ", ".join(parts)
