@@ -9,8 +9,8 @@ import rerun as rr
 
 from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
-from utank_hil.retuning.adaptive import RetuningEvent
 from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, time_index, write_about
 from utank_hil.telemetry.rotation import Rotation, remove_oldest
 from utank_hil.telemetry.viewer import LOOPBACK
@@ -88,8 +88,8 @@ class RecordingParts(Closing):
         for log in self._logs():
             log.write(rows)
 
-    def write_events(self, events: Sequence[RetuningEvent]) -> None:
-        """Log events of retuning."""
+    def write_events(self, events: Sequence[Event]) -> None:
+        """Log events of retuning and alarms."""
         for log in self._logs():
             log.write_events(events)
 
