@@ -238,7 +238,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
             assert watcher.drive.state is DriveState.FAULT
             report, notes = controller.end(ExitCode.BUS_LOST)
             ship.end()
-            assert f"FAULT, fault {Fault.BUS_LOST.value}, {fault_text(Fault.BUS_LOST)}" in notes
+            assert f"ALARM in FAULT: {fault_text(Fault.BUS_LOST)}" in notes
     finally:
         set_link(up=True)
         watcher.close()
