@@ -83,6 +83,12 @@ PARTS = (
         3,
     ),
     Part(
+        "monitor_margins",
+        "python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --hours 50 --json",
+        "how near the monitors come to a false alarm",
+        900,
+    ),
+    Part(
         "identification_bound",
         "python -m tools.studies.identification_bound --json",
         "identification in a storm against the Cramer-Rao bound",
