@@ -68,10 +68,10 @@ def run(
 
     It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
     (UTC) of their start and go on in another file every hour; one that fails is reported, and the
-    controller runs without. A
-    controller that retunes itself prints each step with its reasons when it happens; so does one
-    that raises an alarm, and both are logged in the folder of --out. A fault that is latched at the
-    end, or a lost bus, has an exit code of its own (docs/exit-codes.md).
+    controller runs without. A controller that retunes itself prints each step with its reasons when
+    it happens; so does one that raises an alarm, and both are logged in the folder of --out. A
+    fault that is latched at the end, or a lost bus, has an exit code of its own
+    (docs/exit-codes.md).
 
     [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
