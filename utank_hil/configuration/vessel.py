@@ -42,7 +42,6 @@ class Vessel(Section):
     def version(self) -> int:
         """Hash of everything but the name, for the nodes to compare before arming."""
         parts = (self.ship, self.tank, self.pump)
-        parts = (self.ship, self.tank, self.pump)
         content = [None if part is None else _not_by_default(part) for part in parts]
         if self.valve is not None:
             content.append(_not_by_default(self.valve))
