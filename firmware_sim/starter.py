@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import yaml
+from pydantic import BaseModel, ValidationError
 
 from firmware_sim import starter_text
 from firmware_sim.pooled_waves import pooled_wave_moment
@@ -30,6 +31,9 @@ from utank_hil.analysis.tank_sizing import (
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import ParameterError, Problem
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
 
 SHIP, CONTROLLER, SCENARIO, README = "ship.yaml", "controller.yaml", "scenario.yaml", "README.md"
 FILES: Final = (SHIP, CONTROLLER, SCENARIO, README)
@@ -136,21 +140,38 @@ def make_starter(
     pump = size_pump(sized.tank, demand)
     texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}
     # from here on with the numbers as they stand in the files
-    vessel = Vessel.model_validate(yaml.safe_load(texts[SHIP]))
+    vessel = _valid(Vessel, yaml.safe_load(texts[SHIP]))
     content: dict[str, Any] = {"name": ship.name, "vessel": vessel, "law": {"kind": "passive"}}
     usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
     limits = {}
     if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
         limits["level_m"] = usable_m
-    config = ControllerConfig.model_validate(content | {"limits": limits})
+    config = _valid(ControllerConfig, content | {"limits": limits})
     sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s)
     texts[SCENARIO] = starter_text.scenario_file(ship.name, sea)
-    scenario = Scenario.model_validate(
-        yaml.safe_load(texts[SCENARIO]) | {"vessel": vessel, "controllers": {"lqg": config}}
-    )
+    parts = {"vessel": vessel, "controllers": {"lqg": config}}
+    scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
     state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     law = first_law(config.plant, state.slope_rad, state.peak_rad_s)
     texts[CONTROLLER] = starter_text.controller_file(ship.name, law, limits)
     texts[README] = starter_text.readme(ship.name)
     prediction = predict_roll(config.plant, state)
     return StarterProject(vessel, sized, demand, law, prediction, sea, texts)
+
+
+def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
+    """A part of the project; what can't be is told at its key, as ``ship.gm_m``."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        problems: list[Problem] = []
+        for item in error.errors():
+            section = [str(part) for part in item["loc"][:1]]
+            cause = item.get("ctx", {}).get("error")
+            if isinstance(cause, ParameterError):
+                found = cause.problems
+            else:
+                reason = str(item["msg"]).removeprefix("Value error, ")
+                found = [(str(item["loc"][-1]), reason)]
+            problems += [(".".join((*section, name)), reason) for name, reason in found]
+        raise ParameterError("starter", problems) from error

@@ -1,10 +1,14 @@
 """The ship of a starter project."""
 
+import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 from utank_hil.configuration.ship_keys import weather_criterion_period_s
-from utank_hil.parameters import Positive, Range, range_problems, refuse
+from utank_hil.dynamics.tank import GRAVITY_M_S2
+from utank_hil.parameters import Positive, Problem, Range, range_problems, refuse
+
+_GYRATION_PER_BEAM: Final = (0.1, 1.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +29,8 @@ class StarterShip:
     Raises
     ------
     ValueError
-        If a value is out of its range, or neither period nor draught is given.
+        If a value is out of its range, neither period nor draught is given, or GM and period are
+        not of one ship.
     """
 
     name: str
@@ -35,14 +40,27 @@ class StarterShip:
     gm_m: Positive
     roll_period_s: Positive | None = None
     draught_m: Positive | None = None
-    roll_damping_ratio: Annotated[float, Range(above=0, below=1)] = 0.05
+    roll_damping_ratio: Annotated[float, Range(above=0, most=0.3)] = 0.05
 
     def __post_init__(self) -> None:
         problems = range_problems(self)
         if self.roll_period_s is None and self.draught_m is None:
             reason = "is needed, or else the draught for the weather criterion's period"
             problems.append(("roll_period_s", reason))
-        refuse("ship", problems)
+        refuse("ship", problems or self._shape_problems())
+
+    def _shape_problems(self) -> list[Problem]:
+        """A period and a GM that no ship of that beam has together."""
+        gyration_m = self.period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * self.gm_m)
+        least, most = _GYRATION_PER_BEAM
+        if least <= gyration_m / self.beam_m <= most:
+            return []
+        reason = (
+            f"gives a radius of gyration of {gyration_m:.3g} m at a roll period of "
+            f"{self.period_s:.3g} s; it is about 0.4 of the beam, {0.4 * self.beam_m:.3g} m: GM is "
+            "in metres, the period in seconds"
+        )
+        return [("gm_m", reason)]
 
     @property
     def period_s(self) -> float:

@@ -27,6 +27,11 @@ _OPTIONS = {
     "stability_share": "gm-loss",
     "roll_damping_ratio": "roll-damping",
     "damping_ratio": "roll-damping",
+    "ship.damping_ratio": "roll-damping",
+    "tank.width_m": "tank-breadth",
+    "tank.height_m": "tank-height",
+    "tank.lz_m": "duct-below-cg",
+    "duct_below_cg_m": "duct-below-cg",
 }
 """Options that are not named as the parameters they set."""
 _UNITS = ("_m", "_t", "_s")
@@ -152,14 +157,19 @@ def init(
 def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
     """Name the options that are wrong, and end with exit code 2."""
     for name, reason in error.problems:
-        option = _OPTIONS.get(name, name)
-        for unit in _UNITS:
-            option = option.removesuffix(unit)
-        option = option.replace("_", "-")
-        if option != "duct-below-cg":
-            option = prefix + option
-        notes.print("[red]error:[/red]", escape(f"--{option}: {reason}"), soft_wrap=True)
+        place = f"--{_OPTIONS[name]}" if name in _OPTIONS else _place(name, prefix)
+        notes.print("[red]error:[/red]", escape(f"{place}: {reason}"), soft_wrap=True)
     raise typer.Exit(ExitCode.USAGE)
+
+
+def _place(name: str, prefix: str) -> str:
+    """The option that sets a parameter; the parameter where none does."""
+    section, _, option = name.rpartition(".")
+    if section not in ("", "ship", "sea"):
+        return name
+    for unit in _UNITS:
+        option = option.removesuffix(unit)
+    return f"--{prefix}{option.replace('_', '-')}"
 
 
 def _as_json(project: "StarterProject") -> dict[str, Any]:

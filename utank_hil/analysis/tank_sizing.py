@@ -19,6 +19,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
+import numpy as np
+
 from utank_hil.analysis.tank_design import best_passive_tank
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.pump import Pump
@@ -260,7 +262,14 @@ def _in_room(
         headroom_m=height_m,
     )
     if tuned:
-        tank = best_passive_tank(ship, tank)
+        try:
+            with np.errstate(all="ignore"):  # an optimum that runs away ends in the error below
+                tank = best_passive_tank(ship, tank)
+        except ValueError as error:
+            raise TankImpossibleError(
+                f"no water in this room can be tuned to a roll period of "
+                f"{2 * math.pi / ship.natural_frequency_rad_s:.3g} s: {error}"
+            ) from error
     length_m = area_m2 / breadth_m
     return SizedTank(tank, length_m, breadth_m, tank.duct_area_m2 / length_m, "")
 
