@@ -75,6 +75,9 @@ def table() -> Iterator[Table]:
 
 
 def test_lines_that_come_together_are_all_obeyed_at_once(table: Table) -> None:
+    table.hear(Mode.STANDBY)
+    table.look()
+    table.said.clear()
     table.type("arm\npassive\nforbid\nstop\n")
     table.look()
     assert table.order.stop
@@ -192,7 +195,20 @@ def test_an_alarm_that_is_not_repeated_is_over(table: Table) -> None:
     assert [alarm.code for alarm in table.node.alarms] == [Fault.TANK_SILENT]
 
 
+def test_arm_is_refused_in_words_while_no_controller_is_heard(table: Table) -> None:
+    table.type("arm\n")
+    table.look()
+    table.hear(Mode.STANDBY)
+    table.look()
+    assert not table.order.arm
+    assert "no controller" in table.said[0]
+    table.type("arm\n")
+    table.look()
+    assert table.order.arm
+
+
 def test_arm_is_refused_in_words_while_a_stop_is_not_answered(table: Table) -> None:
+    table.hear(Mode.ACTIVE)
     table.type("stop\n")
     table.look()
     table.type("arm\n")
@@ -206,7 +222,7 @@ def test_a_station_without_the_command_may_stop_and_accept_and_nothing_else() ->
     table.type("arm\n")
     table.look()
     assert not table.order.arm
-    assert "take" in table.said[0]
+    assert "take" in table.said[-1]
     table.type("accept\nstop\n")
     table.look()
     assert table.order.stop

@@ -52,15 +52,17 @@ class Keyboard:
         self._open = True
         self._typed = b""
         self._shown = ""
+        self._silent = True
         self._leave_ns: int | None = None
         self._alarms: dict[Fault | None, AlarmState | None] = {}
 
     def look(self, now_ns: int) -> bool:
         """Obey every line that has come and show what is new; whether to leave."""
-        for line in self._lines():
+        lines = self._lines()
+        self._show(now_ns)
+        for line in lines:
             if self._obey(line) and self._leave_ns is None:
                 self._leave_ns = now_ns + LEAVE_NS
-        self._show(now_ns)
         # what was pressed last is to be heard: a stop until it is answered
         return self._leave_ns is not None and (not self._node.busy or now_ns >= self._leave_ns)
 
@@ -98,7 +100,9 @@ class Keyboard:
 
     def _press(self, action: Action) -> None:
         node = self._node
-        if action is Action.ARM and node.stopping:
+        if action is Action.ARM and self._silent:
+            self._say("not armed: no controller is heard")
+        elif action is Action.ARM and node.stopping:
             self._say("not armed: the controller has not answered the stop yet")
         elif action not in (Action.STOP, Action.ACCEPT, Action.TAKE) and self._elsewhere:
             self._say("the other station has the command: take")
@@ -114,9 +118,10 @@ class Keyboard:
     def _show(self, now_ns: int) -> None:
         node = self._node
         heard_ns = node.heard_ns
-        if node.status is not None and heard_ns is not None:
-            silent = now_ns - heard_ns > SILENT_NS
-            said = "controller: SILENT" if silent else _status_text(node.status, node.station)
+        self._silent = heard_ns is None or now_ns - heard_ns > SILENT_NS
+        if node.status is not None:
+            text = _status_text(node.status, node.station)
+            said = "controller: SILENT" if self._silent else text
             if said != self._shown:
                 self._say(said)
                 self._shown = said
