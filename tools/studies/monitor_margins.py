@@ -41,7 +41,7 @@ def shares(monitors: Monitors) -> dict[str, float]:
     judged = twin.ship_rms_rad > limits.amplified_roll_rad and twin.rms_rad > 0
     return {
         "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
-        "roll noise": monitors.roll_noise.share,
+        "roll noise": monitors.motion.noise.share,
         "rate noise": monitors.rate_noise.share,
         "volume": abs(monitors.volume.sum_m) / limits.volume_m,
         "roll sign": (1 - equation.roll_gain) / (1 - SIGN_GAIN),

@@ -35,9 +35,6 @@ SILENT_S: Final = 1.0
 LATE_ROUND: Final = 1.2
 """So many rounds after the last one, ticks were left out: as a gap."""
 
-NOISE_LASTS_S: Final = 2.0
-
-_DRIFT: Final = int(Finding.DRIFT)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
@@ -63,7 +60,7 @@ class Monitors:
     thresholds : MonitorThresholds
     twin : PassiveTwin
     motion : RollAgainstRate
-    roll_noise, rate_noise : Noise
+    rate_noise : Noise
     drive : DriveFollowing
     equation : TankEquation
     volume : Volume
@@ -86,7 +83,6 @@ class Monitors:
         self.gates = SpikeGates(thresholds)
         self._spikes = SpikeCount()
         self.motion = RollAgainstRate(thresholds)
-        self.roll_noise = Noise(math.sqrt(2) * thresholds.roll_noise_rad)
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
         self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
@@ -102,7 +98,6 @@ class Monitors:
         self._senders = Senders((), self._frames_per_s)
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
-        self._noisy_s = 0.0
         self._turned_rad = self._last_rate_rad_s = 0.0
         self._of_motion = self._of_drive = self._of_water = self._of_volume = 0
         self._of_senders = self._of_twin = self._of_saturation = 0
@@ -207,15 +202,9 @@ class Monitors:
             self._of_motion = 0
             return
         found = self.motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
-        noisy = self.roll_noise.update(self.motion.residual_rad, elapsed_s)
-        noisy |= self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s)
-        if not noisy:
-            self._noisy_s = 0.0
-            self._of_motion = found
-            return
-        # a flip looks like noise at first, and lasting noise like a flip now and then
-        self._noisy_s += elapsed_s
-        self._of_motion = _NOISE | (found & _DRIFT if self._noisy_s > NOISE_LASTS_S else found)
+        if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
+            found |= _NOISE
+        self._of_motion = found
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excited: bool) -> None:
         twin = self.twin

@@ -5,14 +5,15 @@ m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it
 constant bias is learned over five minutes and taken off.
 
 The sum tells *that* the two disagree. What disagrees is told by the sums over the time in which one
-of them has not moved, and by
-the sign of sum(m t) / sum(t t) over half a second, which is 1 in health and -1 with one sign wrong.
+of them has not moved, and by the sign of sum(m t) / sum(t t) over the last second, which is 1 in
+health and -1 with one sign wrong.
 """
 
 import math
 from typing import Final
 
 from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.noise import Noise, SecondDifference
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 LEAK_S: Final = 15.0
@@ -20,9 +21,13 @@ BIAS_S: Final = 300.0
 FIRST_BIAS_S: Final = 30.0
 """The bias is zero at the start as if it had been learned for so long."""
 SMOOTH_S: Final = 0.25
+LONG_STEP_S: Final = 0.2
+"""Steps of the sign's sums: in a longer one a sensor's noise is a smaller share."""
 SIGN_S: Final = 0.5
+NOISE_SHARE: Final = 3.0
+"""Standard deviations by which noise may shift the sums."""
 SIGN_GAIN: Final = -0.25
-STUCK_S: Final = 0.5
+STUCK_S: Final = 0.7
 LEARN: Final = 3.0
 """Up to so many times the threshold what is left is taken for a bias."""
 LARGE_DRIFT: Final = 4.0
@@ -33,6 +38,7 @@ MOST_DRIFT: Final = 6.0
 
 _DRIFT: Final = int(Finding.DRIFT)
 _DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
+_NOISE: Final = int(Finding.NOISE)
 _SIGN: Final = int(Finding.MOTION_SIGN)
 _ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
 _RATE_STUCK: Final = int(Finding.RATE_STUCK)
@@ -77,8 +83,8 @@ class RollAgainstRate:
     ----------
     unexplained_rad : float
         Leaky sum of the roll's moves that the rate does not account for.
-    residual_rad : float
-        The last step's part of it.
+    noise : Noise
+        Of the roll, by its second difference: three times the power of a difference.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
@@ -87,6 +93,8 @@ class RollAgainstRate:
         least_rad = thresholds.drift_rad + 4 * thresholds.roll_still_rad
         self._roll_stuck = Stuck(thresholds.roll_still_rad, least_rad)
         self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
+        self.noise = Noise(math.sqrt(6) * thresholds.roll_noise_rad)
+        self._bend = SecondDifference()
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
         self.restart()
@@ -94,9 +102,11 @@ class RollAgainstRate:
     def restart(self) -> None:
         """Begin anew after a gap, with the bias that was learned."""
         self._roll_rad = math.nan
-        self.unexplained_rad = self.residual_rad = 0.0
+        self._bend.restart()
+        self.unexplained_rad = 0.0
         self._over_s = self._smooth_rad = 0.0
         self._moved_turned = self._turned_turned = 0.0
+        self._moved_rad = self._turned_rad = self._long_s = 0.0
 
     def update(
         self, roll_rad: float, rate_rad_s: float, turned_rad: float, elapsed_s: float
@@ -117,7 +127,8 @@ class RollAgainstRate:
         if moved_rad != moved_rad:  # the first sample
             return 0
         limit_rad = self._limit_rad
-        self.residual_rad = left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
+        left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
+        noisy = self.noise.update(self._bend.update(roll_rad), elapsed_s)
         slow_rad = min(
             max(left_rad, -limit_rad), limit_rad
         )  # a jump is neither bias nor standstill
@@ -131,18 +142,26 @@ class RollAgainstRate:
         self._smooth_rad += (summed_rad - self._smooth_rad) * (elapsed_s / SMOOTH_S)
         roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
         rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
-        keep = 1 - elapsed_s / SIGN_S
-        self._moved_turned = keep * self._moved_turned + moved_rad * turned_rad
-        self._turned_turned = keep * self._turned_turned + turned_rad * turned_rad
+        most_move_rad = abs(turned_rad) + limit_rad  # nor is a jump a wrong sign
+        self._moved_rad += min(max(moved_rad, -most_move_rad), most_move_rad)
+        self._turned_rad += turned_rad
+        self._long_s += elapsed_s
+        if self._long_s >= LONG_STEP_S:
+            keep = 1 - self._long_s / SIGN_S
+            self._moved_turned = keep * self._moved_turned + self._moved_rad * self._turned_rad
+            self._turned_turned = keep * self._turned_turned + self._turned_rad**2
+            self._moved_rad = self._turned_rad = self._long_s = 0.0
+        found = _NOISE if noisy else 0
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
                 self._over_s = 0.0
-            return 0
+            return found
         self._over_s += elapsed_s
-        found = _DRIFT
+        found |= _DRIFT
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
-        if self._moved_turned < SIGN_GAIN * self._turned_turned:
+        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * self._turned_turned)
+        if self._moved_turned < SIGN_GAIN * self._turned_turned - beside:
             found |= _SIGN
         if roll_stuck:
             found |= _ROLL_STUCK

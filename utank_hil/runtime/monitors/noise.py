@@ -4,6 +4,8 @@ import math
 from typing import Final
 
 NOISE_S: Final = 0.7
+MOST: Final = 1.5
+"""A residual counts as so many limits at most: one jump is no noise."""
 
 
 class Noise:
@@ -23,6 +25,7 @@ class Noise:
 
     def __init__(self, limit: float) -> None:
         self._limit_power = limit * limit
+        self._most = MOST * limit
         self.power = 0.0
         self.found = False
 
@@ -33,6 +36,7 @@ class Noise:
 
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
+        residual = min(max(residual, -self._most), self._most)
         self.power += (residual * residual - self.power) * (elapsed_s / NOISE_S)
         self.found = self.power > self._limit_power
         return self.found
