@@ -1,4 +1,5 @@
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +233,28 @@ def test_bad_seas_are_refused():
         Sea.irregular(STORM, -1)
     with pytest.raises(ValueError, match="omega_rad_s"):
         Sea.regular(1.0, 0.0)
+
+
+def test_an_hour_of_one_seed_scatters_as_the_document_says():
+    """Relative deviation of an hour's Hs over seeds, and what Gaussian theory gives.
+
+    Theory: the variance of the variance of T seconds is the integral of S^2 over T. Of components
+    with random phases it is the sum over pairs of the energies times sinc^2 of half the phase
+    between.
+    """
+    hour_s = 3600.0
+    page = (Path(__file__).parents[2] / "docs" / "sea.md").read_text(encoding="utf-8")
+    words = " ".join(page.split())
+    pattern = r"deviation of ([\d.]+) % over the seeds, where Gaussian theory gives ([\d.]+)"
+    written = re.search(pattern, words)
+    assert written is not None
+
+    width = np.diff(STORM.band_edges_hz, axis=1)[:, 0]
+    theory = math.sqrt(width @ STORM.density**2 / hour_s) / (width @ STORM.density) / 2
+    sea = Sea.irregular(STORM, seed=1)
+    energy, turns = sea.amplitude_m**2 / 2, sea.omega_rad_s * hour_s / (2 * np.pi)
+    pairs = np.outer(energy, energy) * np.sinc(np.subtract.outer(turns, turns)) ** 2
+    found = math.sqrt(pairs.sum() - np.trace(pairs)) / energy.sum() / 2
+    assert [100 * found, 100 * theory] == pytest.approx(
+        list(map(float, written.groups())), rel=0.02
+    )
