@@ -59,7 +59,7 @@ class ForeignNode:
 
 
 class ForeignSensors(ForeignNode):
-    """A ship that rolls as a sine, whatever the pump does."""
+    """A ship that rolls as a sine, whatever the pump does; the pressure is what the drive says."""
 
     amplitude_rad, period_s = 0.05, 12.0
 
@@ -74,9 +74,13 @@ class ForeignSensors(ForeignNode):
             frames += [
                 self.frame("SENSOR_TANK", port_level_m=-level_m, starboard_level_m=level_m,
                            port_high=0, starboard_high=0, quality=0),
-                self.frame("SENSOR_PUMP", pressure_pa=0, flow_m3_s=0, quality=0),
+                self.frame("SENSOR_PUMP", pressure_pa=self.pressure_pa(), flow_m3_s=0, quality=0),
             ]  # fmt: skip
         return frames + self.life(now_ns)
+
+
+    def pressure_pa(self) -> float:
+        return self.heard.get("DRIVE_STATUS_1", {}).get("pressure_pa", 0.0)
 
 
 # state of CiA 402 -> control word that leads on -> next state
@@ -84,15 +88,16 @@ STEPS = {(0x40, 0x06): 0x21, (0x21, 0x07): 0x23, (0x23, 0x0F): 0x27}
 
 
 class ForeignDrive(ForeignNode):
-    """A drive whose pressure is two thirds of the command, and notes what it reported when."""
+    """A drive whose pressure is a little less than the command, and notes what it reported when."""
 
-    share = 2 / 3
+    share = 0.95
+    lag_share = 0.1  # of the way to the command in a tick: a lag of 0.1 s
     silent = unavailable = False
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.state = 0x40
-        self.pressure_pa = 0.0
+        self.pressure_pa = self.target_pa = 0.0
         self.reported: list[tuple[int, float]] = []
 
     def on(self, name: str, now_ns: int) -> None:
@@ -100,9 +105,10 @@ class ForeignDrive(ForeignNode):
             return
         command = self.heard[name]
         self.state = STEPS.get((self.state, int(command["control_word"])), self.state)
-        self.pressure_pa = self.share * command["pressure_pa"] if self.state == 0x27 else 0.0
+        self.target_pa = self.share * command["pressure_pa"] if self.state == 0x27 else 0.0
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
+        self.pressure_pa += self.lag_share * (self.target_pa - self.pressure_pa)
         if self.silent:
             return []
         frames = []

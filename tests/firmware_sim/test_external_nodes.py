@@ -130,8 +130,11 @@ def test_a_drive_that_reports_nothing_lets_the_emulated_rotor_turn_freely(why: s
     drive = bench.foreign["drive"]
     assert isinstance(drive, ForeignDrive)
     bench.run(8.0)
-    while abs(drive.pressure_pa) < 20e3:
+    for _ in range(400):
         bench.run(0.05)
+        if abs(drive.pressure_pa) > 20e3:
+            break
+    assert abs(drive.pressure_pa) > 20e3
     (external,) = (node for node in bench.kept if isinstance(node, ExternalDrive))
     assert external.reported_share > 0.99
     before = len(bench.table.rows)
@@ -141,7 +144,7 @@ def test_a_drive_that_reports_nothing_lets_the_emulated_rotor_turn_freely(why: s
     held = STALE_NS // TICK_NS
     assert (pressure[: held - 2] > 18e3).all()
     # the rotor's inertia lags behind water that was pressed hard
-    assert (pressure[held + 2 :] < 10e3).all()
+    assert (pressure[held + 2 :] < 15e3).all()
     assert pressure[-1] < 2e3
     assert 0.8 < external.reported_share < 0.95
     if why == "silent":
