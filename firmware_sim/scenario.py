@@ -22,7 +22,7 @@ from firmware_sim.voyage import (
 from firmware_sim.waves import PassingWaves, SteadyWaves, Waves
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.plausibility import tank_problems
-from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
@@ -49,6 +49,7 @@ SAILED: Final = (
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
 
+_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))
 _TINY: Final = 1e-30
 _NO_MOMENT: Final = 1e-9
 """Share of the waves' slope below which the ship feels nothing of it."""
@@ -262,15 +263,24 @@ class Scenario(Section):
         return [(key, why) for key, ship in ships.items() for why in self._heel_problems(ship)]
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
-        """Why a ship's steady heel is refused: the water would be at the tank's roof."""
-        tank = self.vessel.tank
-        _, _, stiffness = coupled_matrices(ship, tank)
-        roll_rad, level_m = np.linalg.solve(stiffness, [ship.heeling_moment_nm, 0.0]).tolist()
-        if abs(level_m) <= tank.level_limit_m:
+        """Why a ship's steady heel is refused: she finds none, or the water is at the roof."""
+        tank, model = self.vessel.tank, RollModel(ship, self.vessel.tank)
+        if ship.heeling_moment_nm == 0:
             return []
+        roll_rad = math.copysign(1.0, ship.heeling_moment_nm) * _HEELS_RAD
+        flat_m = np.tan(roll_rad) * tank.width_m / 2  # the water's level, where there is room
+        level_m = np.clip(flat_m, -tank.level_limit_m, tank.level_limit_m)
+        at_rest = np.zeros_like(roll_rad)
+        states = np.stack([roll_rad, at_rest, level_m, at_rest], axis=-1)
+        held = np.flatnonzero(model.derivative(states, stopped=True)[:, 1] * roll_rad < 0)
+        if held.size and abs(flat_m[held[0]]) <= tank.level_limit_m:
+            return []
+        remedy = f"lower {' or '.join(SAILED[-2:])}"
+        if not held.size:
+            return [f"capsizes her without a wave, as no righting moment holds it: {remedy}"]
         return [
-            f"heels steadily by {math.degrees(roll_rad):.0f} degrees, at which the tank is full or "
-            f"empty at one side: lower {' or '.join(SAILED[-2:])}"
+            f"heels steadily by {math.degrees(abs(roll_rad[held[0]])):.0f} degrees, at which the "
+            f"tank is full or empty at one side: {remedy}"
         ]
 
     def _sea_problems(self) -> list[Problem]:
@@ -285,8 +295,10 @@ class Scenario(Section):
         steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
         if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:
             return []
-        # still water is a sea, too, and a ship under way may turn
-        return self.sea.without_moment() if steep > 0 and not self.voyage else []
+        # still water is a sea, too, and a ship that turns meets these waves from the side
+        turns = any(point.heading_deg is not None or point.course_deg is not None
+                    for point in self.voyage)  # fmt: skip
+        return self.sea.without_moment() if steep > 0 and not turns else []
 
     def warnings(self) -> list[Problem]:
         """What is unusual in vessel and sea."""
@@ -326,7 +338,10 @@ class Scenario(Section):
                 return [(f"voyage.{index}.ship.{name}", why) for name, why in error.problems]
             if unstable:
                 return [(f"voyage.{index}.ship", f"with it, the tank {unstable[0][1]}")]
-        return []
+            if point.ship:
+                heels = self._heel_problems(self.ship_at(point.time_s))
+                problems += [(f"voyage.{index}.ship", why) for why in heels]
+        return problems
 
     def wave_moment(self, seed: int) -> Harmonics:
         """Roll moment of the sea as it is at the start, on a ship that keeps its course."""

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -6,7 +7,9 @@ import yaml
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.waves import PassingWaves
-from utank_hil.configuration import ConfigError, load_config
+from utank_hil.analysis.capsize.threshold import equilibria
+from utank_hil.configuration import ConfigError, Vessel, load_config
+from utank_hil.dynamics import RollModel
 
 CONFIGS = Path("configs").resolve()
 STORM = CONFIGS / "scenarios" / "storm.yaml"
@@ -106,6 +109,10 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
          "voyage.0.ship.inertia_kg_m2", "got -1.0"),
         ({"voyage": [{"time_s": 9.0, "ship": {"stiffness_nm_rad": 1e6}}]}, "voyage.0.ship",
          "takes all of the ship's stability"),
+        ({"voyage": [{"time_s": 9.0, "ship": {"offset_moment_nm": 4e8}}]}, "voyage.0.ship",
+         "full or empty at one side: lower offset_moment_nm or wind_moment_nm"),
+        ({"sea": {"kind": "jonswap", "hs_m": 3.0, "tp_s": 9.0, "heading_deg": 0.0},
+          "voyage": [{"time_s": 9.0, "speed_m_s": 3.0}]}, "sea.heading_deg", "no roll moment"),
         ({"sea": {**STORM_SEA, "until": "2019-02-10T05:40"}}, "sea.until", "must be after time"),
         ({"sea": {**STORM_SEA, "until": "2019-02-10T06:10"}}, "sea.until",
          "no spectrum within 0 s of 2019-02-10T06:10"),
@@ -194,3 +201,29 @@ def test_records_of_hours_pass_into_one_another(tmp_path: Path) -> None:
     heights = [4 * np.sqrt((passing.at(t)[0] ** 2).sum() / 2) for t in (0, 3600, 5400, 7200)]
     mean = np.sqrt((4.27**2 + 3.86**2) / 2)
     assert heights == pytest.approx([4.71, 4.27, mean, 3.86], abs=0.006)
+
+
+@pytest.mark.parametrize("wind_moment_nm", [-2e4, 3e4, -3.5e4, 4e4, 5e4])
+def test_wind_is_taken_as_far_as_the_ship_finds_a_heel_to_hold(
+    tmp_path: Path, wind_moment_nm: float
+) -> None:
+    """Her restoring moment softens: a linear ship would find one for each of these."""
+    vessel = load_config(CONFIGS / "ships" / "patti_b.yaml", Vessel)
+    windy = RollModel(replace(vessel.ship, wind_moment_nm=wind_moment_nm), vessel.tank)
+    held = [
+        each
+        for each in equilibria(windy)
+        if each.stable and abs(each.level_m) < vessel.tank.level_limit_m
+    ]
+    controller = CONFIGS / "controllers" / "patti_b_constrained_gpc.yaml"
+    path = scenario_file(
+        tmp_path,
+        vessel=str(CONFIGS / "ships" / "patti_b.yaml"),
+        controllers={"constrained": str(controller)},
+        actual_ship={"wind_moment_nm": wind_moment_nm},
+    )
+    if held:
+        assert load_config(path, Scenario).actual_ship
+        return
+    with pytest.raises(ConfigError, match="actual_ship: capsizes her without a wave"):
+        load_config(path, Scenario)
