@@ -78,7 +78,6 @@ class ForeignSensors(ForeignNode):
             ]  # fmt: skip
         return frames + self.life(now_ns)
 
-
     def pressure_pa(self) -> float:
         return self.heard.get("DRIVE_STATUS_1", {}).get("pressure_pa", 0.0)
 

@@ -73,8 +73,8 @@ PARTS = (
     Part(
         "shipped_scenarios",
         "python -m tools.studies.shipped_scenarios --json",
-        "every shipped scenario on the bench, beside the linear plant",
-        60,
+        "the shipped scenarios on the bench, beside the linear plant",
+        10,
     ),
     Part(
         "starter_ships",
