@@ -90,7 +90,8 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
     scenario : Scenario
         Whose ship is the truth.
     settle_s : float
-        Left out at the start. Where the ship changes later, the time before that is left out, too.
+        Left out at the start. Where the ship changes later, or under way, the time before that is
+        left out, too.
     """
     if not run.retuning:
         return None
@@ -98,8 +99,10 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
     time_s, state = run.column("time_s"), run.column("retuning")
     begun = [event for event in events if event.state is RetuningState.IDENTIFY]
     begun_s = begun[0].time_ns * 1e-9 if begun else math.inf
-    if scenario.actual_ship and scenario.actual_from_s < begun_s:
-        settle_s = max(settle_s, scenario.actual_from_s)
+    changed_s = [point.time_s for point in scenario.voyage if point.ship]
+    if scenario.actual_ship:
+        changed_s.append(scenario.actual_from_s)
+    settle_s = max(settle_s, *(each for each in changed_s if each < begun_s), 0.0)
     before = _rms(run, settle_s, begun_s) if begun else None
     after = retuned_at_s = None
     spans = _spans(time_s, np.isin(state, _NEW_LAW))
@@ -144,7 +147,7 @@ def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:
 
 
 def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """When each segment_bounds stretch of rows for which `here` is true begins and has ended."""
+    """When each unbroken stretch of rows for which `here` is true begins and has ended."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], here.astype(np.int8), [0]))))
     return [
         (float(time_s[start]), float(time_s[stop - 1]) + RECORD_S)
@@ -153,8 +156,7 @@ def _spans(time_s: FloatArray, here: npt.NDArray[np.bool_]) -> list[tuple[float,
 
 
 def _truth(scenario: Scenario, time_s: float) -> ShipInFigures:
-    changed = time_s >= scenario.actual_from_s
-    ship = scenario.sailing_ship if changed else scenario.vessel.ship
+    ship = scenario.ship_at(time_s)
     return ShipInFigures(
         2 * math.pi / ship.natural_frequency_rad_s,
         ship.damping_nms_rad,

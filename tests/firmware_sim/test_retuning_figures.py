@@ -14,6 +14,7 @@ from firmware_sim.report_tables import retuning_table
 from firmware_sim.retuning_figures import RetuningFigures, events_on_ships_time, retuning_figures
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
+from firmware_sim.voyage import Waypoint
 from utank_hil.canbus import RetuningState
 from utank_hil.configuration import load_config
 from utank_hil.retuning import ModelSummary, RetuningEvent
@@ -120,6 +121,22 @@ def test_ship_that_changes_later_is_judged_after_that_and_is_the_truth_then() ->
     assert told.truth.roll_period_s == pytest.approx(
         2 * math.pi / ADAPTIVE.vessel.ship.natural_frequency_rad_s
     )
+
+
+def test_ship_that_changes_under_way_is_judged_after_that_and_is_the_truth_then() -> None:
+    """Half of the way to twice the stiffness by 90 s, and all of it at 180 s."""
+    stiff = 2 * ADAPTIVE.vessel.ship.stiffness_nm_rad
+    points = [
+        Waypoint(time_s=90.0, ship={"stiffness_nm_rad": 0.75 * stiff}),
+        Waypoint(time_s=180.0, ship={"stiffness_nm_rad": stiff}),
+    ]
+    changes = {"actual_ship": {}, "voyage": tuple(points)}
+    run = voyage((80.0, IDLE, 0.04, (), None), *GOOD)
+    told = figures(run, ADAPTIVE.model_copy(update=changes))
+    assert told.roll_before_rad == pytest.approx(0.04, rel=1e-12)
+    configured_s = 2 * math.pi / ADAPTIVE.vessel.ship.natural_frequency_rad_s
+    share = 0.75 + 0.25 * (100.0 - 90.0) / 90.0
+    assert told.truth.roll_period_s == pytest.approx(configured_s / math.sqrt(2 * share))
 
 
 def test_events_are_on_the_ships_time() -> None:
