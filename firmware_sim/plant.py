@@ -244,8 +244,8 @@ class Plant:
 
     @property
     def speed_limited(self) -> bool:
-        """Whether the rotor turns as fast as it may."""
-        return math.isclose(abs(self.pump_speed_rad_s), self._pump.max_speed_rad_s, rel_tol=1e-3)
+        """Whether the rotor turns as fast as it may, or the water drives it beyond that."""
+        return abs(self.pump_speed_rad_s) >= 0.999 * self._pump.max_speed_rad_s
 
     @property
     def power_limited(self) -> bool:

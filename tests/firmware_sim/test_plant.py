@@ -269,6 +269,19 @@ def test_set_point_is_followed_within_the_pumps_lag_and_its_flags_tell_the_limit
     assert not plant.power_limited
 
 
+def test_rotor_that_the_water_drives_beyond_its_speed_is_at_its_limit() -> None:
+    plant = plant_in(Harmonics(np.array([4e8]), np.array([0.5]), np.zeros(1)))
+    plant.advance(0)
+    beyond = 0
+    for tick in range(1, 6000, 10):
+        plant.advance(tick * TICK_NS)
+        if abs(plant.pump_speed_rad_s) > 1.05 * VESSEL.pump.max_speed_rad_s:
+            beyond += 1
+            assert plant.speed_limited
+            assert not plant.power_limited
+    assert beyond
+
+
 PATTI_B = load_config(Path("configs/ships/patti_b.yaml"), Vessel)
 NAVAL = load_config(Path("configs/ships/naval_vessel.yaml"), Vessel)
 LOSSY = replace(VESSEL.tank, quadratic_loss=2.0, restitution=0.3)
