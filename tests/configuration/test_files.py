@@ -84,6 +84,8 @@ def test_missing_file_is_a_problem_even_where_nothing_is_required(tmp_path: Path
         ("duration_s: 1\nduration_s: 2\n", "duration_s", "written twice, in lines 1 and 2"),
         ("ship: {name: A,\n  length_m: 1, name: B}\n", "ship.name", "in lines 1 and 2"),
         ("ship: {name: A, length_m: 1}\nyes: 3\n", "yes", "is read as a bool and not as a name"),
+        ("ship: {length_m: 9,5, name: A}\n", "ship.length_m", "decimal comma (line 1): write"),
+        ("ship: {name: A, length_m: 1}\n5:\n", "5", "is read as a int and not as a name"),
         ("? [1, 2]\n: 3\n", "", "line 1, column 3: found unhashable key"),
         ("ship: &a {name: *a}\n", "", "an alias (*) names what it stands in"),
         ("ship: 2019-13-45\n", "", "line 1, column 7: month must be in 1..12; put text in quotes"),

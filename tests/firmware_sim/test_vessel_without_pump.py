@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.plant import Plant
 from firmware_sim.run import run_lockstep
 from firmware_sim.scenario import PASSIVE, Scenario
 from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.dynamics import coupled_model
 from utank_hil.tick import TICK_NS
@@ -52,6 +54,13 @@ def test_bench_runs_its_tank_passive(tmp_path: Path) -> None:
     system = coupled_model(vessel.ship, vessel.tank)
     expected = motion_in_sea(None, system, ("roll_rad",), scenario.wave_moment(1)).roll_rms_rad
     assert np.sqrt(np.mean(roll**2)) == pytest.approx(expected, rel=0.05)
+
+
+def test_check_shows_no_margins_of_no_law(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["check", str(scenario_file(tmp_path))])
+    assert done.exit_code == 0, done.output
+    assert "there is no pump" in done.stdout
+    assert "Margins" not in done.stdout
 
 
 def test_plant_takes_no_command(tmp_path: Path) -> None:

@@ -255,6 +255,8 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     console.print(ship_line(collection.vessel), soft_wrap=True)
     for line in collection.meaning():
         console.print(line, soft_wrap=True)
+    if not judged:  # a passive tank has no law
+        return
     table = Table(title="Margins, delay and pump lag included")
     table.add_column("", no_wrap=True)
     for heading in (

@@ -96,6 +96,11 @@ def _findings(node: yaml.Node, key: Key, above: tuple[yaml.Node, ...]) -> Iterat
             continue  # can be no key, and is refused when it is made
         if name.tag not in (_STRING, _MERGE):
             kind = name.tag.rpartition(":")[2]
+            if name.tag == _INT and node.flow_style and not value.value and lines:  # {hs_m: 9,5}
+                last = next(reversed(lines))
+                reason = f"has a decimal comma (line {line}): write a decimal point, as 9.5"
+                yield (*key, last), reason
+                continue
             yield (
                 (*key, name.value),
                 f"is read as a {kind} and not as a name (line {line}): put it in quotes",
