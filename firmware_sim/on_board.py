@@ -60,13 +60,18 @@ def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
 
 
 def judged_runs(result: BenchResult) -> dict[str, OnBoard]:
-    """The bare ship and the runs that can be compared with it, over the bench's window."""
+    """The bare ship and the runs that can be compared with it, over the bench's window.
+
+    A ship that capsized lies still, and nothing on board is to be judged.
+    """
     from firmware_sim.run import RECORD_S
 
     place = result.scenario.place_on_board
-    rolls = {_NO_TANK: result.without_tank_rad[round(result.settle_s / RECORD_S) :]}
+    rolls = {}
+    if result.without_tank_capsized_s >= result.end_s:
+        rolls[_NO_TANK] = result.without_tank_rad[round(result.settle_s / RECORD_S) :]
     for run in result.runs:
-        if result.compares(run):
+        if result.compares(run) and run.capsized_s >= result.end_s:
             window = run.between(result.settle_s, result.end_s)
             rolls[run.name] = run.column("true_roll_rad")[window]
     return {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from firmware_sim.bench import BenchResult
 from firmware_sim.figures import figures
 from firmware_sim.model_limits import MODEL_LIMITS, passed_limits, steepness
+from firmware_sim.on_board import judged_runs
 from firmware_sim.report import as_json, endings, exit_code
 from firmware_sim.report_tables import in_one_unit, motion_table, pump_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run
@@ -155,6 +156,14 @@ def test_nothing_is_said_to_be_below_a_bare_ship_that_capsized() -> None:
     assert endings(result) == ["no tank: the ship capsized at 88.0 s"]
     assert exit_code(result) is ExitCode.OK  # that the tank kept her up is what it is for
     assert as_json(result, {}, {})["no_tank"]["capsized_s"] == 88.0
+
+
+def test_nobody_on_board_of_a_ship_that_capsized_is_judged() -> None:
+    upset = run("upset", 0.02, capsized_s=80.0)
+    result = result_of(PASSIVE_RUN, run("good", 0.02), upset)
+    assert set(judged_runs(result)) == {"no tank", "passive", "good"}
+    result = dataclasses.replace(result, without_tank_capsized_s=88.0)
+    assert set(judged_runs(result)) == {"passive", "good"}
 
 
 def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> None:
