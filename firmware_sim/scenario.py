@@ -168,8 +168,10 @@ class Scenario(Section):
     def meaning(self) -> list[str]:
         """`figures` in words."""
         figures = self.figures()
+        changes = self.voyage or len(self.sea.spectra) > 1
+        waves = "At the start, waves" if changes else "Waves"
         return [
-            f"Waves of {figures['hs_m']:.2f} m significant height, met at "
+            f"{waves} of {figures['hs_m']:.2f} m significant height, met at "
             f"{figures['encounter_rad_s']:.3g} rad/s and {figures['speed_kn']:.3g} knots; standing "
             f"still they would heel her {math.degrees(figures['static_roll_rms_rad']):.2g}° RMS."
         ]

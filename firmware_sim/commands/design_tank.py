@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from firmware_sim.scenario import Scenario
     from utank_hil.analysis.tank_prediction import RollPrediction, SeaState, SweepPoint
     from utank_hil.control import DesignPlant
+    from utank_hil.dynamics.ship import RollShip
 
 PICTURE, SWEEP, FIGURES = "tank.png", "tank_sweep.png", "tank.json"
 
@@ -105,11 +106,22 @@ def tank(
         sys.stdout.write(json.dumps(figures) + "\n")
         return
     print_table(console, _table(loaded, tanks, found, f"roll: linear prediction for {name}"))
+    if left_out := _left_out(loaded.ship):
+        console.print(f"left out of the roll: {left_out}; utank-hil bench has it", soft_wrap=True)
     print_table(console, loading_table(loadings))
     for each in sweep_tables(points) if points else ():
         print_table(console, each)
     for key, file in files.items():
         console.print(f"{key:>10}: {shown(file)}", soft_wrap=True)
+
+
+def _left_out(ship: "RollShip") -> str:
+    """What a linear prediction does not have of a ship."""
+    parts = {
+        "quadratic damping": ship.quadratic_damping_nms2_rad2 > 0,
+        "the restoring moment's curve": bool(ship.restoring_odd_nm or ship.gz_m),
+    }
+    return " and ".join(part for part, there in parts.items() if there)
 
 
 def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:

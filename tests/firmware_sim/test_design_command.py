@@ -112,6 +112,16 @@ def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Pat
     assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
 
 
+@pytest.mark.parametrize(("ship", "said"), [("patti_b", True), ("thesis_first", False)])
+def test_tank_command_says_what_a_linear_prediction_leaves_out(
+    ship: str, said: bool, tmp_path: Path
+):
+    done = run("tank", CONFIGS / "ships" / f"{ship}.yaml", "--out", tmp_path)
+    assert done.exit_code == 0, done.output
+    left_out = "left out of the roll: quadratic damping and the restoring moment's curve"
+    assert (left_out in done.stdout) is said
+
+
 def test_tank_command_refuses_a_calm_sea(tmp_path: Path):
     still = CONFIGS / "scenarios" / "still_water.yaml"
     first = CONFIGS / "ships" / "thesis_first.yaml"

@@ -227,3 +227,17 @@ def test_wind_is_taken_as_far_as_the_ship_finds_a_heel_to_hold(
         return
     with pytest.raises(ConfigError, match="actual_ship: capsizes her without a wave"):
         load_config(path, Scenario)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, "Waves of 2.83 m"),
+        ({"voyage": [{"time_s": 30.0, "speed_m_s": 3.0}]}, "At the start, waves of 2.83 m"),
+    ],
+)
+def test_sea_that_changes_is_told_as_it_is_at_the_start(
+    tmp_path: Path, changes: dict[str, object], said: str
+) -> None:
+    (line,) = load_config(scenario_file(tmp_path, **changes), Scenario).meaning()
+    assert line.startswith(said)
