@@ -123,6 +123,8 @@ def init(
         room = replace(usual, **{key: of for key, of in given.items() if of is not None})
     except ParameterError as error:
         _fail_at(error, "tank-")
+    if room.breadth_m > beam:
+        fail(f"--tank-breadth: is {room.breadth_m:g} m, and the ship's beam {beam:g} m")
     for option, value in (("hs", hs), ("tp", tp)):
         if value is not None and not 0 < value < math.inf:
             fail(f"--{option}: must be positive and finite, got {value}")

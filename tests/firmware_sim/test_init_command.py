@@ -113,6 +113,7 @@ def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> Non
         ({"roll-period": -3}, "--roll-period: must be positive"),
         ({"displacement": 0}, "--displacement: must be positive"),
         ({"tank-height": -1}, "--tank-height: must be positive"),
+        ({"tank-breadth": 12}, "--tank-breadth: is 12 m, and the ship's beam 9.5 m"),
         ({"duct-below-cg": math.inf}, "--duct-below-cg: must be finite"),
         ({"gm-loss": 0.5}, "--gm-loss: must be 0.03 to 0.25"),
         ({"roll-damping": 2}, "--roll-damping: must be above 0 and at most 0.3"),
