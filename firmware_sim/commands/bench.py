@@ -119,7 +119,8 @@ def bench(
         console = Console()
         print_table(console, motion_table(result))
         print_table(console, pump_table(result))
-        print_table(console, on_board_table(result))
+        if (on_board := on_board_table(result)).rows:  # not all of them capsized
+            print_table(console, on_board)
         retuning = retuning_table(result)
         if retuning is not None:
             print_table(console, retuning)
