@@ -155,6 +155,7 @@ class Monitors:
             self._of_drive = self.drive.update(
                 seen.command_pa,
                 inbox.pressure_pa,
+                level_rate_m_s,
                 enabled=seen.drive_enabled and seen.pump_age_ms <= STALE_MS,
                 limited=inbox.drive_held_back,
             )

@@ -96,8 +96,13 @@ STEP_S = 0.05
 LAG_S = CONFIG.vessel.pump.lag_s
 
 
-def drive_findings(actual, seconds: float = 30.0, limited: bool = False) -> dict[Finding, float]:
-    """When a drive that makes `actual(time, pressure)` of the right pressure is found out."""
+def drive_findings(
+    actual, seconds: float = 30.0, limited: bool = False, along_m_s: float = 0.0
+) -> dict[Finding, float]:
+    """When a drive that makes `actual(time, pressure)` of the right pressure is found out.
+
+    The water flows at `along_m_s` the way of the command.
+    """
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
     right = 0.0
     first: dict[Finding, float] = {}
@@ -107,7 +112,8 @@ def drive_findings(actual, seconds: float = 30.0, limited: bool = False) -> dict
         for j in range(5):  # a drive of its own: 20 ms late, in steps of 10 ms
             late = 30e3 * math.sin(0.6 * (t - STEP_S + 0.01 * (j + 1) - 0.02))
             right += (late - right) * (1 - math.exp(-0.01 / LAG_S))
-        found = monitor.update(command, actual(t, right), enabled=True, limited=limited)
+        rate_m_s = math.copysign(along_m_s, right) * math.copysign(1.0, along_m_s)
+        found = monitor.update(command, actual(t, right), rate_m_s, enabled=True, limited=limited)
         for finding in Finding:
             if found & finding:
                 first.setdefault(finding, t)
@@ -146,9 +152,18 @@ def test_drive_at_its_own_limit_may_stay_behind() -> None:
     assert not drive_findings(weak, limited=True)
 
 
+def test_water_that_outruns_a_rotor_at_its_limit_is_no_reversed_pump() -> None:
+    def braking(_, right):
+        return -0.3 * right
+
+    for along_m_s, limited, blamed in ((0.7, True, False), (-0.7, True, True), (0.7, False, True)):
+        found = drive_findings(braking, limited=limited, along_m_s=along_m_s)
+        assert (Finding.PUMP_SIGN in found) == blamed
+
+
 def test_drive_that_is_off_is_not_judged() -> None:
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
-    assert not any(monitor.update(30e3, 0.0, enabled=False, limited=False) for _ in range(100))
+    assert not any(monitor.update(30e3, 0.0, 0.0, enabled=False, limited=False) for _ in range(100))
 
 
 def test_command_held_at_its_limit_for_ten_seconds_is_saturated_until_it_leaves() -> None:

@@ -28,7 +28,9 @@ _SATURATED: Final = int(Finding.SATURATED)
 class DriveFollowing:
     """The pressure against a model of the drive: the command, later by a step, through its lag.
 
-    A drive that says it is limited in power or speed may stay behind the command, not oppose it.
+    A drive that says it is limited in power or speed may stay behind the command. It may oppose it
+    only while the water flows the way of the command: a rotor at its greatest speed brakes water
+    that outruns it.
 
     Parameters
     ----------
@@ -54,12 +56,22 @@ class DriveFollowing:
         self.expected_pa = self.late_pa = 0.0
         self._enabled_s = self._behind_s = self._reversed_s = 0.0
 
-    def update(self, command_pa: float, pressure_pa: float, *, enabled: bool, limited: bool) -> int:
+    def update(
+        self,
+        command_pa: float,
+        pressure_pa: float,
+        level_rate_m_s: float,
+        *,
+        enabled: bool,
+        limited: bool,
+    ) -> int:
         """Take the command that leaves now and the newest pressure; return what was found.
 
         Parameters
         ----------
         command_pa, pressure_pa : float
+        level_rate_m_s : float
+            Of the starboard level: the way the water flows.
         enabled : bool
             Whether the drive is in operation enabled.
         limited : bool
@@ -78,11 +90,13 @@ class DriveFollowing:
             return 0
         limit_pa = self._limit_pa
         along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
-        if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa:
+        outrun = limited and level_rate_m_s * expected_pa > 0
+        if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa and not outrun:
             self._reversed_s += self._period_s
         else:
             self._reversed_s = 0.0
-        excused = limited and -limit_pa < along_pa < abs(expected_pa) + limit_pa
+        ahead_pa = abs(expected_pa) + limit_pa
+        excused = limited and (outrun or along_pa > -limit_pa) and along_pa < ahead_pa
         self.late_pa = 0.0 if excused else abs(pressure_pa - expected_pa)
         if self.late_pa > limit_pa:
             self._behind_s += self._period_s
