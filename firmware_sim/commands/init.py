@@ -5,7 +5,7 @@ import math
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 import typer
 from rich.console import Console
@@ -35,6 +35,9 @@ _OPTIONS = {
 }
 """Options that are not named as the parameters they set."""
 _UNITS = ("_m", "_t", "_s")
+
+WORTH_IT: Final = 0.15
+"""Share of the roll that a tank should take in the starter's sea."""
 
 
 def init(
@@ -104,7 +107,6 @@ def init(
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom
 
-    prepare_out(folder, ())
     for path in (folder / file for file in FILES):
         if path.exists():
             fail(f"{path}: is there already; name another folder, or remove it")
@@ -139,21 +141,40 @@ def init(
         fail(f"--tp: {error}")
     except ParameterError as error:
         _fail_at(error)
+    prepare_out(folder, ())  # not before: a refusal leaves nothing behind
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
         path.write_text(project.texts[file], encoding="utf-8")
+    little = _little_help(project)
     if json_:
-        figures = {"possible": True, **_as_json(project)}
+        figures = {"possible": True, "little_help": little, **_as_json(project)}
         told = {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
         sys.stdout.write(json.dumps(told) + "\n")
         return
     console = Console(highlight=False)
     print_table(console, _table(project))
+    if little:
+        console.print(f"[yellow]little help:[/yellow] {little}", soft_wrap=True)
     for path in files.values():
         console.print(f"written: {shown(path)}", soft_wrap=True)
     console.print("Next:")
     for command, file in (("check", "controller.yaml"), ("bench", "scenario.yaml")):
         console.print(f"  utank-hil {command} {shown(files[file])}", soft_wrap=True)
+
+
+def _little_help(project: "StarterProject") -> str | None:
+    """What is to be said where the tank is hardly worth its water; None where it is."""
+    found = project.prediction
+    best = found.passive if found.active is None else found.active
+    less = 1 - best.roll_rms_rad / found.without_tank_rad
+    if less >= WORTH_IT:
+        return None
+    period_s = 2 * math.pi / project.vessel.ship.natural_frequency_rad_s
+    return (
+        f"the tank takes {max(less, 0.0):.0%} of the roll in a sea of {project.sea['tp_s']:g} s, "
+        f"and the ship rolls in {period_s:.1f} s. A tank helps near the roll period: try --tp, "
+        "more room, or --gm-loss"
+    )
 
 
 def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:

@@ -97,8 +97,15 @@ def test_sea_can_be_given(tmp_path: Path) -> None:
     assert scenario.sea.spectrum().hs_m == pytest.approx(2.25, rel=0.01)
 
 
+def test_a_tank_that_hardly_helps_is_said_to(tmp_path: Path) -> None:
+    assert json.loads(run(tmp_path / "a", PATROL, "--json").stdout)["little_help"] is None
+    slow = {"length": 300, "beam": 48, "displacement": 180e3, "gm": 0.6, "roll-period": 45}
+    said = json.loads(run(tmp_path / "b", slow, "--json").stdout)["little_help"]
+    assert "of the roll in a sea of 18 s, and the ship rolls in 45.0 s" in said
+
+
 def test_a_tank_that_cannot_be_is_refused_with_the_reason(tmp_path: Path) -> None:
-    done = run(tmp_path, PATROL | {"gm": 0.15})
+    done = run(tmp_path / "new", PATROL | {"gm": 0.15})
     assert done.exit_code == ExitCode.REFUSED
     assert "a GM of 0.15 m can spare nothing for a free surface" in done.stderr
     assert list(tmp_path.iterdir()) == []

@@ -18,6 +18,7 @@ from utank_hil.telemetry.viewer import LOOPBACK
 LIVE_RUN: Final = "live"
 _LIVE_MEMORY: Final = "64MiB"  # history for a viewer that connects late; bounds the memory
 _FLUSH_TIMEOUT_S: Final = 5.0
+_GROWTH: Final = 1.05
 _RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
 _FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
 
@@ -122,7 +123,8 @@ class RecordingParts(Closing):
         if self.count > 1:
             self._file = self._first.with_stem(f"{self._first.stem}-part{self.count:03d}")
         if self._rotation is not None and self._rotation.keep_bytes is not None:
-            remove_oldest(self._file, self._rotation.keep_bytes - expected_bytes)
+            room_bytes = round(_GROWTH * expected_bytes)  # compression differs from file to file
+            remove_oldest(self._file, self._rotation.keep_bytes - room_bytes)
         _reserve_file(self._file)
         self._rows = 0
         self._recording, self._log = self._open(rr.FileSink(self._file), self._file.stem)
