@@ -5,6 +5,8 @@ READY := $(VENV)/.ready
 # a worker on each core; a file's tests stay together, for their fixtures
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
 ON_VCAN := tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence"
+# these in one kernel, the others in another: both take as long
+LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py)
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -61,10 +63,10 @@ test: check
 
 # they mostly wait, each in a kernel of its own on a core of its own
 test-retuning:
-	$(ON_VCAN) tests/socketcan/test_retuning.py
+	$(ON_VCAN) $(LONG_ON_VCAN)
 
 test-bus:
-	$(ON_VCAN) tests/socketcan --ignore=tests/socketcan/test_retuning.py
+	$(ON_VCAN) tests/socketcan $(addprefix --ignore=,$(LONG_ON_VCAN))
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few
