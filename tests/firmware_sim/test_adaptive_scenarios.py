@@ -11,7 +11,7 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.retuning_figures import retuning_figures
 from firmware_sim.run import Run, run_lockstep
 from firmware_sim.scenario import Scenario
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import Mode, RetuningState
 from utank_hil.configuration import load_config
 
 pytestmark = pytest.mark.slow
@@ -47,6 +47,8 @@ def cached_run_of(name: str, controller: str) -> Run:
 def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controller: str) -> None:
     run = cached_run_of("adaptive.yaml", controller)
     assert [event.state for event in run.retuning] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
+    # no false alarm either: the twin is the ship of the file, which this one is not any more
+    assert run.column("mode")[-1] == Mode.ACTIVE
     figures = retuning_figures(run, scenario("adaptive.yaml"), 60.0)
     assert figures is not None
     assert figures.roll_after_below_before is not None

@@ -48,7 +48,8 @@ FRESH_MS: Final = 50.0
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
 _CONTROL: Final = Demand.CONTROL
-_IDENTIFY: Final = RetuningState.IDENTIFY
+# the pulses roll the ship on purpose; from the trial on it is known to be another than the twin
+_OFF_THE_TWIN = frozenset((RetuningState.IDENTIFY, RetuningState.TRIAL, RetuningState.RETUNED))
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
@@ -334,7 +335,7 @@ class ControllerNode:
                 self.inbox,
                 seen,
                 self._level.rate_m_s,
-                excited=self.retuning_state is _IDENTIFY,
+                excited=self.retuning_state in _OFF_THE_TWIN,
             )
         if seen.reset_edge:
             self._drive_sequence.request_reset()
