@@ -321,9 +321,14 @@ def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
 def _controller(
     job: Job, retuner: Retuner | None, statistics: LoopStatistics | None = None
 ) -> tuple[ControllerNode, MemoryLog]:
-    log = MemoryLog(len(SIGNALS), job.ticks, RECORD_TICKS)
+    log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
     node = build_controller_node(
-        job.controller, job.law, retuner=retuner, statistics=statistics, sink=log.write
+        job.controller,
+        job.law,
+        retuner=retuner,
+        statistics=statistics,
+        sink=log.write,
+        sink_every=RECORD_TICKS,
     )
     return node, log
 

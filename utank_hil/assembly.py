@@ -123,6 +123,7 @@ def build_controller_node(
     retuner: Retuner | None = None,
     statistics: LoopStatistics | None = None,
     sink: Callable[[FloatArray], None] | None = None,
+    sink_every: int = 1,
     event_sink: EventSink | None = None,
 ) -> ControllerNode:
     """Build the controller node of a configuration.
@@ -135,7 +136,7 @@ def build_controller_node(
     retuner : Retuner, optional
         Who identifies and designs, if the configuration has the controller retune itself; without
         one it does not.
-    statistics, sink, event_sink
+    statistics, sink, sink_every, event_sink
         As `ControllerNode` takes them.
     """
     law = law or build_law(config)
@@ -174,6 +175,7 @@ def build_controller_node(
         retuning=retuning,
         statistics=statistics,
         sink=sink,
+        sink_every=sink_every,
         event_sink=event_sink,
     )
 

@@ -110,7 +110,9 @@ class ControllerNode:
     retuning : AdaptiveController, optional
         The controller again, when it is one that retunes itself.
     sink : callable, optional
-        Takes one telemetry row (columns `SIGNALS`) every tick; must copy it and not wait.
+        Takes one telemetry row (columns `SIGNALS`); must copy it and not wait.
+    sink_every : int
+        Ticks from one row to the next; the first tick has one.
     event_sink : callable, optional
         Takes each event of retuning and alarms, with the time of the first tick, as it happens;
         must not wait.
@@ -161,6 +163,7 @@ class ControllerNode:
         retuning: AdaptiveController | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
+        sink_every: int = 1,
         event_sink: EventSink | None = None,
     ) -> None:
         if not is_whole_ticks(controller.sample_time_s):
@@ -176,7 +179,8 @@ class ControllerNode:
         self.supervisor = supervisor
         self._settings = settings
         self.statistics = statistics or LoopStatistics(real_time=True)
-        self._sink = sink
+        self._sink, self._sink_every = sink, sink_every
+        self._ticks_to_row = 0
         self._event_sink = event_sink
         self._events_sent = 0
         self._law_commands = commands
@@ -492,7 +496,11 @@ class ControllerNode:
         return frames
 
     def _show(self) -> None:
-        """Hand one telemetry row to the sink."""
-        if self._sink is not None:
+        """Hand a telemetry row to the sink when one is due."""
+        if self._sink is None:
+            return
+        if self._ticks_to_row == 0:
+            self._ticks_to_row = self._sink_every
             self._row[:] = values_of(self)
             self._sink(self._row)
+        self._ticks_to_row -= 1
