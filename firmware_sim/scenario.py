@@ -8,10 +8,10 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from firmware_sim.drive import DriveLimits
+from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
-from firmware_sim.sensors import SensorErrors
+from firmware_sim.sensor_errors import SensorErrors
 from firmware_sim.voyage import (
     Waypoint,
     ship_on_the_way,

@@ -39,10 +39,10 @@ class TruthRecorder:
     """
 
     name = "truth"
-    hears: frozenset[int] = frozenset()
 
     def __init__(self, plant: Plant, log: MemoryLog, period_ns: int) -> None:
         self.period_ns = period_ns
+        self.hears: frozenset[int] = frozenset()
         self._plant = plant
         self._log = log
         self._row = np.zeros(len(TRUTH))

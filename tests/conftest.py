@@ -1,5 +1,9 @@
 """Settings of all tests."""
 
+import os
+
+os.environ["UTANK_HIL_COMPILED"] = "0"  # what is tested can be patched and is covered
+
 from hypothesis import settings
 
 import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads

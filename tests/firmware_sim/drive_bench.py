@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from firmware_sim.drive import DriveLimits, PumpDrive
+from firmware_sim.drive import PumpDrive
+from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     ControlWord,

@@ -7,7 +7,8 @@ from drive_bench import CATALOGUE, ENABLE, MS, DriveBench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP, DriveLimits
+from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP
+from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
 from utank_hil.canbus import (
     Address,
