@@ -17,7 +17,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers docs lock clean
+.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers site docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -31,6 +31,7 @@ help:
 	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
 	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
+	@echo "make site       the documentation as web pages, out/site"
 	@echo "make docs       write the generated documents and tables anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
@@ -62,7 +63,7 @@ check: setup
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
-test: check
+test: check site
 	$(PARALLEL) -m "not socketcan and not evidence"
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-retuning test-bus
 
@@ -104,6 +105,11 @@ $(PEERS_READY): tools/peers/requirements.lock | $(READY)
 	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
 		-r tools/peers/requirements.lock
 	@touch $@
+
+# the site of README, docs/ and docstrings; a link that leads nowhere is an error
+site: setup
+	$(VENV)/bin/sphinx-build -q -W --keep-going -d .cache/site -c docs . out/site
+	@echo "out/site/docs/index.html"
 
 docs: setup
 	$(PYTHON) -m tools.documents.write

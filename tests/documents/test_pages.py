@@ -88,7 +88,7 @@ MEANT = [
 
 @pytest.mark.parametrize("page", [*PAGES, *HOW_TO], ids=lambda page: page.stem)
 def test_a_page_has_three_parts(page: Path) -> None:
-    if page.stem not in ("README", "glossary"):
+    if page.stem not in ("README", "api", "configuration", "glossary", "index"):
         headings = re.findall(r"^## (.*)$", page.read_text(encoding="utf-8"), re.M)
         assert headings[:3] == PARTS
 
@@ -115,7 +115,12 @@ def test_files_and_names_on_a_page_exist(page: Path) -> None:
     assert [path for path in paths if not (path in made or found(path))] == []
     tests = re.findall(r"`(test_\w+\.py)`", text)
     assert [name for name in tests if not list((ROOT / "tests").rglob(name))] == []
-    names = re.findall(rf"`((?:{'|'.join(ROOMS)})\.[\w.]+)", text)
+    # keys of files may begin as rooms do
+    names = (
+        []
+        if page.stem == "configuration"
+        else re.findall(rf"`((?:{'|'.join(ROOMS)})\.[\w.]+)", text)
+    )
     assert [name for name in names if not is_name(name)] == []
 
 

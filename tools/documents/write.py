@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools.documents import catalogue, exit_codes, faults, tables
+from tools.documents import catalogue, configuration, exit_codes, faults, tables
 
 
 def pages() -> Iterator[tuple[Path, str]]:
@@ -16,6 +16,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield catalogue.PAGE, catalogue.page()
     yield faults.PAGE, faults.page()
     yield exit_codes.PAGE, exit_codes.page()
+    yield configuration.PAGE, configuration.page()
     yield from tables.pages()
 
 

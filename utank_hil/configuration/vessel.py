@@ -35,7 +35,7 @@ class Vessel(Section):
     tank: Tank
     pump: Pump | None = None
     valve: Valve | None = None
-    """None and None leave the tank passive."""
+    """Without pump and valve the tank is passive."""
     _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property

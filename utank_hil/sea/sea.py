@@ -32,7 +32,7 @@ COMPONENTS = 512
 class EffectiveSlope:
     """Ratio r of effective to true wave slope.
 
-    r = coefficient * exp(-k depth) * sinc(k |sin(heading)| beam / 2), sinc(x) = sin(x) / x.
+    r = coefficient * exp(-k depth) * sinc(k ``|sin(heading)|`` beam / 2), sinc(x) = sin(x) / x.
 
     Parameters
     ----------

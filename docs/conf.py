@@ -1,0 +1,25 @@
+"""The documentation site: `make site` makes it of the pages in this folder, README and docstrings.
+
+Warnings are errors there, so a link or a reference that leads nowhere fails.
+"""
+
+import importlib.metadata
+
+project = "utank-hil"
+author = "the developers of utank-hil"
+version = release = importlib.metadata.version("utank-hil")
+
+root_doc = "docs/index"
+include_patterns = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/**.md"]
+exclude_patterns = ["docs/evidence"]
+extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+
+myst_heading_anchors = 4
+numpydoc_show_class_members = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings give types, shapes and units
+
+html_theme = "furo"
+html_title = "utank-hil"
+html_show_sphinx = False
+html_copy_source = False
