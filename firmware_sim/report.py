@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,8 +16,10 @@ from firmware_sim.retuning_figures import events_on_ships_time, retuning_figures
 from firmware_sim.run import COLUMNS, Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
+from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.pictures import BenchCurve, draw_bench
+from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
+from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.telemetry import write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
@@ -148,7 +151,8 @@ def write_report(
 
 
 def _draw(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
-    found = {run.name: run for run in figures(result)[1]}
+    bare, compared = figures(result)
+    found = {run.name: run for run in compared}
     draw_bench(
         [
             BenchCurve(
@@ -164,7 +168,36 @@ def _draw(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
         path,
         title=f"{result.scenario.name}, seed {result.seed}, {result.mode}",
         about=about,
+        bars=[_bare_bar(result, bare), *map(partial(_bar, result, found), result.runs, COLORS)],
+        wrong=[*endings(result), *passed_limits(result)],
     )
+
+
+def _bare_bar(result: BenchResult, bare: RollStatistics) -> BenchBar:
+    if result.without_tank_capsized_s < result.end_s:
+        return BenchBar("no tank", NO_TANK, None, "capsized", None, "")
+    return BenchBar("no tank", NO_TANK, bare.rms_rad, _degrees(bare), None, "")
+
+
+def _bar(result: BenchResult, found: Mapping[str, RunFigures], run: Run, color: str) -> BenchBar:
+    mark = mark_of(result, run)
+    if mark is not None:
+        return BenchBar(run.name, color, None, mark.word, None, "")
+    told = found[run.name]
+    said = _degrees(told.roll)
+    if run.name == PASSIVE:
+        return BenchBar(run.name, color, told.roll.rms_rad, said, None, "")
+    if told.roll_below_passive is not None:
+        below = told.roll_below_passive
+        said += f"   {abs(below):.0%} {'below' if below >= 0 else 'above'} passive"
+    scale, unit = (1e6, "MW") if told.pump.power_peak_w >= 1e6 else (1e3, "kW")
+    mean, most = (each / scale for each in (told.pump.power_mean_w, told.pump.power_peak_w))
+    cost = f"{mean:.2f} {unit}, at most {most:.2f}"
+    return BenchBar(run.name, color, told.roll.rms_rad, said, told.pump.power_mean_w, cost)
+
+
+def _degrees(roll: RollStatistics) -> str:
+    return f"{math.degrees(roll.rms_rad):.2f}°"
 
 
 def _legend(result: BenchResult, run: Run, found: dict[str, RunFigures]) -> str:

@@ -1,20 +1,26 @@
-"""Figure of a bench: roll, level and pressure over time, with passive and active tank."""
+"""Figure of a bench: how much less roll, at what cost, and roll, level and pressure over time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
-from utank_hil.pictures.style import COLORS, HIGHLIGHT, picture
+from utank_hil.pictures.style import COLORS, HIGHLIGHT, WRONG, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
 ZOOM_S: Final = 180.0
+WINDOWS: Final = 60
+"""Of the whole run, in each of which the greatest value is shown: a curve of an hour is a block."""
+_DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
+"""Of the runs, so that they can be told in print without colours."""
 _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.IDENTIFY: ("identification", 0.25),
     RetuningState.DESIGN: ("design", 0.4),
@@ -51,13 +57,46 @@ class BenchCurve:
     retuning: FloatArray | None = None
 
 
-def draw_bench(
-    curves: Sequence[BenchCurve], path: Path, title: str, about: Mapping[str, Any] | None = None
-) -> Path:
-    """Draw roll, level and pressure of all runs: the whole time, and three minutes enlarged.
+@dataclass(frozen=True, slots=True)
+class BenchBar:
+    """One run in the summary of a bench.
 
-    The enlarged part is around the largest roll, or around the first trial of a new law if a run
-    retuned. Lanes below show the retuning states of each run.
+    Attributes
+    ----------
+    name : str
+    color : str
+    roll_rad : float or None
+        Root mean square; None for a run that gives none.
+    said : str
+        Beside the bar of the roll.
+    power_w : float or None
+        Mean shaft power; None where there is no pump to drive.
+    cost : str
+        Beside the bar of the power.
+    """
+
+    name: str
+    color: str
+    roll_rad: float | None
+    said: str
+    power_w: float | None
+    cost: str
+
+
+def draw_bench(
+    curves: Sequence[BenchCurve],
+    path: Path,
+    title: str,
+    about: Mapping[str, Any] | None = None,
+    *,
+    bars: Sequence[BenchBar] = (),
+    wrong: Sequence[str] = (),
+) -> Path:
+    """Draw the roll and cost of all runs as bars, and their roll, level and pressure over time.
+
+    Of the whole time the greatest value of each of `WINDOWS` parts is shown; three minutes are
+    shown as they were. These are around the largest roll, or around the first trial of a new law
+    if a run retuned. Lanes below show the retuning states of each run.
 
     Parameters
     ----------
@@ -70,6 +109,10 @@ def draw_bench(
         Title of the figure.
     about : mapping, optional
         As in `picture`.
+    bars : sequence of BenchBar
+        Of the summary, those of the curves last; there is none without any.
+    wrong : sequence of str
+        What went wrong, written above the bars.
 
     Returns
     -------
@@ -89,23 +132,35 @@ def draw_bench(
     spans = [whole] if zoom == whole else [whole, zoom]
     retuning = any(curve.retuning is not None for curve in curves)
     lane = 0.25 * sum(curve.retuning is not None for curve in curves)
-    size_in = (13.0 if len(spans) > 1 else 9.0, 7.5 + (0.6 + lane if retuning else 0.0))
-    with picture(path, title, size_in, about) as figure:
+    curves_in = 6.6 + (0.6 + lane if retuning else 0.0)
+    bars_in = 0.8 + 0.32 * len(bars) if bars else 0.0
+    lines = [line for each in wrong for line in wrap(each, 130)]
+    size_in = (13.0 if len(spans) > 1 else 9.0, curves_in + bars_in + 0.24 * len(lines))
+    with picture(path, title, size_in, about) as whole_figure:
+        figure: Figure | SubFigure = whole_figure
+        if bars:
+            height_ratios = [bars_in + 0.24 * len(lines), curves_in]
+            top, figure = whole_figure.subfigures(2, 1, squeeze=False, height_ratios=height_ratios)[
+                :, 0
+            ]
+            if lines:
+                top.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10, color=WRONG)
+            _draw_bars(top, bars)
         axes = figure.subplots(
             3 + retuning,
             len(spans),
             sharex="col",
-            sharey="row",
             squeeze=False,
             height_ratios=[2.0, 2.0, 2.0, lane][: 3 + retuning],
         )
         for column, span_s in zip(axes.T, spans, strict=True):
-            _draw_column(column, curves, span_s)
+            _draw_column(column, curves, span_s, as_they_were=span_s == spans[-1])
         if len(spans) > 1:
             unit_s, _ = _time_unit(whole)
             for axis in axes[:3, 0]:
                 axis.axvspan(zoom[0] / unit_s, zoom[1] / unit_s, color=HIGHLIGHT, alpha=0.35, lw=0)
-            axes[0, 0].set_title("Whole run", loc="left", fontsize=10)
+            part = _part_words((whole[1] - whole[0]) / WINDOWS)
+            axes[0, 0].set_title(f"Whole run: greatest in each {part}", loc="left", fontsize=10)
             axes[0, 1].set_title(zoomed, loc="left", fontsize=10)
         for axis, label in zip(axes[:, 0], _LABELS, strict=False):
             axis.set_ylabel(label)
@@ -113,9 +168,9 @@ def draw_bench(
             axes[-1, 0].set_ylabel("Retuning", rotation=0, ha="right", va="center")
         figure.align_ylabels()
         handles = axes[0, -1].get_lines()[: len(curves)]
-        figure.legend(
+        whole_figure.legend(
             handles,
-            [curve.label for curve in curves],
+            [bar.name for bar in bars[-len(curves) :]] or [curve.label for curve in curves],
             loc="outside lower left",
             ncols=len(curves),
             frameon=False,
@@ -145,27 +200,80 @@ def _around(centre_s: float, whole: tuple[float, float]) -> tuple[float, float]:
     return start_s, start_s + ZOOM_S
 
 
+def _part_words(part_s: float) -> str:
+    """Length of a part of the run, in words."""
+    return f"{part_s:.0f} s" if part_s >= 2 else f"{part_s:.1f} s"
+
+
+def _draw_bars(figure: "SubFigure", bars: Sequence[BenchBar]) -> None:
+    """Draw how much the ship rolled in each run, and what power that took."""
+    rolls, powers = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
+    places = range(len(bars))
+    for axis, label, values, words in (
+        (
+            rolls,
+            "Roll, RMS (°)",
+            [None if bar.roll_rad is None else float(np.degrees(bar.roll_rad)) for bar in bars],
+            [bar.said for bar in bars],
+        ),
+        (
+            powers,
+            "Shaft power, mean",
+            [bar.power_w for bar in bars],
+            [bar.cost for bar in bars],
+        ),
+    ):
+        most = max((value for value in values if value is not None), default=0.0) or 1.0
+        axis.barh(places, [value or 0.0 for value in values], 0.62,
+                  color=[bar.color for bar in bars])  # fmt: skip
+        for place, value, word in zip(places, values, words, strict=True):
+            axis.text((value or 0.0) + 0.012 * most, place, word, va="center", fontsize=10)
+        axis.set_xlim(0.0, 1.45 * most)
+        axis.set_title(label, loc="left", fontsize=10)
+        axis.grid(visible=False)
+        axis.spines["bottom"].set_visible(False)
+        axis.set_xticks([])
+    rolls.set_yticks(places, [bar.name for bar in bars])
+    rolls.tick_params(axis="y", length=0, labelcolor="black")
+    powers.tick_params(axis="y", length=0)
+    rolls.invert_yaxis()
+
+
 def _time_unit(span_s: tuple[float, float]) -> tuple[float, str]:
     """Return the unit of a time axis: its length in s, and its name."""
     return (60.0, "min") if span_s[1] - span_s[0] > 600.0 else (1.0, "s")
 
 
 def _draw_column(
-    axes: "Sequence[Axes]", curves: Sequence[BenchCurve], span_s: tuple[float, float]
+    axes: "Sequence[Axes]",
+    curves: Sequence[BenchCurve],
+    span_s: tuple[float, float],
+    *,
+    as_they_were: bool,
 ) -> None:
-    """Draw roll, level and pressure over one span of time."""
+    """Draw roll, level and pressure over one span of time, or their greatest values."""
     unit_s, unit = _time_unit(span_s)
-    width = 0.5 if unit_s > 1 else 1.4
-    for curve, color in zip(curves, COLORS, strict=False):
+    for curve, color, dashes in zip(curves, COLORS, _DASHES, strict=False):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
         time = curve.time_s[shown] / unit_s
         values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
         for axis, value in zip(axes, values, strict=False):
-            axis.plot(time, value[shown], color=color, linewidth=width)
+            x, y = (time, value[shown]) if as_they_were else _greatest(time, value[shown])
+            axis.plot(x, y, color=color, linewidth=1.4, linestyle=dashes)
+    if not as_they_were:
+        for axis in axes[: len(values)]:
+            axis.set_ylim(bottom=0.0)
     if len(axes) > len(values):
         _draw_lanes(axes[-1], curves, span_s)
     axes[-1].set_xlim(span_s[0] / unit_s, span_s[1] / unit_s)
     axes[-1].set_xlabel(f"Time ({unit})")
+
+
+def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle of each part of a record, and the greatest absolute value in it."""
+    parts = np.array_split(np.arange(len(time)), min(WINDOWS, len(time)))
+    greatest = [np.abs(value[part]).max() for part in parts]
+    return np.array([time[part].mean() for part in parts]), np.array(greatest)
 
 
 def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float, float]) -> None:

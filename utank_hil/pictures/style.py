@@ -23,6 +23,8 @@ COLORS: Final = (
     "#E69F00",
     "#000000",
 )
+NO_TANK: Final = "#BBBBBB"
+WRONG: Final = "#A40000"
 HIGHLIGHT: Final = "#F0E442"
 STYLE: "Final[dict[RcKeyType, Any]]" = {
     "font.size": 10.0,
