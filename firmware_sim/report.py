@@ -18,12 +18,13 @@ from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.telemetry import write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
-REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES)
+REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 
 
 def endings(result: BenchResult) -> list[str]:
@@ -76,6 +77,7 @@ def as_json(
         "not_run": list(result.not_run),
         "wall_s": result.wall_s,
         "exit_code": exit_code(result),
+        "endings": endings(result),
         "limits_passed": passed_limits(result),
         "no_tank": asdict(bare) | {"capsized_s": _finite(result.without_tank_capsized_s)},
         "on_board": on_board_json(result),
@@ -120,12 +122,12 @@ def _retuning_json(result: BenchResult, run: Run) -> dict[str, Any] | None:
 def write_report(
     result: BenchResult, folder: Path, about: Mapping[str, Any]
 ) -> tuple[dict[str, Path], list[str]]:
-    """Write picture, recording and figures of a bench, each with where it comes from (`about`).
+    """Write picture, recording, figures and report of a bench, with where it comes from (`about`).
 
     Returns
     -------
     files : dict
-        Path of each that was written: "picture", "recording", "figures".
+        Path of each that was written: "picture", "recording", "figures", "report".
     failures : list of str
         What could not be written, and why.
     """
@@ -139,11 +141,12 @@ def write_report(
     for name, file, write in (
         ("picture", PICTURE, _draw),
         ("recording", RECORDING, _record),
-        ("figures", FIGURES, write_figures),  # last, because they name the others
+        ("figures", FIGURES, write_figures),  # after those that they name
+        ("report", PAGE, lambda _result, path, _about: write_page([folder], path)),
     ):
         try:
             write(result, folder / file, about)
-        except (OSError, RuntimeError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
             failures.append(f"the {name} could not be written: {error}")
         else:
             files[name] = folder / file

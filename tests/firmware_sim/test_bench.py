@@ -3,6 +3,7 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
+from utank_hil.provenance import describe
 from utank_hil.telemetry import read_recording
 
 pytestmark = pytest.mark.slow
@@ -40,6 +42,10 @@ def storm() -> tuple[BenchResult, list[tuple[str, float]]]:
         lambda name, done_s: progress.append((name, done_s)),
     )
     return result, progress
+
+
+def about(result: BenchResult, folder: Path) -> dict[str, Any]:
+    return describe("bench", result.scenario, folder, options={}, seed=result.seed)
 
 
 def test_every_run_has_its_rows_on_one_grid_and_the_passive_one_comes_first(storm) -> None:
@@ -149,7 +155,7 @@ def test_figures_follow_from_the_rows(storm) -> None:
 
 def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Path) -> None:
     result, _ = storm
-    files, failures = write_report(result, tmp_path, {})
+    files, failures = write_report(result, tmp_path, about(result, tmp_path))
     assert failures == []
     assert files["picture"].read_bytes().startswith(b"\x89PNG")
     recording = read_recording(files["recording"])
@@ -160,9 +166,15 @@ def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Pat
                 recording[run.name][name], run.column(name), rtol=1e-6, atol=1e-6, err_msg=name
             )
     told = json.loads(files["figures"].read_text(), parse_constant=pytest.fail)
-    assert told == json.loads(json.dumps(as_json(result, files, {}), allow_nan=False))
+    known = {name: path for name, path in files.items() if name != "report"}
+    expected = as_json(result, known, about(result, tmp_path))
+    assert told | {"date": ""} == json.loads(json.dumps(expected, allow_nan=False)) | {"date": ""}
     assert [run["name"] for run in told["runs"]] == list(recording)
     assert told["files"]["picture"] == str(files["picture"])
+    page = files["report"].read_text(encoding="utf-8")
+    for run in told["runs"]:
+        assert f"<td>{run['name']}</td>" in page
+        assert f"<td>{math.degrees(run['roll']['rms_rad']):.2f}</td>" in page
     assert all(run["compared"] and run["rows"] == run["expected_rows"] for run in told["runs"])
 
 
@@ -170,7 +182,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
     result, _ = storm
     drawn: list[BenchCurve] = []
     monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
-    write_report(result, tmp_path, {})
+    write_report(result, tmp_path, about(result, tmp_path))
     cells = [list(column.cells) for column in motion_table(result).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
     for run, curve in zip(result.runs, drawn, strict=True):
@@ -186,10 +198,9 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
 def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path: Path) -> None:
     result, _ = storm
     (tmp_path / "bench.rrd").mkdir()
-    files, failures = write_report(result, tmp_path, {})
+    files, failures = write_report(result, tmp_path, about(result, tmp_path))
     assert set(files) == {"picture", "figures"}
-    assert len(failures) == 1
-    assert "recording" in failures[0]
+    assert [failure.split()[1] for failure in failures] == ["recording", "report"]
     assert set(json.loads(files["figures"].read_text())["files"]) == {"picture", "figures"}
 
 

@@ -10,6 +10,7 @@ from utank_hil.commands.exit_codes import ExitCode
 EXTRA_OF: Final = {
     "clarabel": "bench",
     "control": "bench",
+    "jinja2": "bench",
     "matplotlib": "bench",
     "numba": "bench",
     "pyarrow": "viewer",

@@ -10,7 +10,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
-from utank_hil.pictures.style import COLORS, HIGHLIGHT, WRONG, picture
+from utank_hil.pictures.style import COLORS, DASHES, HIGHLIGHT, WRONG, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 ZOOM_S: Final = 180.0
 WINDOWS: Final = 60
 """Of the whole run, in each of which the greatest value is shown: a curve of an hour is a block."""
-_DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
-"""Of the runs, so that they can be told in print without colours."""
 _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.IDENTIFY: ("identification", 0.25),
     RetuningState.DESIGN: ("design", 0.4),
@@ -253,7 +251,7 @@ def _draw_column(
 ) -> None:
     """Draw roll, level and pressure over one span of time, or their greatest values."""
     unit_s, unit = _time_unit(span_s)
-    for curve, color, dashes in zip(curves, COLORS, _DASHES, strict=False):
+    for curve, color, dashes in zip(curves, COLORS, DASHES, strict=False):
         shown = (curve.time_s >= span_s[0]) & (curve.time_s <= span_s[1])
         time = curve.time_s[shown] / unit_s
         values = (np.rad2deg(curve.roll_rad), curve.level_m, curve.pressure_pa / 1e3)
@@ -272,7 +270,7 @@ def _draw_column(
 def _greatest(time: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Middle of each part of a record, and the greatest absolute value in it."""
     parts = np.array_split(np.arange(len(time)), min(WINDOWS, len(time)))
-    greatest = [np.abs(value[part]).max() for part in parts]
+    greatest = [np.fmax.reduce(np.abs(value[part])) for part in parts]  # NaN where all are
     return np.array([time[part].mean() for part in parts]), np.array(greatest)
 
 

@@ -23,6 +23,8 @@ COLORS: Final = (
     "#E69F00",
     "#000000",
 )
+DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
+"""Of the curves with these colours, so that they can be told in print without them."""
 NO_TANK: Final = "#BBBBBB"
 WRONG: Final = "#A40000"
 HIGHLIGHT: Final = "#F0E442"

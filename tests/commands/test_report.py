@@ -1,0 +1,131 @@
+"""The report of a recording, read back from its page; that of a bench is in tests/firmware_sim."""
+
+import base64
+import io
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.cli import app
+from utank_hil.commands.report import write_page
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
+from utank_hil.provenance import describe
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import write_recording
+
+pytestmark = pytest.mark.slow
+
+ACTIVE_FROM_S, FAULT_FROM_S, END_S = 20.0, 200.0, 240.0
+
+
+class _Links(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.targets += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that was in charge and then stopped on a full reservoir."""
+    folder = tmp_path_factory.mktemp("log")
+    time_s = np.arange(0.0, END_S, 0.01)
+    rows = np.zeros((len(time_s), len(SIGNALS)))
+
+    def fill(name: str, values: object) -> None:
+        rows[:, SIGNALS.index(name)] = values
+
+    fill("time_s", time_s)
+    fill("roll_rad", 0.03 * np.sin(0.5 * time_s))
+    fill("twin_roll_rad", 0.06 * np.sin(0.5 * time_s + 1.0))
+    fill("starboard_level_m", np.sin(0.5 * time_s))
+    fill("mode", np.where(time_s < ACTIVE_FROM_S, Mode.STANDBY, Mode.ACTIVE))
+    fill("fault", np.where(time_s < FAULT_FROM_S, Fault.NONE, Fault.LEVEL_LIMIT))
+    rows[time_s >= FAULT_FROM_S, SIGNALS.index("mode")] = Mode.FAULT
+    config = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig)
+    about = describe("run", config, folder, options={"bus": "can0"})
+    file = folder / "run-20260101T000000Z.rrd"
+    write_recording(file, SIGNALS, {"run": rows}, about=about)
+    event = {
+        "time_s": FAULT_FROM_S, "event": "alarm", "state": "RAISED", "fault": "LEVEL_LIMIT",
+        "happened": "A reservoir is <full>.", "remedy": "Look at it.",
+    }  # fmt: skip
+    log = folder / "log-20260101T000000Z.jsonl"
+    log.write_text(json.dumps(event) + "\n" + '{"time_s": 3.0, "ev', encoding="utf-8")
+    return file
+
+
+def test_the_page_of_a_recording_says_what_happened(recording: Path, tmp_path: Path) -> None:
+    page = write_page([recording], tmp_path / "page.html").read_text(encoding="utf-8")
+    rms = math.degrees(0.03 / math.sqrt(2))
+    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of her passive twin" in page
+    assert "In charge for 75% of the time" in page
+    assert 'class="verdict bad"' in page
+    assert "A reservoir is &lt;full&gt;. Look at it." in page
+    for begin, mode in ((0.0, "STANDBY"), (20.0, "ACTIVE"), (200.0, "FAULT")):
+        assert re.search(rf"{begin:.1f} s</td><td[^>]*>{mode}<", page)
+    assert "kind: gpc" in page  # the whole configuration
+
+
+def test_the_page_needs_nothing_else_and_is_whole(recording: Path, tmp_path: Path) -> None:
+    written = write_page([recording], tmp_path / "page.html")
+    assert written.stat().st_size < 5e6
+    page = written.read_text(encoding="utf-8")
+    links = _Links()
+    links.feed(page)
+    assert links.open == []
+    assert "http" not in page.replace("https://", "http://").split("<details>")[0]
+    assert len(links.targets) == 2
+    for target in links.targets:
+        kind, _, content = target.partition(",")
+        assert kind == "data:image/png;base64"
+        image = matplotlib.image.imread(io.BytesIO(base64.b64decode(content)), format="png")
+        assert np.std(image[..., :3]) > 0.05
+
+
+def test_cells_are_escaped(tmp_path: Path) -> None:
+    table = ReportTable(["", "<b>"], [["a & b", "<script>"]])
+    section = ReportSection("<i>", ["<u>"], tables=[table], listings={"<x>": "<y>"})
+    page = write_report_page(
+        tmp_path / "a.html", "<t>", "<a>", [Verdict(["<v>"], good=True)], [section]
+    ).read_text(encoding="utf-8")
+    for text in ("<b>", "<script>", "<i>", "<u>", "<x>", "<y>", "<t>", "<a>", "<v>"):
+        assert text not in page.partition("<body>")[2]
+    assert 'class="verdict"' in page
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("nothing", "is not there"), ("empty", "holds no bench.json"), ("text.rrd", "text.rrd")],
+)
+def test_what_is_no_run_is_named(tmp_path: Path, name: str, expected: str) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.rrd").write_text("no recording")
+    with pytest.raises((ValueError, OSError)) as caught:
+        write_page([tmp_path / name], tmp_path / "page.html")
+    assert expected in str(caught.value)
+    assert str(tmp_path / name) in str(caught.value)
+
+
+def test_the_command_prints_the_page(recording: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["report", str(recording), "--out", str(page), "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout) == {"page": str(page), "bytes": page.stat().st_size}

@@ -1,0 +1,168 @@
+"""What a report says of a recording of ``utank-hil run``: the ship, her twin, alarms, deadlines."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from utank_hil.analysis.motion.statistics import roll_statistics
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.commands.report_parts import about_section, roll_figure
+from utank_hil.pictures import BenchCurve, draw_bench
+from utank_hil.pictures.report_page import (
+    ReportPicture,
+    ReportSection,
+    ReportTable,
+    Verdict,
+)
+from utank_hil.runtime.faults import fault_text
+
+STEP_S: Final = 0.05
+"""Between the samples that are drawn: ample for a ship."""
+RUN, LOG = "run-", "log-"
+"""Beginnings of the names of a run's recording and of its log of alarms."""
+
+
+def recording_sections(file: Path, scratch: Path) -> tuple[str, str, Verdict, list[ReportSection]]:
+    """Title, line below it, verdict and sections of a recording's report.
+
+    Parameters
+    ----------
+    file : Path
+        The `.rrd` file of ``utank-hil run --out``. Its log of alarms is looked for beside it.
+    scratch : Path
+        Folder for pictures that are made for the report.
+
+    Raises
+    ------
+    OSError, ValueError
+        If the file is no recording.
+    """
+    from utank_hil.telemetry.recording import read_about, read_recording
+
+    ((name, rows),) = list(read_recording(file).items())[:1]
+    try:
+        about: dict[str, Any] | None = read_about(file)
+    except ValueError:
+        about = None
+    duration_s = float(rows["time_s"][-1] - rows["time_s"][0])
+    alarms = _alarms(file)
+    sections = [
+        ReportSection("Roll, level and pressure", pictures=[_histories(rows, scratch, file.stem)]),
+        ReportSection("Modes", tables=[_modes(rows)]),
+        _alarm_section(alarms, file),
+    ]
+    rolls = {"passive twin": rows["twin_roll_rad"], "ship": rows["roll_rad"]}
+    known = {each: roll for each, roll in rolls.items() if np.isfinite(roll).all()}
+    step_s = float(np.median(np.diff(rows["time_s"])))
+    sections.append(roll_figure(known, step_s, scratch))
+    sections.append(_deadlines(rows))
+    if about is not None:
+        sections.append(about_section(about, about["configuration"]))
+    title = (about or {}).get("configuration", {}).get("name", name)
+    below = f"Recording {file.name}, {duration_s:.0f} s" + (f", {about['date']}." if about else ".")
+    return f"{title}: run", below, _verdict(rows, alarms), sections
+
+
+def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdict:
+    lines = []
+    active = rows["mode"] == Mode.ACTIVE
+    if active.any():
+        roll = roll_statistics(rows["roll_rad"][active])
+        line = f"In charge for {active.mean():.0%} of the time: {_degrees(roll.rms_rad)} RMS"
+        twin_rad = rows["twin_roll_rad"][active]
+        if np.isfinite(twin_rad).all() and (twin := float(np.sqrt(np.mean(twin_rad**2)))) > 0:
+            share = 1 - roll.rms_rad / twin
+            line += (
+                f", {abs(share):.0%} {'less' if share >= 0 else 'more'} than the "
+                f"{_degrees(twin)} of her passive twin"
+            )
+        lines.append(f"{line}; {_degrees(roll.maximum_rad)} at most.")
+    else:
+        lines.append("The controller was never in charge.")
+    faults = [Fault(int(code)) for code in np.unique(rows["fault"]) if code != Fault.NONE]
+    lines += [fault_text(fault) for fault in faults]
+    raised = {alarm["fault"] for alarm in alarms if alarm.get("state")}
+    lines += [f"Alarm: {name}." for name in sorted(raised - {fault.name for fault in faults})]
+    return Verdict(lines, good=not (faults or raised))
+
+
+def _degrees(angle_rad: float) -> str:
+    return f"{math.degrees(angle_rad):.2f}°"
+
+
+def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> ReportPicture:
+    every = max(1, round(STEP_S / float(np.median(np.diff(rows["time_s"])))))
+    thin = {name: values[::every] for name, values in rows.items()}
+    level_m = (thin["starboard_level_m"] - thin["port_level_m"]) / 2
+    nothing = np.full_like(level_m, np.nan)
+    file = draw_bench(
+        [
+            BenchCurve("passive twin", thin["time_s"], thin["twin_roll_rad"], nothing, nothing),
+            BenchCurve(
+                "ship", thin["time_s"], thin["roll_rad"], level_m, thin["pressure_actual_pa"]
+            ),
+        ],
+        scratch / "histories.png",
+        title,
+    )
+    says = "Roll of the ship and of her passive twin, level and pressure"
+    return ReportPicture(file.read_bytes(), says)
+
+
+def _modes(rows: dict[str, FloatArray]) -> ReportTable:
+    """When which mode and fault began."""
+    state = np.column_stack([rows["mode"], rows["fault"]])
+    begins = np.flatnonzero(np.any(np.diff(state, axis=0, prepend=np.nan) != 0, axis=1))
+    table = [
+        [
+            f"{rows['time_s'][row]:.1f} s",
+            Mode(int(rows["mode"][row])).name,
+            "" if rows["fault"][row] == Fault.NONE else fault_text(Fault(int(rows["fault"][row]))),
+        ]
+        for row in begins
+    ]
+    return ReportTable(["from", "mode", "fault"], table, text=True)
+
+
+def _alarms(file: Path) -> list[dict[str, Any]]:
+    """Events of the run's log, if there is one; a last line that was cut is left out."""
+    log = file.with_name(file.name.replace(RUN, LOG, 1)).with_suffix(".jsonl")
+    found = []
+    if log.exists() and log != file:
+        for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:
+                found.append(json.loads(line))
+            except ValueError:
+                break
+    return [event for event in found if event.get("event") != "retuning"]
+
+
+def _alarm_section(alarms: list[dict[str, Any]], file: Path) -> ReportSection:
+    if not alarms:
+        return ReportSection("Alarms", [f"None in the log of {file.name}."])
+    rows = [
+        [
+            f"{alarm['time_s']:.1f} s",
+            alarm["fault"],
+            alarm["state"] or alarm["event"],
+            f"{alarm['happened']} {alarm['remedy']}",
+        ]
+        for alarm in alarms
+    ]
+    return ReportSection("Alarms", tables=[ReportTable(["at", "", "", ""], rows, text=True)])
+
+
+def _deadlines(rows: dict[str, FloatArray]) -> ReportSection:
+    late_us = 1e6 * rows["wakeup_lateness_s"]
+    figures = [
+        ["late by, median", f"{np.median(late_us):.0f} µs"],
+        ["late by, 99.9 %", f"{np.percentile(late_us, 99.9):.0f} µs"],
+        ["late by, at most", f"{late_us.max():.0f} µs"],
+        ["tick took, 99.9 %", f"{1e6 * np.percentile(rows['tick_duration_s'], 99.9):.0f} µs"],
+        ["deadlines missed", f"{rows['overruns'].max():.0f}"],
+    ]
+    return ReportSection("Deadlines", tables=[ReportTable(["", ""], figures)])

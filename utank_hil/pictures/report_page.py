@@ -1,0 +1,111 @@
+"""A report as one HTML page that needs nothing else: texts, tables and pictures in it."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+_TEMPLATE: Final = Path(__file__).with_name("report.html.jinja")
+
+
+@dataclass(frozen=True, slots=True)
+class ReportTable:
+    """A table: the first column names the rows.
+
+    Attributes
+    ----------
+    headings : sequence of str
+    rows : sequence of sequence of str
+    caption : str
+    text : bool
+        Whether the cells are sentences and not figures.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+    text: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ReportPicture:
+    """A picture.
+
+    Attributes
+    ----------
+    png : bytes
+        Content of the `.png` file.
+    says : str
+        What it shows, for who can't see it.
+    """
+
+    png: bytes
+    says: str
+
+    @property
+    def base64(self) -> str:
+        """The content as the page holds it."""
+        return base64.b64encode(self.png).decode()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is said first of all.
+
+    Attributes
+    ----------
+    lines : sequence of str
+    good : bool
+        Whether nothing was wrong.
+    """
+
+    lines: Sequence[str]
+    good: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ReportSection:
+    """A section of a report; `listings` are long texts by name, folded."""
+
+    title: str
+    texts: Sequence[str] = ()
+    pictures: Sequence[ReportPicture] = ()
+    tables: Sequence[ReportTable] = ()
+    listings: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_report_page(
+    path: Path,
+    title: str,
+    about: str,
+    verdicts: Sequence[Verdict],
+    sections: Sequence[ReportSection],
+) -> Path:
+    """Write the page; return its path.
+
+    Parameters
+    ----------
+    path : Path
+        The `.html` file; overwritten.
+    title, about : str
+        Heading, and the line below it.
+    verdicts : sequence of Verdict
+        Of each run that is reported.
+    sections : sequence of ReportSection
+
+    Raises
+    ------
+    OSError
+        If the page can't be written.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
+        title=title, about=about, verdicts=verdicts, sections=sections
+    )
+    path.write_text(page, encoding="utf-8")
+    return path

@@ -1,0 +1,72 @@
+"""Figure of rolls as statistics: at which periods, and how often it is how great."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from utank_hil.analysis.motion.exceedance import exceedance
+from utank_hil.arrays import FloatArray
+from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, picture
+
+SEGMENT_S: Final = 200.0
+"""Of Welch's spectra: 0.03 rad/s apart."""
+LONGEST_S, SHORTEST_S = 40.0, 3.0
+"""Periods that are shown."""
+
+
+def draw_roll_statistics(
+    rolls: Mapping[str, FloatArray], step_s: float, path: Path, title: str
+) -> Path:
+    """Draw spectra of the roll over its period, and shares of its amplitudes above each angle.
+
+    Parameters
+    ----------
+    rolls : mapping of str to ndarray, shape (n,)
+        Rolls in radians by name, in the order of the colours; one without colour, "no tank", may
+        come first.
+    step_s : float
+        Sample time.
+    path : Path
+        The `.png` file; overwritten.
+    title : str
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    from scipy.signal import welch
+
+    colors = [NO_TANK, *COLORS] if "no tank" in rolls else list(COLORS)
+    dashes = ["-", *DASHES] if "no tank" in rolls else list(DASHES)
+    with picture(path, title, (13.0, 4.6)) as figure:
+        spectra, shares = figure.subplots(1, 2)
+        for (name, roll_rad), color, dash in zip(rolls.items(), colors, dashes, strict=False):
+            degrees = np.rad2deg(roll_rad)
+            frequency_hz, density = welch(
+                degrees, 1 / step_s, nperseg=min(len(degrees), round(SEGMENT_S / step_s))
+            )
+            shown = (frequency_hz > 1 / LONGEST_S) & (frequency_hz < 1 / SHORTEST_S)
+            style = {"color": color, "linestyle": dash, "linewidth": 1.5}
+            spectra.plot(1 / frequency_hz[shown], density[shown], label=name, **style)
+            levels = np.linspace(0.0, np.abs(degrees).max(), 60)
+            try:
+                share = exceedance(degrees, levels)
+            except ValueError:  # no half-cycle in it
+                continue
+            shares.plot(levels, np.where(share > 0, 100 * share, np.nan), **style)
+        spectra.set_xscale("log")
+        ticks = [4, 5, 6, 8, 10, 12, 15, 20, 30]
+        spectra.set_xticks(ticks, [str(tick) for tick in ticks])
+        spectra.minorticks_off()
+        spectra.set_xlabel("Period (s)")
+        spectra.set_ylabel("Spectrum of the roll (°²/Hz)")
+        spectra.set_ylim(bottom=0.0)
+        shares.set_yscale("log")
+        shares.set_xlabel("Single amplitude of the roll (°)")
+        shares.set_ylabel("Share of amplitudes above it (%)")
+        shares.set_xlim(left=0.0)
+        figure.legend(loc="outside lower left", ncols=len(rolls), frameon=False)
+    return path
