@@ -46,7 +46,9 @@ class _Commands(TyperGroup):
 
 
 app = new_app(
-    "Hardware-in-the-loop controller stack for active U-tube anti-roll tanks.", cls=_Commands
+    "Hardware-in-the-loop controller stack for active U-tube anti-roll tanks.",
+    cls=_Commands,
+    completion=True,
 )
 
 

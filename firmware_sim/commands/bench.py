@@ -18,6 +18,7 @@ from utank_hil.commands.common import (
     Json,
     View,
     fail,
+    lead_on,
     load,
     notes,
     prepare_out,
@@ -140,6 +141,7 @@ def bench(
             )
         for name, path in files.items():
             console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+        lead_on(console, f"bench {shown(scenario)} --view", "run CONTROLLER.yaml --bus can0")
     if failures:
         fail("; ".join(failures))
     if view:

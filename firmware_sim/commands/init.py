@@ -14,7 +14,7 @@ from rich.table import Table
 
 from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
-from utank_hil.commands.common import Json, fail, notes, prepare_out, shown
+from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, shown
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.parameters import ParameterError
@@ -157,9 +157,8 @@ def init(
         console.print(f"[yellow]little help:[/yellow] {little}", soft_wrap=True)
     for path in files.values():
         console.print(f"written: {shown(path)}", soft_wrap=True)
-    console.print("Next:")
-    for command, file in (("check", "controller.yaml"), ("bench", "scenario.yaml")):
-        console.print(f"  utank-hil {command} {shown(files[file])}", soft_wrap=True)
+    steps = (("check", "controller.yaml"), ("bench", "scenario.yaml"))
+    lead_on(console, *(f"{command} {shown(files[file])}" for command, file in steps))
 
 
 def _little_help(project: "StarterProject") -> str | None:

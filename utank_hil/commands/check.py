@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 from pydantic import BaseModel
+from rich.console import Console
 
-from utank_hil.commands.common import Json, fail, load, warnings_of
+from utank_hil.commands.common import Json, fail, lead_on, load, shown, warnings_of
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
 from utank_hil.configuration.controller import ControllerConfig
@@ -65,3 +66,6 @@ def check(
         sys.stdout.write(json.dumps({"kind": kind, **content, "warnings": unusual}) + "\n")
     if not content.get("accepted", True):
         raise typer.Exit(ExitCode.REFUSED)
+    if not json_:
+        following = {"ship": "design tank {}", "controller": "run {} --bus can0"}
+        lead_on(Console(), following.get(kind, "bench {}").format(shown(config)))

@@ -58,12 +58,14 @@ Duration = Annotated[
 notes: Final = Console(stderr=True, highlight=False)
 
 
-def new_app(help_text: str | None = None, cls: type[TyperGroup] = TyperGroup) -> typer.Typer:
-    """A command line in the project's style."""
+def new_app(
+    help_text: str | None = None, cls: type[TyperGroup] = TyperGroup, *, completion: bool = False
+) -> typer.Typer:
+    """A command line in the project's style; `completion` adds what installs that of the shell."""
     return typer.Typer(
         cls=cls,
         no_args_is_help=True,
-        add_completion=False,
+        add_completion=completion,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -135,6 +137,13 @@ def prepare_out(folder: Path, files: Iterable[str]) -> None:
     reason = why_not_writable(folder, files)
     if reason is not None:
         fail(f"{reason}; choose another folder with --out")
+
+
+def lead_on(console: Console, *commands: str) -> None:
+    """Print which commands come next, the last thing that a command says."""
+    console.print("Next:")
+    for command in commands:
+        console.print(f"  utank-hil {escape(command)}", soft_wrap=True)
 
 
 def shown(path: Path) -> str:

@@ -16,7 +16,17 @@ from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
-from utank_hil.commands.common import OUT, Duration, Json, View, fail, load, notes, shown
+from utank_hil.commands.common import (
+    OUT,
+    Duration,
+    Json,
+    View,
+    fail,
+    lead_on,
+    load,
+    notes,
+    shown,
+)
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
@@ -202,6 +212,8 @@ def _print_summary(
         console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:
         _tell(console, recording.summary)
+        if recording.summary.file is not None and recording.summary.error is None:
+            lead_on(console, f"report {shown(Path(recording.summary.file))}")
 
 
 def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
