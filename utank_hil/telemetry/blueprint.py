@@ -14,15 +14,24 @@ from utank_hil.telemetry.rerun_log import (
     COMPONENT,
     STATE_COLUMNS,
     TIME_COLUMN,
-    TIMELINE,
     has_state,
     log_path,
     run_paths,
     state_path,
 )
+from utank_hil.telemetry.scene import SceneSize, scene_path, words_path
 from utank_hil.telemetry.units import UNITS, Field, Unit, field_of
+from utank_hil.telemetry.viewer import TIMELINE
 
 HALF_WINDOW_S: Final = 60.0
+MOST_SCENES: Final = 4
+"""Of several runs, so many ships are shown side by side."""
+WATCHED: Final = (
+    ("roll_rad", "twin_roll_rad"),
+    ("port_level_m", "starboard_level_m"),
+    ("pressure_command_pa", "pressure_actual_pa"),
+)
+"""Columns of the watch's plots."""
 
 # Okabe and Ito's colour-blind safe palette, in an order for a dark background
 _PALETTE: Final = (
@@ -34,11 +43,19 @@ _PALETTE: Final = (
     (0xCC, 0x79, 0xA7),
 )
 
+_COLOR_NAMES: Final = ("grey", "orange", "blue", "green", "yellow", "pink")
+
 
 def make_blueprint(
-    columns: Sequence[str], runs: Sequence[str], span_s: tuple[float, float] | None = None
+    columns: Sequence[str],
+    runs: Sequence[str],
+    span_s: tuple[float, float] | None = None,
+    size: SceneSize | None = None,
 ) -> rrb.Blueprint:
-    """Lay out the plots of one run, or of several on one time line.
+    """Lay out the views of one run, or of several on one time line.
+
+    In the first tab, for the watch, the ship's section rolls beside words and a few plots around
+    the cursor. The others, for the engineer, have every signal.
 
     Parameters
     ----------
@@ -49,21 +66,26 @@ def make_blueprint(
     span_s : (float, float), optional
         First and last time of a finished recording, shown in one tab as a whole and in another
         around the cursor. By default the view is live and follows the newest data.
+    size : SceneSize, optional
+        Of the scenes, if the runs have any; without, there is no tab for the watch.
     """
     boundary = rr.TimeRangeBoundary
-    body: rrb.Container
     if span_s is None:
-        since = boundary.cursor_relative(seconds=-2 * HALF_WINDOW_S)
-        body = _page("Live", since, boundary.cursor_relative(), columns, runs)
+        around = boundary.cursor_relative(seconds=-3 * HALF_WINDOW_S), boundary.cursor_relative()
+        pages: list[rrb.Container] = [_page("Live", *around, columns, runs)]
     else:
         first, last = (boundary.absolute(seconds=time_s) for time_s in span_s)
-        before, after = (
-            boundary.cursor_relative(seconds=seconds) for seconds in (-HALF_WINDOW_S, HALF_WINDOW_S)
+        around = (
+            boundary.cursor_relative(seconds=-HALF_WINDOW_S),
+            boundary.cursor_relative(seconds=HALF_WINDOW_S),
         )
-        body = rrb.Tabs(
+        pages = [
             _page("Whole run", first, last, columns, runs),
-            _page("At the cursor", before, after, columns, runs),
-        )
+            _page("At the cursor", *around, columns, runs),
+        ]
+    if size is not None:
+        pages.insert(0, _watch(*around, runs, size))
+    body = rrb.Tabs(*pages, active_tab=0)
     return rrb.Blueprint(
         body,
         rrb.TimePanel(
@@ -72,6 +94,50 @@ def make_blueprint(
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
     )
+
+
+def _watch(
+    start: rr.TimeRangeBoundary,
+    end: rr.TimeRangeBoundary,
+    runs: Sequence[str],
+    size: SceneSize,
+) -> rrb.Container:
+    """Lay out the ships, words below them, and the plots that a watch-keeper needs."""
+    axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
+    bounds = rrb.VisualBounds2D(
+        x_range=[-size.reach_m, size.reach_m], y_range=list(size.height_range_m)
+    )
+    shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SCENES]
+    scenes = [
+        rrb.Spatial2DView(origin=scene_path(path), name=run, visual_bounds=bounds)
+        for path, run in shown
+    ]
+    words = [rrb.TextDocumentView(origin=words_path(path), name=run) for path, run in shown]
+    if len(shown) == 1:
+        plots = [_watched_plot([field_of(name) for name in names], runs, axis) for names in WATCHED]
+        ship = rrb.Vertical(*scenes, *words, row_shares=[3, 2])
+        return rrb.Horizontal(ship, rrb.Vertical(*plots), column_shares=[1, 1], name="Watch")
+    return rrb.Vertical(
+        rrb.Horizontal(*scenes),
+        rrb.Horizontal(*words),
+        _watched_plot([field_of(WATCHED[0][0])], runs[:MOST_SCENES], axis),
+        row_shares=[4, 2, 4],
+        name="Watch",
+    )
+
+
+def _watched_plot(
+    fields: Sequence[Field], runs: Sequence[str], axis: rrb.TimeAxis
+) -> rrb.TimeSeriesView:
+    """A plot that names its colours in its title: a legend would hide what it is about."""
+    plot = _plot(fields[0].unit, fields, runs, axis, legend=False)
+    labels = runs if len(runs) > 1 else _short_labels([field.label for field in fields])
+    names = _COLOR_NAMES if len(runs) > 1 else _COLOR_NAMES[1:]
+    told = ", ".join(
+        f"{label or fields[0].label} {name}" for label, name in zip(labels, names, strict=False)
+    )
+    plot.name = f"{fields[0].unit.plot}: {told}"
+    return plot
 
 
 def _page(

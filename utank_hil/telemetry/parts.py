@@ -13,6 +13,7 @@ from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, time_index, write_about
 from utank_hil.telemetry.rotation import Rotation, remove_oldest
+from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.viewer import LOOPBACK
 
 LIVE_RUN: Final = "live"
@@ -133,10 +134,15 @@ class RecordingParts(Closing):
         self, sink: rr.FileSink | rr.GrpcServerSink, name: str
     ) -> tuple[rr.RecordingStream, RunLog]:
         recording = rr.RecordingStream(APPLICATION, recording_id=name)
-        recording.set_sinks(sink, default_blueprint=make_blueprint(self._columns, [LIVE_RUN]))
+        recording.set_sinks(
+            sink,
+            default_blueprint=make_blueprint(
+                self._columns, [LIVE_RUN], size=scene_size(self._columns, self._about)
+            ),
+        )
         if self._about is not None:
             write_about(recording, self._about)
-        return recording, RunLog(recording, run_paths([LIVE_RUN])[0], self._columns)
+        return recording, RunLog(recording, run_paths([LIVE_RUN])[0], self._columns, self._about)
 
     def _end(self) -> None:
         """Finish a file."""

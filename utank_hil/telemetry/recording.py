@@ -22,15 +22,15 @@ from utank_hil.telemetry.rerun_log import (
     ARCHETYPE,
     COMPONENT,
     TIME_COLUMN,
-    TIMELINE,
     RunLog,
     run_of,
     run_paths,
     time_index,
     write_about,
 )
+from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.units import column_of
-from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
+from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
@@ -75,13 +75,15 @@ def write_recording(
         if len(rows) == 0:
             raise ValueError(f"run {run!r} has no rows")
     time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
-    blueprint = make_blueprint(columns, list(runs), span_s=(time_s.min(), time_s.max()))
+    blueprint = make_blueprint(
+        columns, list(runs), span_s=(time_s.min(), time_s.max()), size=scene_size(columns, about)
+    )
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
     if about is not None:
         write_about(recording, about)
     for path_of_run, (run, rows) in zip(run_paths(list(runs)), runs.items(), strict=True):
-        log = RunLog(recording, path_of_run, columns)
+        log = RunLog(recording, path_of_run, columns, about)
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])
         log.write_events((events or {}).get(run, ()))

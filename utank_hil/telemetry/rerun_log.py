@@ -19,11 +19,12 @@ import rerun as rr
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.telemetry.event_ring import Event, event_text, warns
+from utank_hil.telemetry.scene import Scene, scene_size
 from utank_hil.telemetry.units import field_of
+from utank_hil.telemetry.viewer import TIMELINE
 
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
-TIMELINE: Final = "time"
 ABOUT: Final = "about"
 """Property of a recording that says where it comes from (`utank_hil.provenance`), as JSON."""
 ARCHETYPE: Final = "telemetry"
@@ -69,6 +70,8 @@ class RunLog:
         Entity path of the run, from `run_paths`.
     columns : sequence of str
         Names of a row's values; `time_s` must be among them.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`); with the ship in it there is a scene.
 
     Raises
     ------
@@ -76,8 +79,16 @@ class RunLog:
         If there is no `time_s`, or a column is not in SI units.
     """
 
-    def __init__(self, recording: rr.RecordingStream, path: str, columns: Sequence[str]) -> None:
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        path: str,
+        columns: Sequence[str],
+        about: Mapping[str, Any] | None = None,
+    ) -> None:
         self._recording = recording
+        size = scene_size(columns, about)
+        self._scene = None if size is None else Scene(recording, path, columns, size)
         self._path = path
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
@@ -104,6 +115,8 @@ class RunLog:
         )
         if self._state:
             self._write_state(time_ns, rows[:, self._state])
+        if self._scene is not None:
+            self._scene.write(rows)
 
     def _write_state(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
         """Log the state's name wherever mode or fault changes."""

@@ -1,0 +1,36 @@
+"""Where in a recording something happens."""
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import Fault, RetuningState
+from utank_hil.telemetry.recording import read_recording
+
+
+def highlight_s(file: Path) -> float:
+    """Time of the first fault of any run, else of the first trial of a law, else of most roll.
+
+    Raises
+    ------
+    ValueError
+        If the file is no recording.
+    """
+    runs = list(read_recording(file).values())
+    faults = [_first(rows, rows["fault"] != Fault.NONE) for rows in runs]
+    trials = [_first(rows, rows["retuning"] == RetuningState.TRIAL) for rows in runs]
+    found = min(faults), min(trials), _largest_roll_s(runs)
+    return next(time_s for time_s in found if np.isfinite(time_s))
+
+
+def _first(rows: dict[str, FloatArray], happens: npt.NDArray[np.bool_]) -> float:
+    at = np.flatnonzero(happens)
+    return float(rows["time_s"][at[0]]) if len(at) else np.inf
+
+
+def _largest_roll_s(runs: list[dict[str, FloatArray]]) -> float:
+    rolls = [np.nan_to_num(np.abs(rows["roll_rad"])) for rows in runs]
+    most = int(np.argmax([roll.max() for roll in rolls]))
+    return float(runs[most]["time_s"][np.argmax(rolls[most])])
