@@ -114,5 +114,7 @@ def test_a_recording_opens_at_its_fault_or_else_at_most_roll(tmp_path: Path) -> 
     write_recording(calm, SIGNALS, {"run": rows})
     assert highlight_s(calm) == pytest.approx(math.pi / 2, abs=0.05)
     rows[200:, SIGNALS.index("fault")] = Fault.LEVEL_LIMIT
+    rows[:20, SIGNALS.index("fault")] = Fault.MOTION_SILENT  # awaited at the start
+    rows[:20, SIGNALS.index("mode")] = Mode.INIT
     write_recording(faulty, SIGNALS, {"still": _rows(20.0), "run": rows})
     assert highlight_s(faulty) == pytest.approx(10.0)

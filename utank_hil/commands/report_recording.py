@@ -19,6 +19,7 @@ from utank_hil.pictures.report_page import (
     Verdict,
 )
 from utank_hil.runtime.faults import fault_text
+from utank_hil.telemetry.highlight import in_service
 
 STEP_S: Final = 0.05
 """Between the samples that are drawn: ample for a ship."""
@@ -83,7 +84,8 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
         lines.append(f"{line}; {_degrees(roll.maximum_rad)} at most.")
     else:
         lines.append("The controller was never in charge.")
-    faults = [Fault(int(code)) for code in np.unique(rows["fault"]) if code != Fault.NONE]
+    codes = np.unique(rows["fault"][in_service(rows)])
+    faults = [Fault(int(code)) for code in codes if code != Fault.NONE]
     lines += [fault_text(fault) for fault in faults]
     raised = {alarm["fault"] for alarm in alarms if alarm.get("state")}
     lines += [f"Alarm: {name}." for name in sorted(raised - {fault.name for fault in faults})]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus.enumerations import Fault, RetuningState
+from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.recording import read_recording
 
 
@@ -19,10 +19,16 @@ def highlight_s(file: Path) -> float:
         If the file is no recording.
     """
     runs = list(read_recording(file).values())
-    faults = [_first(rows, rows["fault"] != Fault.NONE) for rows in runs]
+    faults = [_first(rows, in_service(rows) & (rows["fault"] != Fault.NONE)) for rows in runs]
     trials = [_first(rows, rows["retuning"] == RetuningState.TRIAL) for rows in runs]
     found = min(faults), min(trials), _largest_roll_s(runs)
     return next(time_s for time_s in found if np.isfinite(time_s))
+
+
+def in_service(rows: dict[str, FloatArray]) -> npt.NDArray[np.bool_]:
+    """Which rows are not of the start, where what is awaited is a fault until it has come."""
+    started: npt.NDArray[np.bool_] = (rows["mode"] != Mode.INIT) & (rows["mode"] != Mode.STANDBY)
+    return started
 
 
 def _first(rows: dict[str, FloatArray], happens: npt.NDArray[np.bool_]) -> float:
