@@ -10,11 +10,11 @@ import importlib
 import importlib.machinery
 import importlib.util
 import os
+import random
 import resource
 import signal
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -61,12 +61,12 @@ def in_fork(work: Callable[[], bool], limit_s: float) -> bool:
 
 
 class Spread:
-    """A pytest plugin that keeps some variants of each test, evenly spread.
+    """A pytest plugin that keeps some variants of each test, drawn the same way each time.
 
     Parameters
     ----------
     most : int
-        As many at least, and less than twice as many.
+        Of each.
     """
 
     def __init__(self, most: int) -> None:
@@ -74,14 +74,14 @@ class Spread:
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leave out the others."""
-        names = [item.nodeid.partition("[")[0] for item in items]
-        counts, seen = Counter(names), Counter[str]()
-        kept = []
-        for name, item in zip(names, items, strict=True):
-            if seen[name] % max(1, counts[name] // self._most) == 0:
-                kept.append(item)
-            seen[name] += 1
-        items[:] = kept
+        variants: dict[str, list[int]] = {}
+        for index, item in enumerate(items):
+            variants.setdefault(item.nodeid.partition("[")[0], []).append(index)
+        draw = random.Random(1)
+        kept: set[int] = set()
+        for places in variants.values():
+            kept.update(draw.sample(places, min(self._most, len(places))))
+        items[:] = [items[index] for index in sorted(kept)]
 
 
 class Exchange:
