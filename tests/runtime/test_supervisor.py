@@ -275,6 +275,12 @@ def test_without_pressure_no_fault_is_latched(
     assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
 
 
+def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it() -> None:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(**ARMING, drive_out_ms=50.0).arming
+
+
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
 def test_an_arm_edge_without_the_wish_to_be_active_does_not_arm(mode: Mode) -> None:
     for bench in (Bench(), passive_bench()):
@@ -302,10 +308,36 @@ def test_arming_is_given_up_when_the_drive_does_not_enable() -> None:
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
-    for _ in range(202):
+    for _ in range(200):
         bench.tick(requested_mode=Mode.ACTIVE, armed=True)
-    assert bench.supervisor.fault is Fault.DRIVE_FAULT
+        assert bench.supervisor.arming
+        assert bench.supervisor.mode is Mode.STANDBY
+    bench.tick(requested_mode=Mode.ACTIVE, armed=True)
+    assert not bench.supervisor.arming
+    assert (bench.supervisor.mode, bench.supervisor.fault) == (Mode.STANDBY, Fault.DRIVE_FAULT)
     assert not bench.supervisor.drive_wanted
+
+
+def test_active_is_not_arming_any_more_and_forgets_why_it_was_refused_before() -> None:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(**ARMING, high_level=True).fault is Fault.LEVEL_LIMIT
+    bench.tick(**ARMING)
+    supervisor = bench.tick(**ACTIVE)
+    assert supervisor.mode is Mode.ACTIVE
+    assert not supervisor.arming
+    assert supervisor.fault is Fault.NONE
+
+
+@pytest.mark.parametrize("wish", [{"stop": True}, {"armed": False}])
+def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure(
+    wish: dict[str, object],
+) -> None:
+    bench = armed_bench()
+    assert bench.tick(**ACTIVE, tank_age_ms=150).degraded
+    supervisor = bench.tick(**{**ACTIVE, **wish})
+    assert supervisor.fault is Fault.NONE
+    assert not supervisor.degraded
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
@@ -400,6 +432,8 @@ def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> N
     for _ in range(200):
         bench.tick(**{**ACTIVE, **RAMPING})
     assert bench.supervisor.demand is Demand.CONTROL
+    assert bench.tick(**{**ACTIVE, **RAMPING, "roll_rad": 1.0}).demand is Demand.RAMP
+    assert bench.tick(**{**ACTIVE, **RAMPING}).demand is Demand.RAMP
 
 
 def ends_within_ms(sign: dict[str, object]) -> int:

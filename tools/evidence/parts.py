@@ -192,6 +192,24 @@ PARTS = (
         5,
     ),
     Part(
+        "mutation",
+        "python -m tools.mutation --json",
+        "every small change of the safety code against its tests: what lives, and why",
+        90,
+    ),
+    Part(
+        "fuzz_frames",
+        "python -m tools.fuzz.frames --frames 10000000 --json",
+        "random and mutated frames at the controller node and the drive",
+        8,
+    ),
+    Part(
+        "fuzz_configurations",
+        "python -m tools.fuzz.configurations --number 10000 --laws --json",
+        "mutated configurations: accepted, or refused with their place",
+        10,
+    ),
+    Part(
         "tests",
         "python -m tools.evidence.pytest_part -n auto -m 'evidence and not socketcan'",
         "the tests that take minutes: statistics over many seeds, long voyages",

@@ -158,6 +158,7 @@ def main() -> int:
         )
     if arguments.json:
         sys.stdout.write(json.dumps({"files": results}) + "\n")
+        return 0
     return 1 if any(result["survived"] for result in results) else 0
 
 

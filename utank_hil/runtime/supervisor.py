@@ -150,9 +150,7 @@ class Supervisor:
             self._disarm(Mode.PASSIVE)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:
-        # being out of operation enabled counts from here on
-        self._drive_enabled_ns = now_ns
-        seen.drive_out_ms = 0.0
+        seen.drive_out_ms = 0.0  # off, as it should be
         refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
             self.fault = refusal[0]
