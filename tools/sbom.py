@@ -75,7 +75,8 @@ def sbom(extras: frozenset[str] = frozenset()) -> dict[str, Any]:
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-m", "cyclonedx_py", "requirements", "-",
          "--pyproject", "pyproject.toml", "--output-reproducible"],
-        cwd=ROOT, input=locked(parts.keys() - {PROJECT}), stdout=subprocess.PIPE, text=True, check=True,
+        cwd=ROOT, input=locked(parts.keys() - {PROJECT}), stdout=subprocess.PIPE, text=True,
+        check=True,
     )  # fmt: skip
     made: dict[str, Any] = json.loads(done.stdout)
     refs: dict[str, str] = {

@@ -9,10 +9,12 @@ import gc
 import importlib
 import importlib.machinery
 import importlib.util
+import mmap
 import os
 import random
 import resource
 import signal
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -29,6 +31,7 @@ DEAD, ALIVE = "killed", "survived"
 FEW, MANY = 12, 60
 """Variants of each parametrized test, in the first way and in the second."""
 _MEMORY_BYTES = 4 << 30
+_PLACE = struct.Struct("q")
 _OPTIONS = [
     "-q", "-x", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:cov", "--timeout=0",
     "-m", "not socketcan and not evidence",
@@ -107,12 +110,18 @@ class Exchange:
     ) -> None:
         self._file, self._unchanged, self._mutants = file, unchanged, mutants
         self._report = report
+        self._started = 0
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Run them for every mutant that can be had by exchanging code."""
+        killer = mmap.mmap(-1, _PLACE.size)  # seen from the fork
 
         def passes() -> bool:
-            run_tests(session)
+            try:
+                run_tests(session)
+            finally:
+                if session.testsfailed:
+                    _PLACE.pack_into(killer, 0, self._started - 1)
             return not session.testsfailed
 
         begin = time.monotonic()
@@ -136,9 +145,17 @@ class Exchange:
                         function.__code__ = new
                 return passes()
 
+            _PLACE.pack_into(killer, 0, 0)
             if not in_fork(changed_passes, limit_s):
                 self._report(mutant, True)
+                # what killed one may well kill the next
+                place = _PLACE.unpack_from(killer)[0]
+                session.items.insert(0, session.items.pop(place))
         return True
+
+    def pytest_runtest_logstart(self) -> None:
+        """Count the tests."""
+        self._started += 1
 
 
 def _functions_of(file: Path) -> dict[CodeType, list[FunctionType]]:
