@@ -105,6 +105,30 @@ def test_mean_of_the_commands_between_two_steps():
     assert limiter.mean_since_last_call() == pytest.approx(np.mean(commands))
     limiter.limit(0.0, 0.0, 0.0)
     assert limiter.mean_since_last_call() == pytest.approx(limiter.command_pa)
+    # nothing since: what was commanded last
+    assert limiter.mean_since_last_call() == limiter.command_pa > 0
+    last_pa = limiter.limit(50e3, 0.0, 0.0)
+    limiter.cut()  # is a command of zero
+    assert limiter.mean_since_last_call() == pytest.approx(last_pa / 2)
+
+
+def test_new_and_after_a_cut_or_ramp_it_limits_nothing():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
+    assert (limiter.command_pa, limiter.limiting) == (0.0, False)
+    assert limiter.mean_since_last_call() == 0.0
+    for relieve in (limiter.cut, limiter.ramp_to_zero):
+        limiter.limit(50e3, 0.0, 0.0)
+        assert limiter.limiting
+        relieve()
+        assert not limiter.limiting
+    limiter.limit(limiter.command_pa, 0.0, 0.0)
+    assert not limiter.limiting
+
+
+@pytest.mark.parametrize("period_s", [0.0, -0.01, np.nan, np.inf])
+def test_a_period_that_is_none_is_refused(period_s):
+    with pytest.raises(ValueError, match="period_s"):
+        CommandLimiter(PumpLimits(), TANK, period_s)
 
 
 def test_cut_is_at_zero_at_once_and_ramp_at_the_rate_limit():

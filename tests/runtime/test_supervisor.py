@@ -334,10 +334,40 @@ def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure
     wish: dict[str, object],
 ) -> None:
     bench = armed_bench()
+    assert bench.tick(**ACTIVE, tank_age_ms=90).mode is Mode.ACTIVE
     assert bench.tick(**ACTIVE, tank_age_ms=150).degraded
-    supervisor = bench.tick(**{**ACTIVE, **wish})
+    supervisor = bench.tick(**{**ACTIVE, **wish}, tank_age_ms=150)
     assert supervisor.fault is Fault.NONE
     assert not supervisor.degraded
+
+
+def test_a_fault_after_a_reset_is_latched_like_the_first() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    assert bench.tick(reset_edge=True).mode is Mode.STANDBY
+    bench.tick(**ARMING)
+    assert bench.tick(**ACTIVE).mode is Mode.ACTIVE
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    for _ in range(100):
+        assert bench.tick(**ACTIVE).mode is Mode.FAULT
+
+
+def test_a_fault_while_arming_during_the_ramp_ends_the_arming() -> None:
+    bench = disarmed_bench()
+    assert bench.tick(**RAMPING, requested_mode=Mode.ACTIVE, armed=True, arm_edge=True).arming
+    supervisor = bench.tick(**{**ACTIVE, **RAMPING, "drive_enabled": False, "link_lost": True})
+    assert supervisor.mode is Mode.FAULT
+    assert not supervisor.arming
+
+
+def test_a_drive_that_is_off_after_a_fault_counts_as_no_second_one() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    for _ in range(10):
+        seen = replace(HEALTHY)
+        bench.supervisor.update(seen, bench.now_ns)
+        bench.now_ns += TICK_NS
+        assert seen.drive_out_ms == 0.0
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
@@ -446,10 +476,16 @@ RAMP_SIGNS = [sign for _, reaction, sign in SIGNS if reaction is Reaction.RAMP]
 
 
 @pytest.mark.parametrize("first", [*RAMP_SIGNS, "disarmed"])
-@pytest.mark.parametrize("second", RAMP_SIGNS)
-@pytest.mark.parametrize("later_ms", [10, 300, 900])
 @pytest.mark.parametrize("first_lasts", [False, True])
 def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(
+    first: dict[str, object] | str, first_lasts: bool
+) -> None:
+    for second in RAMP_SIGNS:
+        for later_ms in (10, 300, 900):
+            check_two_ramps(first, second, later_ms, first_lasts)
+
+
+def check_two_ramps(
     first: dict[str, object] | str, second: dict[str, object], later_ms: int, first_lasts: bool
 ) -> None:
     if isinstance(first, str):

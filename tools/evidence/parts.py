@@ -198,6 +198,12 @@ PARTS = (
         90,
     ),
     Part(
+        "coverage",
+        "python -m tools.mutation.coverage --json",
+        "every line and branch of the safety code is run by the tests that mirror it",
+        2,
+    ),
+    Part(
         "fuzz_frames",
         "python -m tools.fuzz.frames --frames 10000000 --json",
         "random and mutated frames at the controller node and the drive",

@@ -187,7 +187,6 @@ class Supervisor:
         # in PASSIVE the drive holds zero pressure, enabled; elsewhere it is off
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
-        self._zero_at_ns = _NEVER_NS
         self._reset_until_ns = None
         self.reset_refused_by = Fault.NONE
 
