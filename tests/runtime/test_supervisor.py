@@ -496,11 +496,12 @@ def check_two_ramps(
         began_ns = bench.now_ns
         bench.tick(**{**ACTIVE, **RAMPING, **sign})
     later_ns = began_ns + later_ms * MILLISECOND_NS
+    second_within_ms = ends_within_ms(second)
     zero_ns = began_ns + first_within_ms * MILLISECOND_NS
     while bench.supervisor.demand is Demand.RAMP:
         both = sign if first_lasts else {}
         if bench.now_ns >= later_ns:
-            zero_ns = min(zero_ns, later_ns + ends_within_ms(second) * MILLISECOND_NS)
+            zero_ns = min(zero_ns, later_ns + second_within_ms * MILLISECOND_NS)
             both = {**both, **second}
         assert bench.now_ns <= zero_ns
         bench.tick(**{**RAMPING, **both})
