@@ -216,6 +216,12 @@ PARTS = (
         10,
     ),
     Part(
+        "week",
+        "python -m tools.studies.week --days 7 --json",
+        "a week in lockstep with load changes, retunings and faults: memory, handles, tick cost",
+        120,
+    ),
+    Part(
         "tests",
         "python -m tools.evidence.pytest_part -n auto -m 'evidence and not socketcan'",
         "the tests that take minutes: statistics over many seeds, long voyages",

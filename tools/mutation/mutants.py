@@ -159,6 +159,11 @@ def _is_words(node: ast.AST) -> bool:
     return False
 
 
+def _is_slots(holder: ast.AST) -> bool:
+    """Say whether it is how a class keeps its attributes, which changes nothing that it does."""
+    return isinstance(holder, ast.keyword) and holder.arg == "slots"
+
+
 def _instead(node: ast.AST, holder: ast.AST, field: str) -> Iterator[ast.AST]:
     """What may stand in the place of an expression."""
     condition = field == "test" or (field == "ifs" and isinstance(holder, ast.comprehension))
@@ -180,7 +185,7 @@ def _instead(node: ast.AST, holder: ast.AST, field: str) -> Iterator[ast.AST]:
             yield operand
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             yield ast.BinOp(left=left, op=OPERATORS[type(op)](), right=right)
-        case ast.Constant(value=bool(value)):
+        case ast.Constant(value=bool(value)) if not _is_slots(holder):
             yield ast.Constant(value=not value)
         case ast.Constant(value=int(value)):
             yield ast.Constant(value=value + 1)

@@ -2,7 +2,33 @@
 
 from dataclasses import dataclass
 
-NO_DIFFERENCE: dict[str, dict[str, str]] = {}
+_NEVER = "any time that never comes is as good"
+_SET_FIRST = "set before it is read, on every way there"
+_OF_40_MS = "a millisecond of the 40 that are allowed"
+_SUM = "a difference of numbers is finite exactly where their sum is"
+_TOUCHING = "a millimetre from the limit the barrier asks for the whole brake on either side"
+NO_DIFFERENCE: dict[str, dict[str, str]] = {
+    "utank_hil/runtime/supervisor.py": {
+        ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
+        ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 1 << 63": _NEVER,
+        "Supervisor.__init__: self._drive_enabled_ns = 0 -> ": _SET_FIRST,
+        "Supervisor.__init__: self._drive_enabled_ns = 0 -> self._drive_enabled_ns = 1": _SET_FIRST,
+        "Supervisor.__init__: self._zero_at_ns = _NEVER_NS -> ": _SET_FIRST,
+        "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
+        "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
+    },
+    "utank_hil/control/limits.py": {
+        "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
+        "if math.isfinite(desired_pa + level_m - level_rate_m_s):": _SUM,
+        "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
+        "if math.isfinite(desired_pa - level_m + level_rate_m_s):": _SUM,
+        "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m < 0.001:": _TOUCHING,
+        "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m <= 0.00125:": _TOUCHING,
+    },
+    "firmware_sim/drive_states.py": {
+        "DriveStates.command: return -> ": "in FAULT no other word has a transition",
+    },
+}
 
 
 @dataclass(frozen=True)
