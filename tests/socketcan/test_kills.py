@@ -66,14 +66,25 @@ class Panel:
 
 
 @contextmanager
-def bus(folder: Path) -> Iterator[tuple[Candump, Watcher, Panel]]:
-    candump, watcher, panel = Candump(folder), Watcher(), Panel()
+def operated() -> Iterator[tuple[Watcher, Panel]]:
+    """Someone who watches, and a panel."""
+    watcher, panel = Watcher(), Panel()
     try:
         with judged_by(watcher.machine.failure):
-            yield candump, watcher, panel
+            yield watcher, panel
     finally:
         panel.close()
         watcher.close()
+
+
+@contextmanager
+def logged(folder: Path) -> Iterator[tuple[Candump, Watcher, Panel]]:
+    """The same, and a log."""
+    candump = Candump(folder)
+    try:
+        with operated() as (watcher, panel):
+            yield candump, watcher, panel
+    finally:
         candump.close()
 
 
@@ -96,7 +107,11 @@ def controller(folder: Path) -> Program:
 def arm(watcher: Watcher, panel: Panel) -> None:
     """Ask for pressure as an operator does, and wait for it; before that there was none."""
     watcher.wait(lambda w: w.mode in (Mode.STANDBY, Mode.FAULT))
-    panel.press("standby", "reset", "arm")
+    panel.press("standby", "reset")
+    watcher.forget()  # what it was before the reset
+    watcher.wait(lambda w: w.mode is Mode.STANDBY)
+    panel.press("arm")
+    watcher.forget()
     watcher.wait_in_charge(PRESSURE_PA)
 
 
@@ -108,7 +123,7 @@ def pauses(log: list[Logged], name: str) -> list[tuple[float, float]]:
 
 def kill_controllers(folder: Path) -> list[Logged]:
     draw = random.Random(1)
-    with bus(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
+    with logged(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
         watcher.wait(lambda w: w.drive is not None)
         for number in range(KILLS):
             with running(controller(folder / str(number))) as running_one:
@@ -151,7 +166,7 @@ def test_a_controller_killed_at_any_instant_leaves_the_pump_at_zero(tmp_path: Pa
 def kill_ships(folder: Path) -> list[Logged]:
     draw = random.Random(2)
     with (
-        bus(folder) as (candump, watcher, panel),
+        logged(folder) as (candump, watcher, panel),
         running(controller(folder / "controller")) as one,
     ):
         for number in range(KILLS):
@@ -185,7 +200,7 @@ def test_a_signal_under_pressure_ends_with_the_pump_at_zero(
     number: signal.Signals, tmp_path: Path
 ) -> None:
     def signalled(folder: Path) -> list[Logged]:
-        with bus(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
+        with logged(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
             watcher.wait(lambda w: w.drive is not None)
             with running(controller(folder / "controller")) as one:
                 arm(watcher, panel)
@@ -203,7 +218,7 @@ def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path: 
         draw = random.Random(3)
         try:
             with (
-                bus(folder) as (_, watcher, panel),
+                operated() as (watcher, panel),
                 running(ship(folder / "ship")) as ship_program,
                 running(controller(folder / "controller")) as one,
             ):
