@@ -17,7 +17,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers site docs lock clean
+.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers site sbom docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -32,6 +32,7 @@ help:
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
 	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
 	@echo "make site       the documentation as web pages, out/site"
+	@echo "make sbom       the list of parts of a deployed controller, out/sbom.json"
 	@echo "make docs       write the generated documents and tables anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
@@ -58,8 +59,8 @@ check: setup
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
-	$(VENV)/bin/mypy tools/compiled.py
-	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence peers studies thesis)
+	$(VENV)/bin/mypy tools/compiled.py tools/sbom.py
+	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence fuzz mutation peers studies thesis)
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
@@ -110,6 +111,12 @@ $(PEERS_READY): tools/peers/requirements.lock | $(READY)
 site: setup
 	$(VENV)/bin/sphinx-build -q -W --keep-going -d .cache/site -c docs . out/site
 	@echo "out/site/docs/index.html"
+
+# the parts of an installation without extras
+sbom: setup
+	@mkdir -p out
+	$(PYTHON) -m tools.sbom > out/sbom.json
+	@echo "out/sbom.json"
 
 docs: setup
 	$(PYTHON) -m tools.documents.write

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from message_strategies import PROTECTED, PROTECTED_IDS
 
 from utank_hil.canbus.catalogue import read_data_ids
-from utank_hil.canbus.e2e import WORD_TABLES, crc8, first_byte_table, profile2_crc
+from utank_hil.canbus.e2e import WORD_TABLES, crc8, data_ids, first_byte_table, profile2_crc
 
 ID_LISTS = st.binary(min_size=16, max_size=16)
 FRAMES = st.binary(min_size=8, max_size=8)
@@ -101,6 +101,14 @@ def test_up_to_three_flipped_bits_are_found_at_every_counter(case):
                 assert with_counter != 0
                 assert flips == 3 or with_counter not in single
                 assert flips > 1 or with_counter not in pairs
+
+
+def test_the_catalogues_data_ids_are_those_of_its_messages_numbers():
+    lists = {dbc.name: read_data_ids(dbc) for _, _, dbc in PROTECTED}
+    numbers = {name: ids[0] >> 1 for name, ids in lists.items()}
+    assert len(set(numbers.values())) == len(lists)
+    for name, ids in lists.items():
+        assert ids == data_ids(numbers[name])
 
 
 def test_no_message_passes_for_another_even_with_one_flipped_bit():

@@ -105,6 +105,38 @@ def test_mean_of_the_commands_between_two_steps():
     assert limiter.mean_since_last_call() == pytest.approx(np.mean(commands))
     limiter.limit(0.0, 0.0, 0.0)
     assert limiter.mean_since_last_call() == pytest.approx(limiter.command_pa)
+    # nothing since: what was commanded last
+    assert limiter.mean_since_last_call() == limiter.command_pa > 0
+    last_pa = limiter.limit(50e3, 0.0, 0.0)
+    limiter.cut()  # is a command of zero
+    assert limiter.mean_since_last_call() == pytest.approx(last_pa / 2)
+
+
+def test_limits_of_a_file_that_says_nothing_and_the_least_there_are():
+    assert PumpLimits() == PumpLimits(50e3, 100e3, 3.85, np.inf, 0.7, 2.2, 0.25)
+    PumpLimits(pressure_pa=1e-3, rate_pa_s=1e-3, level_m=1e-3, power_w=1e-3, brake_share=1.0)
+    PumpLimits(sharpness=1.0, lookahead_s=0.0)
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9), TANK, PERIOD_S)
+    assert limiter.limit(60e3, 0.0, 0.0) == 50e3  # all of the pressure, if no share is named
+
+
+def test_new_and_after_a_cut_or_ramp_it_limits_nothing():
+    limiter = CommandLimiter(PumpLimits(rate_pa_s=1e5), TANK, PERIOD_S)
+    assert (limiter.command_pa, limiter.limiting) == (0.0, False)
+    assert limiter.mean_since_last_call() == 0.0
+    for relieve in (limiter.cut, limiter.ramp_to_zero):
+        limiter.limit(50e3, 0.0, 0.0)
+        assert limiter.limiting
+        relieve()
+        assert not limiter.limiting
+    limiter.limit(limiter.command_pa, 0.0, 0.0)
+    assert not limiter.limiting
+
+
+@pytest.mark.parametrize("period_s", [0.0, -0.01, np.nan, np.inf])
+def test_a_period_that_is_none_is_refused(period_s):
+    with pytest.raises(ValueError, match="period_s"):
+        CommandLimiter(PumpLimits(), TANK, period_s)
 
 
 def test_cut_is_at_zero_at_once_and_ramp_at_the_rate_limit():

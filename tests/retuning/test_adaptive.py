@@ -16,7 +16,7 @@ from retuning_toys import (
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.control import ARX
-from utank_hil.retuning import Candidate, Refusal
+from utank_hil.retuning import Candidate, Refusal, adaptive
 from utank_hil.retuning.adaptive import TRIAL_PATIENCE
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_bank import FADE_SAMPLES
@@ -230,3 +230,21 @@ def test_roll_above_its_limit_ends_an_identification_though_the_tanks_levels_are
     rig.run(2)
     assert rig.controller.state is REFUSED
     assert "roll is above" in rig.reasons
+
+
+def test_the_last_events_are_kept_and_each_is_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adaptive, "MOST_EVENTS", 5)
+    rig = Rig(ToyRetuner())
+    taken = []
+    for number in range(1, 13):  # too early to begin, which is said each time
+        rig.press(retune=True)
+        rig.run(2)
+        if number % 3 == 0:
+            taken += rig.controller.take_events()
+    assert len(taken) == len({event.time_ns for event in taken}) == 12
+    assert rig.controller.take_events() == []
+    assert list(rig.controller.events) == taken[-5:]
+    for _ in range(7):
+        rig.press(retune=True)
+        rig.run(2)
+    assert rig.controller.take_events() == list(rig.controller.events)

@@ -74,7 +74,6 @@ class EveryWay(RuleBasedStateMachine):
         self.configured = self.laws.accepted
         self.accepted = [self.configured]  # by the events alone: the way back, newest last
         self.on_trial: MonitoredLaw | None = None
-        self.seen = 0
 
     def step(self) -> None:
         """One sample, and what may have changed in it."""
@@ -84,7 +83,7 @@ class EveryWay(RuleBasedStateMachine):
         answer = rig.commands[-1]
         assert np.isfinite(answer)
         rig.command_pa = float(np.clip(answer, -LIMIT_PA, LIMIT_PA))
-        for event in controller.events[self.seen :]:
+        for event in controller.take_events():
             if "begins when" in "".join(event.reasons):
                 assert controller.state is state
             elif event.state is TRIAL:
@@ -102,7 +101,6 @@ class EveryWay(RuleBasedStateMachine):
                 self.on_trial = None
             elif event.state in (IDLE, REFUSED):
                 self.on_trial = None
-        self.seen = len(controller.events)
 
     def run(self, samples: int) -> None:
         for _ in range(samples):

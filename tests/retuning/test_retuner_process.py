@@ -1,10 +1,12 @@
 """A retuner in a real process: what it answers, and what its end, sleep and nonsense do."""
 
 import os
+import random
 import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,6 +183,41 @@ def test_without_its_keeper_it_ends_and_shows_no_sign_of_life() -> None:
         _wait(lambda: not retuner.alive)
         retuner.submit(1, RECORD, 0)
         assert retuner.answer(1, 0) is None
+
+
+def worker_of(retuner: RetunerProcess) -> int | None:
+    children = Path(f"/proc/{retuner.pid}/task/{retuner.pid}/children").read_text().split()
+    return int(children[0]) if children else None
+
+
+def answers_in_a_while(record: FloatArray) -> Answer:
+    time.sleep(0.2)
+    return answers_with_the_sum(record)
+
+
+@pytest.mark.parametrize(
+    "kills", [3, pytest.param(200, marks=[pytest.mark.evidence, pytest.mark.timeout(3600)])]
+)
+def test_worker_killed_at_any_instant_is_replaced_and_every_record_is_answered(kills: int) -> None:
+    draw, refused = random.Random(1), 0
+    with running(answers_in_a_while) as retuner:
+        descriptors = len(os.listdir("/proc/self/fd"))
+        for number in range(1, kills + 1):
+            _wait(lambda: worker_of(retuner) is not None)
+            retuner.submit(number, RECORD, 0)
+            time.sleep(draw.uniform(0, 0.5))
+            worker = worker_of(retuner)
+            if worker is not None:
+                os.kill(worker, signal.SIGKILL)
+            answer = _answer(retuner, number)
+            assert isinstance(answer, Refusal)
+            killed = "was killed by signal 9" in answer.reasons[0]
+            assert killed or answer == answers_with_the_sum(RECORD)
+            refused += killed
+            assert retuner.alive
+        assert len(os.listdir("/proc/self/fd")) == descriptors
+    print(f"{kills} kills, {refused} of them in the middle of a record")
+    assert refused or kills < 10
 
 
 @pytest.mark.parametrize("orphaned", [False, True])

@@ -279,6 +279,30 @@ def test_law_that_fails_stops_the_pump(answer_pa: float) -> None:
     assert bench.pressure_pa == 0.0
 
 
+def test_law_that_raises_stops_the_pump_until_the_operator_resets() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    step = bench.law.step
+
+    def fail(*_: object) -> np.ndarray:
+        raise ZeroDivisionError("of what")
+
+    bench.law.step = fail  # type: ignore[method-assign]
+    bench.run(240)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.node.law_error == "ZeroDivisionError: of what"
+    assert bench.pressure_pa == 0.0
+    bench.law.step = step  # type: ignore[method-assign]
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(1000)  # the law answers again, which nobody trusts
+    assert bench.node.mode is Mode.FAULT
+    bench.law.calls.clear()
+    bench.order_is(reset=True)
+    bench.run(20)
+    assert bench.law.calls[:1] == ["reset"]
+    assert bench.node.mode is Mode.STANDBY
+
+
 orders = st.builds(
     OperatorCommand,
     mode_request=st.sampled_from([Mode.STANDBY, Mode.PASSIVE, Mode.ACTIVE, Mode.ACTIVE, None]),

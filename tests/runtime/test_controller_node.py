@@ -1,5 +1,6 @@
 import math
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -265,6 +266,10 @@ class NotedUpdates:
 
     def __init__(self) -> None:
         self.fresh: list[bool] = []
+        self.laws = SimpleNamespace(active=SimpleNamespace(found=None))
+
+    def take_events(self) -> list[RetuningEvent]:
+        return []
 
     def update(self, now_ns: int, order: RetuningOrder, *, engaged: bool, fresh: bool) -> None:
         self.fresh.append(fresh)
@@ -284,3 +289,20 @@ def test_a_sample_is_fresh_only_if_motion_and_levels_are(
     bench.silent.clear()
     bench.run(400)
     assert noted.fresh[-1]
+
+
+@pytest.mark.parametrize("state", RetuningState)
+def test_every_law_but_the_pulses_is_judged_by_the_twin_of_its_own_ship(
+    state: RetuningState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    bench, noted = ControllerBench(START_NS, monitors=monitors), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    followed, excused = [], []
+    monkeypatch.setattr(monitors, "follow", followed.append)
+    monkeypatch.setattr(monitors.twin, "excuse", lambda: excused.append(True))
+    noted.state = state
+    noted.laws.active.found = object()
+    bench.run(100)
+    assert set(followed) == {noted.laws.active.found}
+    assert bool(excused) is (state is RetuningState.IDENTIFY)

@@ -1,11 +1,14 @@
 """All monitors behind the controller node, fed by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from controller_bench import CATALOGUE, VERSION, VESSEL
 
 from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
 from utank_hil.control import DesignPlant
+from utank_hil.retuning import ModelSummary
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitoring import ROUND_TICKS, Monitors
 from utank_hil.runtime.monitors.finding import Finding
@@ -116,3 +119,58 @@ def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
     twin = table.monitors.twin
     assert twin.rms_rad == pytest.approx(twin.ship_rms_rad, rel=1e-9)
     assert table.monitors.twin_message().twin_rms_rad == twin.rms_rad
+
+
+def found_of(**changes: float) -> ModelSummary:
+    ship, tank = VESSEL.ship, VESSEL.tank
+    found = ModelSummary(
+        roll_period_s=10.0,
+        period_deviation=0.01,
+        inertia_kg_m2=1.2 * ship.inertia_kg_m2,
+        stiffness_nm_rad=1.7 * ship.stiffness_nm_rad,
+        damping_nms_rad=2 * ship.damping_nms_rad,
+        tank_damping_ratio=1.5 * tank.damping_ratio,
+        held_out_fit=0.99,
+        peak_sensitivity=1.2,
+        roll_below_passive=0.3,
+    )
+    return replace(found, **changes)
+
+
+def test_twin_is_the_ship_that_the_law_in_charge_was_designed_for() -> None:
+    table, taken = Table(), []
+    twin = table.monitors.twin
+    twin.take = lambda ship, tank: taken.append((ship, tank))  # type: ignore[method-assign]
+    found = found_of()
+    table.monitors.follow(None)
+    assert not taken
+    for _ in range(3):
+        table.monitors.follow(found)
+    ((ship, tank),) = taken
+    assert (ship.inertia_kg_m2, ship.stiffness_nm_rad, ship.damping_nms_rad) == (
+        found.inertia_kg_m2, found.stiffness_nm_rad, found.damping_nms_rad,
+    )  # fmt: skip
+    assert tank == replace(VESSEL.tank, damping_ratio=found.tank_damping_ratio)
+    table.monitors.follow(None)  # rolled back
+    assert taken[1:] == [(VESSEL.ship, VESSEL.tank)]
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        {"inertia_kg_m2": 0.0},
+        {"inertia_kg_m2": 11 * VESSEL.ship.inertia_kg_m2},
+        {"stiffness_nm_rad": -1e8},
+        {"stiffness_nm_rad": 0.09 * VESSEL.ship.stiffness_nm_rad},
+        {"damping_nms_rad": -1.0},
+        {"damping_nms_rad": 1e30},
+        {"tank_damping_ratio": -0.1},
+        {"tank_damping_ratio": 1.1},
+        {"tank_damping_ratio": float("nan")},
+    ],
+)
+def test_a_ship_that_can_not_be_hers_leaves_the_configured_twin(nonsense: dict[str, float]) -> None:
+    table, taken = Table(), []
+    table.monitors.twin.take = lambda *pair: taken.append(pair)  # type: ignore[method-assign]
+    table.monitors.follow(found_of(**nonsense))
+    assert taken == [(VESSEL.ship, VESSEL.tank)]

@@ -124,3 +124,39 @@ def test_mean_squares_are_those_of_some_roll_periods() -> None:
         twin.update(0.1 + 0.05 * math.sin(0.6 * k * STEP_S), 0.0, 0.0, 0.0)
     assert twin.ship_rms_rad == pytest.approx(0.05 / math.sqrt(2), rel=0.05)
     assert twin.rms_rad == twin.ship_rms_rad
+
+
+LOADED = replace(
+    FIRST.ship,
+    inertia_kg_m2=1.2 * FIRST.ship.inertia_kg_m2,
+    stiffness_nm_rad=1.7 * FIRST.ship.stiffness_nm_rad,
+)
+
+
+def test_twin_of_a_loaded_ship_takes_over_without_a_bump_and_rolls_as_she_does() -> None:
+    def waves(t):
+        return 2e7 * (math.sin(0.55 * t) + 0.7 * math.sin(0.8 * t + 1))
+
+    def pump(t):
+        return 30e3 * (math.sin(0.6 * t) + 0.5 * math.sin(0.3 * t))
+
+    tank = FIRST.tank
+    t, driven = motion(LOADED, tank, waves, pump, 600.0)
+    _, passive = motion(LOADED, tank, waves, lambda _: 0.0, 600.0)
+    twin, stays = (PassiveTwin(FIRST.ship, tank, STEP_S, LEAST_RAD) for _ in range(2))
+    rolls = []
+    for time_s, (roll, rate, _, level_rate) in zip(t, driven, strict=True):
+        if len(rolls) == len(t) // 2:
+            before = twin.roll_rad, twin.rms_rad, twin.ship_rms_rad, twin.amplified
+            twin.take(LOADED, tank)
+            assert (twin.roll_rad, twin.rms_rad, twin.ship_rms_rad, twin.amplified) == before
+        twin.update(roll, rate, level_rate, pump(time_s))
+        stays.update(roll, rate, level_rate, pump(time_s))
+        rolls.append((twin.roll_rad, stays.roll_rad))
+    # a twin's roll steps no more at the take-over than the sea makes it do elsewhere
+    steps = np.abs(np.diff(np.array(rolls)[:, 0]))
+    assert steps[len(t) // 2 - 1] <= steps.max() * (1 + 1e-9)
+    errors = np.abs(np.array(rolls) - passive[:, :1])[-len(t) // 4 :].max(axis=0)
+    scale = passive[:, 0].std()
+    assert errors[0] < 0.03 * scale
+    assert errors[1] > 0.3 * scale

@@ -222,14 +222,30 @@ def test_old_levels_that_only_halve_the_pressure_refuse_a_reset_too() -> None:
     assert bench.supervisor.fault is Fault.BUS_LOST
 
 
+def test_new_it_waits_with_the_pump_at_zero_and_the_drive_off() -> None:
+    supervisor = Supervisor(SafetyLimits())
+    assert (supervisor.mode, supervisor.fault) == (Mode.INIT, Fault.NONE)
+    assert supervisor.demand is Demand.ZERO
+    assert not supervisor.drive_wanted
+    assert not supervisor.degraded
+    assert not supervisor.arming
+    assert supervisor.reset_refused_by is Fault.NONE
+
+
 def test_reset_waits_half_a_second_for_the_drive_to_leave_its_fault() -> None:
-    for ticks, mode in ((45, Mode.STANDBY), (55, Mode.FAULT)):
+    for ticks, mode in ((49, Mode.STANDBY), (50, Mode.FAULT)):
         bench = armed_bench()
         bench.tick(**{**ACTIVE, "drive_fault": True})
         bench.tick(drive_fault=True, reset_edge=True)
         for _ in range(ticks):
             bench.tick(drive_fault=True)
         assert bench.tick().mode is mode
+
+
+def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    assert bench.tick(drive_out_ms=50.0, reset_edge=True).mode is Mode.STANDBY
 
 
 @pytest.mark.parametrize(("age_ms", "mode"), [(600, Mode.PASSIVE), (601, Mode.STANDBY)])
@@ -239,6 +255,47 @@ def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> No
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     assert bench.supervisor.mode is mode
+
+
+def passive_bench() -> Bench:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(requested_mode=Mode.PASSIVE).mode is Mode.PASSIVE
+    return bench
+
+
+@pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
+def test_without_pressure_no_fault_is_latched(
+    fault: Fault, reaction: Reaction, sign: dict[str, object]
+) -> None:
+    assert passive_bench().tick(requested_mode=Mode.PASSIVE, **sign).mode is not Mode.FAULT
+    bench = Bench()
+    bench.tick()
+    # in STANDBY the command is zero whatever the last one was
+    assert bench.tick(command_pa=1e4, **sign).mode is not Mode.FAULT
+
+
+def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it() -> None:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(**ARMING, drive_out_ms=50.0).arming
+
+
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
+def test_an_arm_edge_without_the_wish_to_be_active_does_not_arm(mode: Mode) -> None:
+    for bench in (Bench(), passive_bench()):
+        bench.tick()
+        assert not bench.tick(requested_mode=mode, armed=True, arm_edge=True).arming
+
+
+def test_why_arming_was_refused_stays_to_be_read() -> None:
+    bench = Bench()
+    bench.tick()
+    bench.tick(**ARMING, high_level=True)
+    for _ in range(10):
+        assert bench.tick().fault is Fault.LEVEL_LIMIT
+    bench.tick(**ARMING)
+    assert bench.tick(**ACTIVE).fault is Fault.NONE
 
 
 def test_arm_bit_held_since_before_the_start_never_arms() -> None:
@@ -251,10 +308,66 @@ def test_arming_is_given_up_when_the_drive_does_not_enable() -> None:
     bench = Bench()
     bench.tick()
     bench.tick(requested_mode=Mode.ACTIVE, armed=True, arm_edge=True)
-    for _ in range(202):
+    for _ in range(200):
         bench.tick(requested_mode=Mode.ACTIVE, armed=True)
-    assert bench.supervisor.fault is Fault.DRIVE_FAULT
+        assert bench.supervisor.arming
+        assert bench.supervisor.mode is Mode.STANDBY
+    bench.tick(requested_mode=Mode.ACTIVE, armed=True)
+    assert not bench.supervisor.arming
+    assert (bench.supervisor.mode, bench.supervisor.fault) == (Mode.STANDBY, Fault.DRIVE_FAULT)
     assert not bench.supervisor.drive_wanted
+
+
+def test_active_is_not_arming_any_more_and_forgets_why_it_was_refused_before() -> None:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(**ARMING, high_level=True).fault is Fault.LEVEL_LIMIT
+    bench.tick(**ARMING)
+    supervisor = bench.tick(**ACTIVE)
+    assert supervisor.mode is Mode.ACTIVE
+    assert not supervisor.arming
+    assert supervisor.fault is Fault.NONE
+
+
+@pytest.mark.parametrize("wish", [{"stop": True}, {"armed": False}])
+def test_what_ends_active_without_a_fault_leaves_neither_fault_nor_half_pressure(
+    wish: dict[str, object],
+) -> None:
+    bench = armed_bench()
+    assert bench.tick(**ACTIVE, tank_age_ms=90).mode is Mode.ACTIVE
+    assert bench.tick(**ACTIVE, tank_age_ms=150).degraded
+    supervisor = bench.tick(**{**ACTIVE, **wish}, tank_age_ms=150)
+    assert supervisor.fault is Fault.NONE
+    assert not supervisor.degraded
+
+
+def test_a_fault_after_a_reset_is_latched_like_the_first() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    assert bench.tick(reset_edge=True).mode is Mode.STANDBY
+    bench.tick(**ARMING)
+    assert bench.tick(**ACTIVE).mode is Mode.ACTIVE
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    for _ in range(100):
+        assert bench.tick(**ACTIVE).mode is Mode.FAULT
+
+
+def test_a_fault_while_arming_during_the_ramp_ends_the_arming() -> None:
+    bench = disarmed_bench()
+    assert bench.tick(**RAMPING, requested_mode=Mode.ACTIVE, armed=True, arm_edge=True).arming
+    supervisor = bench.tick(**{**ACTIVE, **RAMPING, "drive_enabled": False, "link_lost": True})
+    assert supervisor.mode is Mode.FAULT
+    assert not supervisor.arming
+
+
+def test_a_drive_that_is_off_after_a_fault_counts_as_no_second_one() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "link_lost": True})
+    for _ in range(10):
+        seen = replace(HEALTHY)
+        bench.supervisor.update(seen, bench.now_ns)
+        bench.now_ns += TICK_NS
+        assert seen.drive_out_ms == 0.0
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
@@ -318,15 +431,29 @@ def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found() -> None
     assert bench.supervisor.fault is Fault.DRIVE_FAULT
 
 
-def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled() -> None:
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
+@pytest.mark.parametrize("command_pa", [20e3, 1.0])
+def test_ramp_after_disarming_is_cut_after_a_second_and_leaves_the_drive_enabled(
+    mode: Mode, command_pa: float
+) -> None:
     bench = disarmed_bench()
     began_ns = bench.now_ns - TICK_NS
     while bench.supervisor.demand is Demand.RAMP:
         assert bench.now_ns - began_ns <= 1000 * MILLISECOND_NS
-        bench.tick(**RAMPING)
+        bench.tick(requested_mode=mode, drive_enabled=True, command_pa=command_pa)
     assert bench.now_ns - TICK_NS - began_ns == 1000 * MILLISECOND_NS
+    assert bench.supervisor.demand is Demand.ZERO
     assert bench.supervisor.mode is Mode.PASSIVE
     assert bench.supervisor.drive_wanted
+
+
+def test_drive_that_drops_out_during_the_ramp_of_a_fault_ends_it() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, "roll_rad": 1.0})
+    for _ in range(4):
+        bench.tick(command_pa=20e3)
+        assert bench.supervisor.demand is Demand.RAMP
+    assert bench.tick(command_pa=20e3).demand is Demand.ZERO
 
 
 def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> None:
@@ -335,6 +462,8 @@ def test_arming_during_the_ramp_takes_over_and_the_ramps_end_is_forgotten() -> N
     for _ in range(200):
         bench.tick(**{**ACTIVE, **RAMPING})
     assert bench.supervisor.demand is Demand.CONTROL
+    assert bench.tick(**{**ACTIVE, **RAMPING, "roll_rad": 1.0}).demand is Demand.RAMP
+    assert bench.tick(**{**ACTIVE, **RAMPING}).demand is Demand.RAMP
 
 
 def ends_within_ms(sign: dict[str, object]) -> int:
@@ -347,10 +476,16 @@ RAMP_SIGNS = [sign for _, reaction, sign in SIGNS if reaction is Reaction.RAMP]
 
 
 @pytest.mark.parametrize("first", [*RAMP_SIGNS, "disarmed"])
-@pytest.mark.parametrize("second", RAMP_SIGNS)
-@pytest.mark.parametrize("later_ms", [10, 300, 900])
 @pytest.mark.parametrize("first_lasts", [False, True])
 def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(
+    first: dict[str, object] | str, first_lasts: bool
+) -> None:
+    for second in RAMP_SIGNS:
+        for later_ms in (10, 300, 900):
+            check_two_ramps(first, second, later_ms, first_lasts)
+
+
+def check_two_ramps(
     first: dict[str, object] | str, second: dict[str, object], later_ms: int, first_lasts: bool
 ) -> None:
     if isinstance(first, str):
@@ -361,11 +496,12 @@ def test_a_ramp_ends_at_the_earliest_of_the_ends_that_run(
         began_ns = bench.now_ns
         bench.tick(**{**ACTIVE, **RAMPING, **sign})
     later_ns = began_ns + later_ms * MILLISECOND_NS
+    second_within_ms = ends_within_ms(second)
     zero_ns = began_ns + first_within_ms * MILLISECOND_NS
     while bench.supervisor.demand is Demand.RAMP:
         both = sign if first_lasts else {}
         if bench.now_ns >= later_ns:
-            zero_ns = min(zero_ns, later_ns + ends_within_ms(second) * MILLISECOND_NS)
+            zero_ns = min(zero_ns, later_ns + second_within_ms * MILLISECOND_NS)
             both = {**both, **second}
         assert bench.now_ns <= zero_ns
         bench.tick(**{**RAMPING, **both})

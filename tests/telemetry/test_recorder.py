@@ -1,6 +1,7 @@
 """The recorder process: nothing lost, nothing waited for, readable however it ends."""
 
 import os
+import random
 import resource
 import signal
 import subprocess
@@ -130,6 +131,50 @@ def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
         with pytest.raises(RecorderError, match="exit code -9"):
             recorder.stop()
     np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
+
+
+@pytest.mark.parametrize(
+    ("kills", "lost_s"),
+    [(3, 5.0), pytest.param(200, 1.0, marks=[pytest.mark.evidence, pytest.mark.timeout(3600)])],
+)
+def test_killed_at_any_instant_it_leaves_what_can_be_read(
+    kills: int, lost_s: float, tmp_path: Path
+) -> None:
+    draw, rows = random.Random(1), table(100_000)
+    missing_s, descriptors = [], []
+    for number in range(kills):
+        file = tmp_path / f"{number}.rrd"
+        started = number % 3 > 0  # else it may not even have begun to read
+        with RingWriter(SIGNALS) as ring:
+            recorder = RecorderProcess(ring.name, file)
+            times_s: list[float] = []
+            while started and not any_recorded(file):
+                write_next(ring, rows, times_s)
+            end_s = time.monotonic() + draw.uniform(0, 1)
+            while time.monotonic() < end_s:
+                write_next(ring, rows, times_s)
+            recorder._process.kill()
+            killed_s = time.monotonic()
+            for _ in range(20):  # nobody is waited for
+                write_next(ring, rows, times_s)
+            with pytest.raises(RecorderError, match="exit code -9"):
+                recorder.stop()
+        kept = recorded(file) if any_recorded(file) else rows[:0]
+        np.testing.assert_allclose(kept, rows[: len(kept)], rtol=4e-16)
+        if started:
+            assert len(kept)
+            missing_s.append(killed_s - times_s[len(kept) - 1])
+        file.unlink(missing_ok=True)
+        descriptors.append(len(os.listdir("/proc/self/fd")))
+    print(f"{kills} kills; lost at most {max(missing_s):.2f} s")
+    assert max(missing_s) <= lost_s
+    assert descriptors[-1] == descriptors[0]
+
+
+def write_next(ring: RingWriter, rows: np.ndarray, times_s: list[float]) -> None:
+    ring.write(rows[len(times_s)])
+    times_s.append(time.monotonic())
+    time.sleep(0.002)
 
 
 def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path: Path) -> None:

@@ -5,14 +5,25 @@
 Both run in this process under the scheduling set-up of the deployed loop, in turns of one second,
 so that they meet the same disturbances: the bare one does nothing but sleep until the next point
 of an absolute grid (clock_nanosleep) and note how late it is. The ratio is what the loop adds; the
-absolute numbers are the machine's.
+absolute numbers are the machine's. Three times: alone, beside as many busy processes as there are
+processors, and beside a retuner at work.
 """
 
 import argparse
 import json
-from collections.abc import Iterable
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import Any
 
+import numpy as np
+
+from utank_hil.arrays import FloatArray
 from utank_hil.canbus.frame import Frame
+from utank_hil.retuning import Answer, RetunerProcess
 from utank_hil.runtime import (
     Histogram,
     LoopStatistics,
@@ -23,6 +34,8 @@ from utank_hil.runtime import (
 
 PERIOD_NS = 10_000_000
 TURN_NS = 1_000_000_000
+RECORD = (2500, 60)
+SHOWN = ("p50_ns", "p99_ns", "p99_9_ns", "max_ns")
 
 
 class Talker:
@@ -51,16 +64,47 @@ def run_bare(lateness: Histogram) -> None:
         lateness.add(clock.now_ns() - deadline_ns)
 
 
-def main() -> None:
-    """Measure both in turns and print percentiles and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=int, default=10, help="turns of a second for each")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    arguments = parser.parse_args()
+@contextmanager
+def beside_busy_processes() -> Iterator[None]:
+    """As many processes as processors, that compute all the time."""
+    spin = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(spin) for _ in range(os.cpu_count() or 1)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def compute(record: FloatArray) -> Answer:
+    """What a retuner does most: least squares, for longer than the measurement."""
+    while True:
+        np.linalg.lstsq(record, record[:, 0], rcond=None)
+
+
+@contextmanager
+def beside_a_retuner() -> Iterator[None]:
+    """A retuner's processes at work on a record."""
+    with RetunerProcess(compute, RECORD) as retuner:
+        retuner.submit(1, np.random.default_rng(1).standard_normal(RECORD), 0)
+        time.sleep(1.0)
+        yield
+
+
+SITUATIONS: dict[str, Callable[[], AbstractContextManager[None]]] = {
+    "alone": nullcontext,
+    "under load": beside_busy_processes,
+    "while retuning": beside_a_retuner,
+}
+
+
+def compared(turns: int) -> dict[str, Any]:
+    """Lateness of both, in turns, and their ratio."""
     bare, statistics = Histogram(), LoopStatistics()
     loop = RealTimeLoop([Talker(f"node {i}", i) for i in range(4)], statistics=statistics)
     with real_time_scheduling() as report:
-        for _ in range(arguments.seconds):
+        for _ in range(turns):
             run_bare(bare)
             loop.run(duration_ns=TURN_NS)
     rows = {
@@ -69,19 +113,33 @@ def main() -> None:
         "loop tick duration": statistics.duration.summary(),
     }
     ratios = {
-        name: rows["loop lateness"][name] / max(rows["bare lateness"][name], 1)
-        for name in ("p50_ns", "p99_ns", "p99_9_ns", "max_ns")
+        name: rows["loop lateness"][name] / max(rows["bare lateness"][name], 1) for name in SHOWN
     }
+    counted = {"overruns": statistics.overruns, "ticks": statistics.ticks}
+    return {**rows, "loop to bare": ratios, **counted, "scheduling": report.lines()}
+
+
+def main() -> None:
+    """Measure both in turns in each situation, and print percentiles and ratios."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=int, default=10, help="turns of a second for each")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    arguments = parser.parse_args()
+    found = {}
+    for situation, beside in SITUATIONS.items():
+        with beside():
+            found[situation] = compared(arguments.seconds)
     if arguments.json:
-        counted = {"overruns": statistics.overruns, "scheduling": report.lines()}
-        print(json.dumps({**rows, "loop to bare": ratios, **counted}))
+        print(json.dumps(found))
         return
-    print(*report.lines(), sep="\n")
-    print(f"{'microseconds':20}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>10}")
-    for title, row in rows.items():
-        print(f"{title:20}" + "".join(f"{row[name] / 1000:10.1f}" for name in ratios))
-    print(f"{'loop to bare':20}" + "".join(f"{ratio:10.2f}" for ratio in ratios.values()))
-    print(f"overruns: {statistics.overruns} of {statistics.ticks} ticks")
+    print(*found["alone"]["scheduling"], sep="\n")
+    for situation, rows in found.items():
+        print(f"\n{situation + ', microseconds':30}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>10}")
+        for title in ("bare lateness", "loop lateness", "loop tick duration"):
+            print(f"{title:30}" + "".join(f"{rows[title][name] / 1000:10.1f}" for name in SHOWN))
+        ratios = rows["loop to bare"]
+        print(f"{'loop to bare':30}" + "".join(f"{ratios[name]:10.2f}" for name in SHOWN))
+        print(f"overruns: {rows['overruns']} of {rows['ticks']} ticks")
 
 
 if __name__ == "__main__":

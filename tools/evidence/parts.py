@@ -151,9 +151,9 @@ PARTS = (
     ),
     Part(
         "cost_realtime",
-        "python -m tools.benchmarks.realtime --json",
-        "lateness of the real-time loop against a bare sleep",
-        1,
+        "python -m tools.benchmarks.realtime --seconds 60 --json",
+        "lateness of the real-time loop against a bare sleep: alone, under load, while retuning",
+        6,
     ),
     Part(
         "cost_retuning",
@@ -190,6 +190,36 @@ PARTS = (
         f"{PEERS} -m tools.peers.compare_plan_solvers --seconds 240 --json",
         "a step of the constrained law beside other solvers and do-mpc",
         5,
+    ),
+    Part(
+        "mutation",
+        "python -m tools.mutation --json",
+        "every small change of the safety code against its tests: what lives, and why",
+        90,
+    ),
+    Part(
+        "coverage",
+        "python -m tools.mutation.coverage --json",
+        "every line and branch of the safety code is run by the tests that mirror it",
+        2,
+    ),
+    Part(
+        "fuzz_frames",
+        "python -m tools.fuzz.frames --frames 10000000 --json",
+        "random and mutated frames at the controller node and the drive",
+        8,
+    ),
+    Part(
+        "fuzz_configurations",
+        "python -m tools.fuzz.configurations --number 10000 --laws --json",
+        "mutated configurations: accepted, or refused with their place",
+        10,
+    ),
+    Part(
+        "week",
+        "python -m tools.studies.week --days 7 --json",
+        "a week in lockstep with load changes, retunings and faults: memory, handles, tick cost",
+        120,
     ),
     Part(
         "tests",

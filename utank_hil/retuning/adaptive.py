@@ -26,6 +26,7 @@ they report. `LawBank` does the switching of laws that belongs to these transiti
 The limits on pressure, rate, level and power apply to the sum of law and pulses, downstream.
 """
 
+from collections import deque
 from dataclasses import asdict, dataclass
 from typing import Any, Final, NamedTuple
 
@@ -52,6 +53,8 @@ EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is dropped before the end of the trial."""
 TRIAL_PATIENCE: Final = 1.5
 """A trial that lasts so many times its length, for want of measurements, is given up."""
+MOST_EVENTS: Final = 1000
+"""That are kept: two days of a retuning every three minutes."""
 MOST_TRIES: Final = 3
 """Identifications of one change of the ship; if all are refused, the new ship counts as normal."""
 RETRY_NS: Final = 600_000_000_000
@@ -137,7 +140,8 @@ class AdaptiveController:
     ----------
     sample_time_s : float
     state : RetuningState
-    events : list of RetuningEvent
+    events : deque of RetuningEvent
+        The last `MOST_EVENTS`.
     candidate : Candidate or None
         Latest admitted candidate.
     laws : LawBank
@@ -154,7 +158,8 @@ class AdaptiveController:
     ) -> None:
         self.sample_time_s = law.sample_time_s
         self.state = RetuningState.IDLE
-        self.events: list[RetuningEvent] = []
+        self.events: deque[RetuningEvent] = deque(maxlen=MOST_EVENTS)
+        self._untaken = 0
         self.candidate: Candidate | None = None
         self.laws = LawBank(MonitoredLaw(law.controller(), ChangeMonitor(model, roll)))
         self._settings = settings
@@ -213,6 +218,13 @@ class AdaptiveController:
             self._check_trial()
         elif engaged and not forbidden:
             self._begin_if_due(ordered)
+
+    def take_events(self) -> list[RetuningEvent]:
+        """Return the events since the last call."""
+        if not self._untaken:
+            return []
+        taken, self._untaken = list(self.events)[-self._untaken :], 0
+        return taken
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
@@ -409,3 +421,4 @@ class AdaptiveController:
 
     def _log_event(self, reasons: tuple[str, ...], found: ModelSummary | None = None) -> None:
         self.events.append(RetuningEvent(self._now_ns, self.state, reasons, found))
+        self._untaken = min(self._untaken + 1, MOST_EVENTS)

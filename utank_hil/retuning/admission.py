@@ -71,7 +71,8 @@ class Admission:
             MOST_COEFFICIENTS
         ):
             return "the law's model is out of bounds"
-        service = MonitoredLaw(law.controller(), ChangeMonitor(model, self._roll))
+        monitor = ChangeMonitor(model, self._roll)
+        service = MonitoredLaw(law.controller(), monitor, candidate.summary)
         return WarmUp(service, self._history)
 
 

@@ -5,7 +5,7 @@ anything too large for the loop to read, to build and to step between two ticks.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,8 @@ from utank_hil.control import ARX, LinearLaw, PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
 
 _CANDIDATE: Final = b"CANDIDAT"
 _REFUSAL: Final = b"REFUSAL "
@@ -65,6 +67,21 @@ class ModelSummary:
     held_out_fit: float
     peak_sensitivity: float
     roll_below_passive: float
+
+    def ship(self, configured: RollShip) -> RollShip:
+        """The configured ship as she was identified; righting levers scale with the stiffness."""
+        share = self.stiffness_nm_rad / configured.stiffness_nm_rad
+        return replace(
+            configured,
+            inertia_kg_m2=self.inertia_kg_m2,
+            stiffness_nm_rad=self.stiffness_nm_rad,
+            damping_nms_rad=self.damping_nms_rad,
+            displacement_n=share * configured.displacement_n,
+        )
+
+    def tank(self, configured: Tank) -> Tank:
+        """The configured tank as it was identified."""
+        return replace(configured, damping_ratio=self.tank_damping_ratio)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control import Controller
+from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.change_monitor import ChangeMonitor
 
 FADE_SAMPLES: Final = 15
@@ -25,10 +26,19 @@ _NOTHING: Final = np.zeros(1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MonitoredLaw:
-    """A law's controller, with the monitor of how well its model fits the ship."""
+    """A law's controller, with the monitor of how well its model fits the ship.
+
+    Attributes
+    ----------
+    controller : Controller
+    monitor : ChangeMonitor
+    found : ModelSummary or None
+        The identified ship that the law was designed for; None for that of the configuration.
+    """
 
     controller: Controller
     monitor: ChangeMonitor
+    found: ModelSummary | None = None
 
 
 class LawBank:

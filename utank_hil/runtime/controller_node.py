@@ -48,8 +48,7 @@ FRESH_MS: Final = 50.0
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
 _CONTROL: Final = Demand.CONTROL
-# the pulses roll the ship on purpose; from the trial on it is known to be another than the twin
-_OFF_THE_TWIN = frozenset((RetuningState.IDENTIFY, RetuningState.TRIAL, RetuningState.RETUNED))
+_IDENTIFY: Final = RetuningState.IDENTIFY
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
@@ -182,7 +181,6 @@ class ControllerNode:
         self._sink, self._sink_every = sink, sink_every
         self._ticks_to_row = 0
         self._event_sink = event_sink
-        self._events_sent = 0
         self._law_commands = commands
         self._pump = pump
         self._valve = valve
@@ -278,7 +276,7 @@ class ControllerNode:
 
     @property
     def retuning_events(self) -> tuple[RetuningEvent, ...]:
-        """What was done so far to retune the controller."""
+        """What was done last to retune the controller."""
         return () if self._retuning is None else tuple(self._retuning.events)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -334,12 +332,13 @@ class ControllerNode:
         self._observer.observe(now_ns, self._frames_sent)
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         if self.monitors is not None:
+            excited = False
+            if self._retuning is not None:
+                # the pulses roll the ship on purpose
+                excited = self._retuning.state is _IDENTIFY
+                self.monitors.follow(self._retuning.laws.active.found)
             seen.found = self.monitors.update(
-                now_ns,
-                self.inbox,
-                seen,
-                self._level.rate_m_s,
-                excited=self.retuning_state in _OFF_THE_TWIN,
+                now_ns, self.inbox, seen, self._level.rate_m_s, excited=excited
             )
         if seen.reset_edge:
             self._drive_sequence.request_reset()
@@ -375,9 +374,8 @@ class ControllerNode:
         elif self._valve is not None:
             self._valve.ask(self._law_loss)
         if self._retuning is not None and self._event_sink is not None:
-            for event in self._retuning.events[self._events_sent :]:
+            for event in self._retuning.take_events():
                 self._event_sink(event, self.start_ns)
-                self._events_sent += 1
 
     def _note_applied(self) -> None:
         """Keep what left, and what was done of it, since the last answer."""

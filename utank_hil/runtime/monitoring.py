@@ -11,6 +11,8 @@ from typing import Final
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.retuning.answer import ModelSummary
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
 from utank_hil.runtime.monitors.finding import Finding
@@ -34,6 +36,11 @@ STALE_MS: Final = 100.0
 SILENT_S: Final = 1.0
 LATE_ROUND: Final = 1.2
 """So many rounds after the last one, ticks were left out: as a gap."""
+
+MOST_CHANGE: Final = 10.0
+"""Of inertia and stiffness by loading, either way: more is an error of the identification."""
+MOST_DAMPING_RATIO: Final = 1.0
+"""Of ship and tank, as identified."""
 
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
@@ -91,6 +98,8 @@ class Monitors:
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
         self.volume = Volume(thresholds)
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
+        self._ship, self._tank = ship, tank
+        self._followed: ModelSummary | None = None
         # a valve's loss stands neither in the tank's equation here nor in the twin
         self._water_free = plant.valve is None
         self._compares = compares and self._water_free
@@ -102,6 +111,23 @@ class Monitors:
         self._of_motion = self._of_drive = self._of_water = self._of_volume = 0
         self._of_senders = self._of_twin = self._of_saturation = 0
         self.found = 0
+
+    def follow(self, found: ModelSummary | None) -> None:
+        """Compare the law in charge with the twin of the ship that it was designed for.
+
+        Parameters
+        ----------
+        found : ModelSummary or None
+            As identified; None for the ship of the configuration, which is taken too in the place
+            of one that can't be hers.
+        """
+        if found is self._followed:
+            return
+        self._followed = found
+        ship, tank = self._ship, self._tank
+        if found is not None and _may_be(found, ship):
+            ship, tank = found.ship(ship), found.tank(tank)
+        self.twin.take(ship, tank)
 
     def watch(self, receivers: Iterable[Heard], expected: Collection[int]) -> None:
         """Watch the pace of messages; of those `expected`, by identifier, the silence too."""
@@ -227,3 +253,19 @@ class Monitors:
         self._of_water = self.equation.update(
             roll_rad, level_m, pressure_pa
         ) | self._level_stuck.update(roll_rad, level_m, pressure_pa)
+
+
+def _may_be(found: ModelSummary, configured: RollShip) -> bool:
+    """Whether an identified ship is the configured one in any loading."""
+    inertia, stiffness = found.inertia_kg_m2, found.stiffness_nm_rad
+    # written so that NaN fails too
+    if not (
+        1 / MOST_CHANGE <= inertia / configured.inertia_kg_m2 <= MOST_CHANGE
+        and 1 / MOST_CHANGE <= stiffness / configured.stiffness_nm_rad <= MOST_CHANGE
+    ):
+        return False
+    damping_ratio = found.damping_nms_rad / (2 * math.sqrt(inertia * stiffness))
+    return (
+        0.0 <= damping_ratio <= MOST_DAMPING_RATIO
+        and 0.0 <= found.tank_damping_ratio <= MOST_DAMPING_RATIO
+    )

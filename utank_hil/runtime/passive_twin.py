@@ -61,21 +61,10 @@ class PassiveTwin:
     """
 
     def __init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float) -> None:
-        a, b = state_matrices(ship, tank)
-        # pressure, moment on the ship, force on the water as a pressure
-        transition, step = transition_and_step(a, np.column_stack([b, b[:, 0]]), period_s)
-        self._step = np.hstack([transition, step])
+        self._period_s = period_s
         self._made = np.zeros(7)
         self._effort = self._made[4:]
-        self._damping = ship.quadratic_damping_nms2_rad2
-        self._loss = tank.quadratic_loss_pa_per_m2_s2
-        moment = restoring(ship)
-        self._stiffness = ship.stiffness_nm_rad
-        self._piece_rad = moment.piece_rad
-        # highest power first
-        self._pieces = [tuple(row[::-1]) for row in moment.coefficients_nm.tolist()]
-        self._straight = len(self._pieces) == 1 and not any(self._pieces[0][:-2])
-        self._period_s = period_s
+        self.take(ship, tank)
         roll_period_s = 2 * math.pi / tank.natural_frequency_rad_s
         self._share = period_s / (MEMORY_PERIODS * roll_period_s)
         self._mean_share = period_s / (MEAN_PERIODS * roll_period_s)
@@ -87,6 +76,21 @@ class PassiveTwin:
         self._losing_s = 0.0
         self.roll_rad = 0.0
         self.amplified = False
+
+    def take(self, ship: RollShip, tank: Tank) -> None:
+        """Be the twin of another ship and tank from now on; what the pump has made stays."""
+        a, b = state_matrices(ship, tank)
+        # pressure, moment on the ship, force on the water as a pressure
+        transition, step = transition_and_step(a, np.column_stack([b, b[:, 0]]), self._period_s)
+        self._step = np.hstack([transition, step])
+        self._damping = ship.quadratic_damping_nms2_rad2
+        self._loss = tank.quadratic_loss_pa_per_m2_s2
+        moment = restoring(ship)
+        self._stiffness = ship.stiffness_nm_rad
+        self._piece_rad = moment.piece_rad
+        # highest power first
+        self._pieces = [tuple(row[::-1]) for row in moment.coefficients_nm.tolist()]
+        self._straight = len(self._pieces) == 1 and not any(self._pieces[0][:-2])
 
     @property
     def ship_rms_rad(self) -> float:

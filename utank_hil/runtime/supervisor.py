@@ -150,9 +150,7 @@ class Supervisor:
             self._disarm(Mode.PASSIVE)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:
-        # being out of operation enabled counts from here on
-        self._drive_enabled_ns = now_ns
-        seen.drive_out_ms = 0.0
+        seen.drive_out_ms = 0.0  # off, as it should be
         refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
             self.fault = refusal[0]
@@ -189,7 +187,6 @@ class Supervisor:
         # in PASSIVE the drive holds zero pressure, enabled; elsewhere it is off
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
-        self._zero_at_ns = _NEVER_NS
         self._reset_until_ns = None
         self.reset_refused_by = Fault.NONE
 

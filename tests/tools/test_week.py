@@ -1,0 +1,58 @@
+"""A shorter week with tighter bounds: a thousand seconds, retuned and disturbed all the while."""
+
+import pytest
+
+from firmware_sim.scenario import Scenario
+from tools.studies.week import SCENARIO, Sample, sail, verdict
+from utank_hil.arrays import FloatArray
+from utank_hil.assembly import retuning_task
+from utank_hil.configuration import load_config
+from utank_hil.control import wave_arx
+from utank_hil.control.washout import WashoutLaw
+from utank_hil.retuning import Answer, Candidate, ModelSummary, RetuningSettings
+
+SETTINGS = RetuningSettings((6.0, 20.0), identification_s=10.0, trial_s=30.0, pulse_pa=10e3)
+
+
+def configured_law() -> Candidate:
+    """An answer that costs nothing: the configured law, for the configured ship."""
+    config = load_config(SCENARIO, Scenario).controllers["gpc"]
+    task = retuning_task(config, 200, (6.0, 20.0))
+    law = task.design.law(task.plant)
+    assert isinstance(law, WashoutLaw)
+    ship = task.plant.ship
+    found = ModelSummary(
+        12.6, 0.01, ship.inertia_kg_m2, ship.stiffness_nm_rad, ship.damping_nms_rad,
+        task.plant.tank.damping_ratio, 0.99, 1.2, 0.3,
+    )  # fmt: skip
+    return Candidate(law.law, law.corner_rad_s, wave_arx(task.design.predictor, task.plant), found)
+
+
+@pytest.mark.slow
+def test_faults_and_retunings_leave_nothing_behind() -> None:
+    candidate = configured_law()
+
+    def retune(record: FloatArray) -> Answer:
+        return candidate
+
+    samples, counts = sail(
+        1000, 50, settings=SETTINGS, retune=retune, episode_s=75.0, cargo_s=150.0
+    )
+    print(counts, verdict(samples))
+    assert counts["last 50 events: RETUNED"] > 0
+    assert min(counts[name] for name in ("silence", "lost_link", "strange_frames")) > 0
+    found = verdict(samples)
+    assert found["objects_ratio"] <= 1.002
+    assert found["resident_growth_mb"] <= 2.0
+    assert found["more_descriptors"] <= 0
+
+
+def test_what_grows_is_found() -> None:
+    flat = [Sample(hour, 100.0, 10_000, 9, 50.0) for hour in range(16)]
+    assert verdict(flat)["flat"]
+    for name, slope in (("resident_mb", 1.0), ("objects", 50), ("descriptors", 1), ("tick_us", 1)):
+        grown = [
+            Sample(**{**vars(each), name: vars(each)[name] + slope * i})
+            for i, each in enumerate(flat)
+        ]
+        assert not verdict(grown)["flat"]

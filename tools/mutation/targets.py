@@ -1,0 +1,98 @@
+"""The files that are mutated, the tests that are to notice, and what no test can notice."""
+
+from dataclasses import dataclass
+
+_NEVER = "any time that never comes is as good"
+_SET_FIRST = "set before it is read, on every way there"
+_OF_40_MS = "a millisecond of the 40 that are allowed"
+_SUM = "a difference of numbers is finite exactly where their sum is"
+_TOUCHING = "a millimetre from the limit the barrier asks for the whole brake on either side"
+NO_DIFFERENCE: dict[str, dict[str, str]] = {
+    "utank_hil/runtime/supervisor.py": {
+        ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
+        ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 1 << 63": _NEVER,
+        "Supervisor.__init__: self._drive_enabled_ns = 0 -> ": _SET_FIRST,
+        "Supervisor.__init__: self._drive_enabled_ns = 0 -> self._drive_enabled_ns = 1": _SET_FIRST,
+        "Supervisor.__init__: self._zero_at_ns = _NEVER_NS -> ": _SET_FIRST,
+        "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
+        "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
+    },
+    "utank_hil/control/limits.py": {
+        "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
+        "if math.isfinite(desired_pa + level_m - level_rate_m_s):": _SUM,
+        "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
+        "if math.isfinite(desired_pa - level_m + level_rate_m_s):": _SUM,
+        "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m < 0.001:": _TOUCHING,
+        "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m <= 0.00125:": _TOUCHING,
+    },
+    "firmware_sim/drive_states.py": {
+        "DriveStates.command: return -> ": "in FAULT no other word has a transition",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Target:
+    """One file of the safety code.
+
+    Attributes
+    ----------
+    file : str
+    tests : tuple of str
+        Those that mirror it.
+    behind : tuple of str
+        Further tests, for mutants that the first ones let live.
+    """
+
+    file: str
+    tests: tuple[str, ...]
+    behind: tuple[str, ...] = ()
+
+
+_NODE = ("tests/runtime/test_controller_node.py", "tests/runtime/test_controller_faults.py")
+_SUPERVISOR = "tests/runtime/test_supervisor.py"
+
+TARGETS = (
+    Target("utank_hil/runtime/supervisor.py", (_SUPERVISOR,), _NODE),
+    Target("utank_hil/runtime/judging.py", (_SUPERVISOR,), ("tests/runtime/test_alarms.py",)),
+    Target(
+        "utank_hil/runtime/safety_limits.py",
+        (_SUPERVISOR, "tests/runtime/test_safety_limits.py"),
+        _NODE,
+    ),
+    Target("utank_hil/control/limits.py", ("tests/control/test_limits.py",)),
+    Target(
+        "utank_hil/canbus/endpoints.py",
+        ("tests/canbus/test_endpoints.py",),
+        ("tests/canbus/test_codec.py", "tests/runtime/test_orders.py"),
+    ),
+    Target("utank_hil/canbus/e2e.py", ("tests/canbus/test_e2e.py",)),
+    Target(
+        "utank_hil/runtime/inbox.py",
+        ("tests/runtime/test_inbox.py",),
+        (
+            "tests/runtime/test_lost_levels.py",
+            "tests/runtime/test_valve_command.py",
+            "tests/runtime/test_stations.py",
+            "tests/runtime/test_monitoring.py",
+            *_NODE,
+        ),
+    ),
+    Target("firmware_sim/drive.py", ("tests/firmware_sim/test_drive.py",)),
+    Target("firmware_sim/drive_states.py", ("tests/firmware_sim/test_drive_states.py",)),
+    Target(
+        "utank_hil/runtime/controller_node.py",
+        _NODE,
+        (
+            "tests/runtime/test_valve_command.py",
+            "tests/runtime/test_law_that_starts_anew.py",
+            "tests/runtime/test_lost_levels.py",
+            "tests/runtime/test_monitoring.py",
+            "tests/runtime/test_alarms.py",
+            "tests/runtime/test_lockstep.py",
+            "tests/runtime/test_invariants.py",
+            "tests/firmware_sim/test_vessel_without_pump.py",
+            "tests/faults/test_retuning_events.py",
+        ),
+    ),
+)
