@@ -42,6 +42,11 @@ class Catalogue:
         self.can_ids = frozenset(codec.can_id for codec in codecs.values())
         self._codecs = dict(codecs)
 
+    @property
+    def codecs(self) -> tuple[Codec[Any], ...]:
+        """Codecs of all messages."""
+        return tuple(self._codecs.values())
+
     def codec(self, message_type: type[T], source: Address | None = None) -> Codec[T]:
         """Return the codec of a message.
 
