@@ -117,12 +117,12 @@ def causes(
     found = [
         f"{name}: recorded {recorded}, here {here}"
         for name, recorded, here in (
-            ("version", about["version"], version()),
-            ("commit", about["commit"], commit()),
+            ("version", about.get("version"), version()),
+            ("commit", about.get("commit"), commit()),
             ("catalogue", head["catalogue"], load_catalogue().version),
             *((name, head["packages"].get(name), here) for name, here in _packages().items()),
         )
-        if recorded != here
+        if recorded not in (None, here)
     ]
     digests = {
         name: hashlib.sha256(zlib.decompress(base64.b85decode(data))).hexdigest()
