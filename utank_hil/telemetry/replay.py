@@ -200,7 +200,7 @@ class _Comparison:
 
     def __init__(self, result: ReplayResult) -> None:
         self._result = result
-        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs}
+        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
         self._tick, self._time_s = 0, 0.0
 
     def at(self, tick: int, time_s: float) -> None:
