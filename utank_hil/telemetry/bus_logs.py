@@ -133,9 +133,7 @@ def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[
             yield entry
             entry = next(waiting, None)
         # the last frames of all may be what a controller leaves behind, after its last tick
-        leaves = tick == last_own and commands.issuperset(
-            frame.can_id for frame in by_tick[tick]
-        )
+        leaves = tick == last_own and commands.issuperset(frame.can_id for frame in by_tick[tick])
         yield Kind.STOP if leaves else Kind.TICK, 0, 0, 0, now_ns, b""
         for can_id, data in by_tick.get(tick, ()):
             yield Kind.SENT, len(data), 0, can_id, now_ns, data
