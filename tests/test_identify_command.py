@@ -29,7 +29,7 @@ def _rows(period_s: float, duration_s: float = 300.0) -> FloatArray:
     stiffness = configured.inertia_kg_m2 * (2 * np.pi / period_s) ** 2
     ship = RollShip(configured.inertia_kg_m2, stiffness, configured.damping_nms_rad)
     plant = sample(pump_model(ship, tank, ("roll_rad", "level_m")), 0.2, 0.05, 0.1)
-    pulses = random_pulses(duration_s, config.limits, 1)
+    pulses = random_pulses(duration_s, config.limits, 1, sample_time_s=0.2)
     state, y = np.zeros(len(plant.A)), np.zeros((len(pulses), 2))
     for k, pressure_pa in enumerate(pulses):
         y[k] = plant.C @ state + plant.D[:, 0] * pressure_pa

@@ -52,6 +52,8 @@ class Instant:
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
         rotation: Rotation | None = None,
+        frames: str | None = None,
+        head: Mapping[str, Any] | None = None,
     ) -> None:
         file.write_text(ring)
 

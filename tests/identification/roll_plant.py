@@ -64,7 +64,7 @@ def plant(period_s: float = 2 * np.pi / 0.5) -> Plant:
 
 
 def pulses(seed: int, limits: PumpLimits = FAST_PUMP, duration_s: float = 500.0) -> FloatArray:
-    return random_pulses(duration_s, limits, seed)
+    return random_pulses(duration_s, limits, seed, sample_time_s=SAMPLE_TIME_S)
 
 
 def noisy(y: FloatArray, level: float, seed: int) -> FloatArray:

@@ -82,7 +82,7 @@ def says_why(refusal: ValueError) -> None:
 def model_of(u: FloatArray, y: FloatArray, order: int) -> OkidResult | None:
     """The model, None for a refusal."""
     try:
-        return okid(u, y, order)
+        return okid(u, y, order, sample_time_s=0.2)
     except IdentificationError as refusal:
         says_why(refusal)
         return None
@@ -128,8 +128,8 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
     if result is None:
         return
     try:
-        system = era(result.markov)
-        found, gain = era_with_observer(result.markov, result.observer_gain)
+        system = era(result.markov, sample_time_s=0.2)
+        found, gain = era_with_observer(result.markov, result.observer_gain, sample_time_s=0.2)
     except IdentificationError as refusal:
         says_why(refusal)
         return
@@ -151,7 +151,7 @@ def test_what_follows_okid_takes_every_model_it_makes(record: Record, order: int
 def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
     for method in (era, era_dc):
         try:
-            system = method(markov)
+            system = method(markov, sample_time_s=0.2)
         except ValueError as refusal:  # an IdentificationError is one
             says_why(refusal)
             continue
@@ -163,7 +163,7 @@ def test_era_ends_in_a_finite_model_or_a_refusal(markov: FloatArray) -> None:
 @given(spoiled())
 def test_waves_are_looked_for_in_any_record(record: Record) -> None:
     try:
-        lines = find_disturbance_frequencies(*record)
+        lines = find_disturbance_frequencies(*record, sample_time_s=0.2)
     except IdentificationError as refusal:
         says_why(refusal)
         return
@@ -174,7 +174,7 @@ def test_waves_are_looked_for_in_any_record(record: Record) -> None:
 @given(spoiled())
 def test_tracking_stays_finite_and_goes_on_afterwards(record: Record) -> None:
     u, y = record
-    model = RecursiveArx(3, np.ones(y.shape[1]), np.ones(u.shape[-1] if u.ndim == 2 else 1))
+    model = RecursiveArx(3, np.ones(y.shape[1]), np.ones(u.shape[-1] if u.ndim == 2 else 1), 0.2)
     for inputs, outputs in zip(u, y, strict=True):
         model.update(inputs, outputs)
     assert np.isfinite(model.arx.alpha).all()

@@ -19,14 +19,16 @@ from utank_hil.identification import (
 
 def _noisy_markov(seed: int, order: int = 60) -> FloatArray:
     u, truth = pulses(seed), plant()
-    return okid(u, noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed), order).markov
+    return okid(
+        u, noisy(truth.respond(u, np.zeros_like(u)), 0.02, seed), order, sample_time_s=0.2
+    ).markov
 
 
 @pytest.mark.parametrize("realize", [era, era_dc])
 def test_exact_markov_parameters_give_the_system_back(realize) -> None:  # type: ignore[no-untyped-def]
     truth = plant()
-    assert response_error(realize(truth.markov(401), 4), truth).max() < 1e-9
-    assert response_error(realize(truth.markov(150)), truth).max() < 1e-9
+    assert response_error(realize(truth.markov(401), 4, sample_time_s=0.2), truth).max() < 1e-9
+    assert response_error(realize(truth.markov(150), sample_time_s=0.2), truth).max() < 1e-9
 
 
 def test_feed_through_and_any_shape_come_through() -> None:
@@ -48,7 +50,7 @@ def test_feed_through_and_any_shape_come_through() -> None:
         ]
     )
     markov[1] = system.C @ system.B
-    found = era(markov, 3, 0.5)
+    found = era(markov, 3, sample_time_s=0.5)
     assert found.dt == 0.5
     np.testing.assert_allclose(np.sort(found.poles().real), [-0.5, 0.3, 0.9], atol=1e-10)
     np.testing.assert_allclose(found.dcgain(), system.dcgain(), atol=1e-9)
@@ -63,38 +65,40 @@ def test_singular_values_tell_the_order() -> None:
 
 def test_window_shorter_than_a_roll_period_is_worse() -> None:
     markov = _noisy_markov(1)
-    wide = response_error(era(markov, 4), plant()).max()
-    narrow = response_error(era(markov[:31], 4), plant()).max()
+    wide = response_error(era(markov, 4, sample_time_s=0.2), plant()).max()
+    narrow = response_error(era(markov[:31], 4, sample_time_s=0.2), plant()).max()
     assert narrow > 5 * wide
 
 
 def test_scaling_of_outputs_and_inputs_does_not_matter() -> None:
     markov = _noisy_markov(1)
     factors = np.array([[1e6], [1e-3]])
-    one, other = era(markov, 4), era(markov * factors, 4)
+    one, other = era(markov, 4, sample_time_s=0.2), era(markov * factors, 4, sample_time_s=0.2)
     np.testing.assert_allclose(np.sort_complex(one.poles()), np.sort_complex(other.poles()))
 
 
 def test_data_correlations_average_over_lags() -> None:
     truth = plant()
-    error = np.mean([response_error(era_dc(_noisy_markov(s), 4), truth) for s in range(3)])
+    error = np.mean(
+        [response_error(era_dc(_noisy_markov(s), 4, sample_time_s=0.2), truth) for s in range(3)]
+    )
     assert error < 0.01
 
 
 def test_bad_requests_are_refused() -> None:
     markov = plant().markov(101)
     with pytest.raises(ValueError, match="from 1 to 4"):
-        era(markov, 5)
+        era(markov, 5, sample_time_s=0.2)
     with pytest.raises(ValueError, match="from 1 to 4"):
-        era(markov, 0)
+        era(markov, 0, sample_time_s=0.2)
     with pytest.raises(ValueError, match=r"shape \(K, m, r\)"):
-        era(markov[:, :, 0])
+        era(markov[:, :, 0], sample_time_s=0.2)
     with pytest.raises(ValueError, match="finite"):
-        era(markov * np.nan)
+        era(markov * np.nan, sample_time_s=0.2)
     with pytest.raises(ValueError, match="9 Markov parameters leave no"):
-        era_dc(markov[:9], 2)
-    assert era_dc(markov[:10], 4).nstates == 4
+        era_dc(markov[:9], 2, sample_time_s=0.2)
+    assert era_dc(markov[:10], 4, sample_time_s=0.2).nstates == 4
     with pytest.raises(ValueError, match="observer_gain must have shape"):
-        era_with_observer(markov, np.zeros((50, 2, 2)))
+        era_with_observer(markov, np.zeros((50, 2, 2)), sample_time_s=0.2)
     with pytest.raises(IdentificationError, match="moves no output"):
-        era(np.zeros((10, 1, 1)), 1)
+        era(np.zeros((10, 1, 1)), 1, sample_time_s=0.2)

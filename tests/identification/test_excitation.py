@@ -1,6 +1,7 @@
 """Excitations keep the pump's limits, excite, and come out the same for the same seed."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -22,10 +23,12 @@ from utank_hil.identification import (
 
 LIMITS = PumpLimits(pressure_pa=5e4, rate_pa_s=1e5)
 SIGNALS: dict[str, Callable[[float, PumpLimits, int], FloatArray]] = {
-    "random pulses": random_pulses,
-    "prbs": prbs,
-    "multisine": multisine,
-    "chirp": lambda duration_s, limits, seed: chirp(duration_s, limits),
+    "random pulses": partial(random_pulses, sample_time_s=SAMPLE_TIME_S),
+    "prbs": partial(prbs, sample_time_s=SAMPLE_TIME_S),
+    "multisine": partial(multisine, sample_time_s=SAMPLE_TIME_S),
+    "chirp": lambda duration_s, limits, seed: chirp(
+        duration_s, limits, sample_time_s=SAMPLE_TIME_S
+    ),
 }
 
 
@@ -57,8 +60,10 @@ def test_another_seed_gives_another_signal_of_useful_size(name: str) -> None:
 
 
 def test_random_pulses_and_prbs_excite_every_coefficient_of_the_thesis_models() -> None:
-    assert excitation_order(random_pulses(500.0, LIMITS, 1), 201) == 201
-    assert excitation_order(prbs(500.0, LIMITS, 1), 201) == 201
+    assert (
+        excitation_order(random_pulses(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S), 201) == 201
+    )
+    assert excitation_order(prbs(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S), 201) == 201
 
 
 def test_order_of_excitation_counts_sines_twice_and_a_constant_once() -> None:
@@ -75,12 +80,15 @@ def test_order_of_excitation_counts_sines_twice_and_a_constant_once() -> None:
 
 
 def test_narrow_band_is_seen_for_what_it_is() -> None:
-    narrow = multisine(500.0, LIMITS, 1, band_rad_s=(0.4, 0.6))
+    narrow = multisine(500.0, LIMITS, 1, band_rad_s=(0.4, 0.6), sample_time_s=SAMPLE_TIME_S)
     assert 8 <= excitation_order(narrow, 201) < 40
 
 
 def test_multisine_and_chirp_hold_their_band() -> None:
-    for pressure in (multisine(500.0, LIMITS, 1), chirp(500.0, LIMITS)):
+    for pressure in (
+        multisine(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S),
+        chirp(500.0, LIMITS, sample_time_s=SAMPLE_TIME_S),
+    ):
         power = np.abs(np.fft.rfft(pressure)) ** 2
         omega = 2 * np.pi * np.fft.rfftfreq(len(pressure), SAMPLE_TIME_S)
         inside = (omega > 0.19) & (omega < 1.25)
@@ -90,7 +98,7 @@ def test_multisine_and_chirp_hold_their_band() -> None:
 def test_scale_keeps_level_and_added_roll_within_their_limits() -> None:
     truth = plant()
     model = ARX.from_state_space(truth.state_space(), 4)
-    pressure = random_pulses(500.0, LIMITS, 1)
+    pressure = random_pulses(500.0, LIMITS, 1, sample_time_s=SAMPLE_TIME_S)
     response = np.abs(truth.respond(pressure, 0 * pressure)).max(axis=0)
     limits = response * [0.5, 0.8]
     scale = response_scale(pressure, model, limits)
@@ -103,13 +111,13 @@ def test_scale_keeps_level_and_added_roll_within_their_limits() -> None:
 
 def test_bad_requests_are_refused() -> None:
     with pytest.raises(ValueError, match="do not last one sample"):
-        prbs(0.05, LIMITS, 1)
+        prbs(0.05, LIMITS, 1, sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="hold_s must rise"):
-        random_pulses(10.0, LIMITS, 1, hold_s=(3.0, 1.0))
+        random_pulses(10.0, LIMITS, 1, hold_s=(3.0, 1.0), sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="no harmonic"):
-        multisine(5.0, LIMITS, 1, band_rad_s=(0.2, 0.3))
+        multisine(5.0, LIMITS, 1, band_rad_s=(0.2, 0.3), sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="band_rad_s must rise"):
-        chirp(50.0, LIMITS, band_rad_s=(1.0, 0.3))
+        chirp(50.0, LIMITS, band_rad_s=(1.0, 0.3), sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="sample_time_s"):
         chirp(50.0, LIMITS, sample_time_s=0.0)
     model = ARX.from_state_space(plant().state_space(), 4)

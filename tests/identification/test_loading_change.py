@@ -38,9 +38,11 @@ def test_ship_is_found_again_after_loading(
 ) -> None:
     truth, u = plant(period_s=7.5), pulses(4, SLOW_PUMP)
     y = noisy(truth.respond(u, _sea(sea, len(u))), 0.01, 6)[:, :outputs]
-    waves = find_disturbance_frequencies(u, y)
+    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
     assert waves == (pytest.approx((0.8,), abs=5e-4) if sea == "regular" else ())
-    found = modal_confidence(okid(u, y, order, disturbance_frequencies_rad_s=waves), 4)
+    found = modal_confidence(
+        okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S), 4
+    )
     right = truth.poles_rad_s()
     assert found.modes.frequency_rad_s == pytest.approx(np.abs(right), rel=frequency_error)
     damping = -right.real / np.abs(right)

@@ -61,7 +61,7 @@ def test_integrators_dead_poles_and_modes_that_no_output_shows_have_figures_all_
 
 def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
     u = pulses(1)
-    result = okid(u, noisy(plant().respond(u, 0 * u), 0.01, 1)[:, :1], 10)
+    result = okid(u, noisy(plant().respond(u, 0 * u), 0.01, 1)[:, :1], 10, sample_time_s=0.2)
     markov = np.zeros_like(result.markov)
     markov[2] = 1.0  # a delay: two poles at zero
     with pytest.raises(IdentificationError, match="order 2 has poles that coincide"):
@@ -77,7 +77,7 @@ def test_orthogonal_shapes_have_no_assurance() -> None:
 def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) -> None:
     # draws from the coefficients' own distribution, each through recursion and ERA
     u, truth = pulses(1, limits), plant()
-    result = okid(u, noisy(truth.respond(u, 0 * u), NOISE, 1), 25)
+    result = okid(u, noisy(truth.respond(u, 0 * u), NOISE, 1), 25, sample_time_s=0.2)
     stated = modal_confidence(result, 4)
     p, m = 25, 2
     gram = np.triu(result.gram) + np.triu(result.gram, 1).T
@@ -97,7 +97,9 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
         shift /= result.column_scale[:, None]
         by_lag = np.vstack([np.zeros((m, m)), shift]).reshape(p + 1, 3, m).transpose(0, 2, 1)
         moved = ARX(result.arx.alpha + by_lag[1:, :, :m], result.arx.beta + by_lag[:, :, m:], 0.2)
-        found = modal_parameters(era(markov_parameters(moved, len(result.markov))[0], 4))
+        found = modal_parameters(
+            era(markov_parameters(moved, len(result.markov))[0], 4, sample_time_s=0.2)
+        )
         draws.append(np.concatenate([found.frequency_rad_s, found.damping_ratio]))
     spread = np.std(draws, axis=0)
     expected = np.concatenate([stated.frequency_std_rad_s, stated.damping_ratio_std])
@@ -106,7 +108,7 @@ def test_delta_method_is_the_spread_of_redrawn_coefficients(limits: PumpLimits) 
 
 def test_data_without_noise_leave_no_doubt() -> None:
     u = pulses(1)
-    stated = modal_confidence(okid(u, plant().respond(u, 0 * u), 60), 4)
+    stated = modal_confidence(okid(u, plant().respond(u, 0 * u), 60, sample_time_s=0.2), 4)
     assert stated.frequency_std_rad_s.max() < 1e-10
     low, high = stated.intervals()[0].T
     assert np.all(low <= stated.modes.frequency_rad_s)
@@ -120,7 +122,7 @@ def test_bias_variance_and_coverage_against_the_cramer_rao_bound(runs: int) -> N
     right = _true_modes(truth)
     found, stated = np.empty((runs, 4)), np.empty((runs, 4))
     for run in range(runs):
-        confidence = modal_confidence(okid(u, noisy(clean, NOISE, run), 120), 4)
+        confidence = modal_confidence(okid(u, noisy(clean, NOISE, run), 120, sample_time_s=0.2), 4)
         found[run] = np.concatenate(
             [confidence.modes.frequency_rad_s, confidence.modes.damping_ratio]
         )

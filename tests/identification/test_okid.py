@@ -1,5 +1,8 @@
 """OKID: exact on exact data, right under waves, clear when it cannot be."""
 
+import inspect
+from collections.abc import Callable
+
 import control
 import numpy as np
 import pytest
@@ -41,9 +44,9 @@ def _relative(found: FloatArray, true: FloatArray) -> float:
 def test_exact_data_give_markov_parameters_poles_and_zeros(order: int, outputs: int) -> None:
     u, truth = pulses(1), plant()
     y = truth.respond(u, np.zeros_like(u))[:, :outputs]
-    result = okid(u, y, order)
+    result = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
     assert _relative(result.markov, truth.markov(len(result.markov))[:, :outputs]) < 1e-8
-    system = era(result.markov, 4)
+    system = era(result.markov, 4, sample_time_s=SAMPLE_TIME_S)
     expected = truth.state_space()[:outputs, 0]
     order_of = np.argsort
     poles, right = system.poles(), expected.poles()
@@ -63,19 +66,27 @@ def test_exact_data_give_markov_parameters_poles_and_zeros(order: int, outputs: 
 def test_wave_of_known_frequency_and_unknown_phase_leaves_the_model_exact(order: int) -> None:
     u, truth = pulses(1), plant()
     y = truth.respond(u, _wave(len(u)))
-    result = okid(u, y, order, disturbance_frequencies_rad_s=[WAVE_RAD_S])
+    result = okid(
+        u, y, order, disturbance_frequencies_rad_s=[WAVE_RAD_S], sample_time_s=SAMPLE_TIME_S
+    )
     assert _relative(result.markov, truth.markov(len(result.markov))) < 1e-8
-    assert response_error(era(result.markov, 4), truth).max() < 1e-8
+    assert response_error(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), truth).max() < 1e-8
 
 
 def test_wave_of_unknown_frequency_and_phase_gives_the_same_model() -> None:
     u, truth = pulses(1), plant()
     calm = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
     y = calm + truth.respond(np.zeros_like(u), _wave(len(u), 2.0, 0.6173))
-    frequencies = find_disturbance_frequencies(u, y)
+    frequencies = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
     assert frequencies == pytest.approx([0.6173], abs=2e-4)
-    quiet = era(okid(u, calm, 120).markov, 4)
-    rough = era(okid(u, y, 120, disturbance_frequencies_rad_s=frequencies).markov, 4)
+    quiet = era(okid(u, calm, 120, sample_time_s=SAMPLE_TIME_S).markov, 4, sample_time_s=0.2)
+    rough = era(
+        okid(
+            u, y, 120, disturbance_frequencies_rad_s=frequencies, sample_time_s=SAMPLE_TIME_S
+        ).markov,
+        4,
+        sample_time_s=0.2,
+    )
     assert response_error(quiet, truth).max() < 0.005
     assert response_error(rough, truth).max() < 0.005
 
@@ -83,7 +94,12 @@ def test_wave_of_unknown_frequency_and_phase_gives_the_same_model() -> None:
 def test_without_its_basis_a_low_order_is_ruined_by_a_wave_and_a_high_one_is_not() -> None:
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, _wave(len(u))), 0.01, 2)
-    error = {p: response_error(era(okid(u, y, p).markov, 4), truth).max() for p in (30, 120)}
+    error = {
+        p: response_error(
+            era(okid(u, y, p, sample_time_s=SAMPLE_TIME_S).markov, 4, sample_time_s=0.2), truth
+        ).max()
+        for p in (30, 120)
+    }
     assert error[30] > 0.05
     assert error[120] < 0.01
 
@@ -95,9 +111,9 @@ def test_offset_drift_and_decaying_transient_are_taken_out_by_their_bases() -> N
     heel = still + np.outer(0.02 + 1e-5 * time_s, [1.0, 5.0])
     decay = still + np.outer(np.exp(-0.02 * time_s), [0.1, 0.3])
     markov = truth.markov(401)
-    found = okid(u, heel, 8, disturbance_polynomial_degree=1)
+    found = okid(u, heel, 8, disturbance_polynomial_degree=1, sample_time_s=SAMPLE_TIME_S)
     assert _relative(found.markov, markov) < 1e-8
-    found = okid(u, decay, 8, disturbance_decay_rates_1_s=[0.02])
+    found = okid(u, decay, 8, disturbance_decay_rates_1_s=[0.02], sample_time_s=SAMPLE_TIME_S)
     assert _relative(found.markov, markov) < 1e-8
     assert found.disturbance.shape == (1, 2)
 
@@ -105,7 +121,7 @@ def test_offset_drift_and_decaying_transient_are_taken_out_by_their_bases() -> N
 def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() -> None:
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
-    result = okid(u, y, 20)
+    result = okid(u, y, 20, sample_time_s=SAMPLE_TIME_S)
     errors = (y - result.arx.predict(u[:, None], y))[20:]
     covariance = errors.T @ errors / (result.rows - result.rank)
     np.testing.assert_allclose(result.residual_covariance, covariance, rtol=1e-8)
@@ -119,19 +135,25 @@ def test_arx_predicts_the_record_and_markov_parameters_are_its_pulse_response() 
 def test_arx_is_the_model_that_okid_begins_with() -> None:
     rng = np.random.default_rng(3)
     u, y = rng.standard_normal((800, 2)), rng.standard_normal((800, 2)).cumsum(axis=0)
-    known = {"disturbance_frequencies_rad_s": (0.6,), "disturbance_polynomial_degree": 0}
-    found, whole = arx(u, y, 12, 0.2, **known), okid(u, y, 12, 0.2, **known)
+    known = {
+        "sample_time_s": SAMPLE_TIME_S,
+        "disturbance_frequencies_rad_s": (0.6,),
+        "disturbance_polynomial_degree": 0,
+    }
+    found, whole = arx(u, y, 12, **known), okid(u, y, 12, **known)
     assert np.array_equal(found.alpha, whole.arx.alpha)
     assert np.array_equal(found.beta, whole.arx.beta)
     with pytest.raises(IdentificationError, match="rows"):
-        arx(u[:30], y[:30], 12)
+        arx(u[:30], y[:30], 12, sample_time_s=SAMPLE_TIME_S)
 
 
 def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, np.zeros_like(u)), 0.01, 2)
-    result = okid(u, y, 40)
-    system, gain = era_with_observer(result.markov, result.observer_gain, 4)
+    result = okid(u, y, 40, sample_time_s=SAMPLE_TIME_S)
+    system, gain = era_with_observer(
+        result.markov, result.observer_gain, 4, sample_time_s=SAMPLE_TIME_S
+    )
     a, b, c = (np.asarray(part) for part in (system.A, system.B, system.C))
     d = np.asarray(system.D)[:, 0]
     state, errors = np.zeros(4), np.empty_like(y)
@@ -145,18 +167,18 @@ def test_observer_of_the_identified_model_predicts_like_the_arx_model() -> None:
 def test_two_inputs_are_told_apart() -> None:
     u, moment = pulses(1), 4e2 * pulses(2)
     y = plant().respond(u, moment)
-    result = okid(np.column_stack([u, moment]), y, 10)
+    result = okid(np.column_stack([u, moment]), y, 10, sample_time_s=SAMPLE_TIME_S)
     truth = plant()
     both = control.ss(truth.a, truth.b, truth.c, np.zeros((2, 2)), SAMPLE_TIME_S)
-    found = frequency_response(era(result.markov, 4))
+    found = frequency_response(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S))
     np.testing.assert_allclose(found, frequency_response(both), rtol=1e-8)
 
 
 def test_units_of_the_record_do_not_matter() -> None:
     u = pulses(1)
     y = noisy(plant().respond(u, np.zeros_like(u)), 0.01, 2)
-    pascals = okid(u, y, 20).markov
-    other = okid(u * 1e-5, y * [57.3, 100.0], 20).markov
+    pascals = okid(u, y, 20, sample_time_s=SAMPLE_TIME_S).markov
+    other = okid(u * 1e-5, y * [57.3, 100.0], 20, sample_time_s=SAMPLE_TIME_S).markov
     np.testing.assert_allclose(other / [[57.3e5], [100e5]], pascals, rtol=1e-6, atol=1e-20)
 
 
@@ -166,7 +188,7 @@ def test_gaps_are_left_out_and_time_goes_on_through_them() -> None:
     y[500:530] = np.nan
     u[1500] = np.nan
     y[1800, 1] = np.inf
-    result = okid(u, y, 30, disturbance_frequencies_rad_s=[WAVE_RAD_S])
+    result = okid(u, y, 30, disturbance_frequencies_rad_s=[WAVE_RAD_S], sample_time_s=SAMPLE_TIME_S)
     assert _relative(result.markov, truth.markov(len(result.markov))) < 1e-8
     assert result.rows == 2500 - 30 - (30 + 30) - (1 + 30) - (1 + 30)
 
@@ -174,13 +196,18 @@ def test_gaps_are_left_out_and_time_goes_on_through_them() -> None:
 def test_excitation_order_is_reported() -> None:
     time_s = np.arange(2500) * SAMPLE_TIME_S
     u = 1e4 * (np.sin(0.5 * time_s) + np.sin(2.0 * time_s) + np.sin(5.0 * time_s))
-    assert okid(u, plant().respond(u, 0 * u), 20).excitation_order == 6
-    assert okid(pulses(1), plant().respond(pulses(1), 0 * u), 20).excitation_order == 21
+    assert okid(u, plant().respond(u, 0 * u), 20, sample_time_s=SAMPLE_TIME_S).excitation_order == 6
+    assert (
+        okid(
+            pulses(1), plant().respond(pulses(1), 0 * u), 20, sample_time_s=SAMPLE_TIME_S
+        ).excitation_order
+        == 21
+    )
 
 
 def _refused(reason: str, u: FloatArray, y: FloatArray, order: int = 20) -> None:
     with pytest.raises(IdentificationError, match=reason):
-        okid(u, y, order)
+        okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
 
 
 def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
@@ -216,7 +243,17 @@ def test_records_that_tell_nothing_are_refused_with_the_reason() -> None:
 )
 def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        okid(pulses(1), plant().respond(pulses(1), pulses(2)), **arguments)  # type: ignore[arg-type]
+        okid(
+            pulses(1),
+            plant().respond(pulses(1), pulses(2)),
+            **{"sample_time_s": SAMPLE_TIME_S, **arguments},  # type: ignore[arg-type]
+        )
+
+
+@pytest.mark.parametrize("function", [okid, arx, era, find_disturbance_frequencies])
+def test_no_sample_time_is_assumed(function: Callable[..., object]) -> None:
+    parameter = inspect.signature(function).parameters["sample_time_s"]
+    assert parameter.default is inspect.Parameter.empty
 
 
 @pytest.mark.parametrize("step", [1e-3, 1e-2, 0.1, 0.5])
@@ -228,7 +265,7 @@ def test_coarse_steps_of_a_sensor_are_not_taken_for_clipping(step: float, noise:
         u = pulses(1)
         y = np.sin(2 * np.pi / period_s * time_s) + 1e-6 * u
         y += noise * np.random.default_rng(1).standard_normal(len(u))
-        assert okid(u, step * np.round(y / step), 4).rows == 2496
+        assert okid(u, step * np.round(y / step), 4, sample_time_s=SAMPLE_TIME_S).rows == 2496
 
 
 def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters() -> None:
@@ -238,17 +275,19 @@ def test_what_a_clipped_sensor_does_to_a_model_is_refused_before_it_matters() ->
         limit = part * np.abs(y[:, 0]).max()
         clipped = np.column_stack([np.clip(y[:, 0], -limit, limit), y[:, 1]])
         try:
-            result = okid(u, clipped, 120)
+            result = okid(u, clipped, 120, sample_time_s=SAMPLE_TIME_S)
         except IdentificationError:
             continue
-        assert response_error(era(result.markov, 4), truth).max() < 0.03
+        assert (
+            response_error(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), truth).max() < 0.03
+        )
 
 
 def test_records_of_the_wrong_shape_are_refused() -> None:
     with pytest.raises(ValueError, match="y has 10 samples and u has 9"):
-        okid(np.zeros(9), np.zeros(10))
+        okid(np.zeros(9), np.zeros(10), sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="u must have shape"):
-        okid(np.zeros((10, 2, 2)), np.zeros(10))
+        okid(np.zeros((10, 2, 2)), np.zeros(10), sample_time_s=SAMPLE_TIME_S)
 
 
 def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
@@ -278,7 +317,7 @@ def _broken(seed: int) -> tuple[FloatArray, FloatArray, int]:
 def test_any_record_ends_in_a_finite_model_or_a_refusal(seed: int) -> None:
     u, y, order = _broken(seed)
     try:
-        result: OkidResult = okid(u, y, order)
+        result: OkidResult = okid(u, y, order, sample_time_s=SAMPLE_TIME_S)
     except IdentificationError:
         return
     assert np.isfinite(result.markov).all()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from roll_plant import noisy, plant, pulses
+from roll_plant import SAMPLE_TIME_S, noisy, plant, pulses
 
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import RecursiveArx
@@ -24,7 +24,7 @@ def _record(
 
 def test_estimate_is_the_batch_solution_with_the_same_weights() -> None:
     u, y = _record(1)
-    model = RecursiveArx(6, *SCALE, forgetting=0.995)
+    model = RecursiveArx(6, *SCALE, SAMPLE_TIME_S, forgetting=0.995)
     errors = _run(model, u, y)
     z = np.column_stack([y, u]) / np.concatenate(SCALE)
     matrix, targets = LagRegression(z, 2, 6, np.empty((0, len(z)))).matrix()
@@ -48,11 +48,11 @@ def test_estimate_is_the_batch_solution_with_the_same_weights() -> None:
 def test_change_of_the_ship_is_followed() -> None:
     u, y = _record(1, noise=1e-3)
     v, w = _record(2, 7.5, noise=1e-3)
-    model = RecursiveArx(6, *SCALE, forgetting=0.99)
+    model = RecursiveArx(6, *SCALE, SAMPLE_TIME_S, forgetting=0.99)
     _run(model, u, y)
     before = model.arx.alpha
     _run(model, v, w)
-    fresh = RecursiveArx(6, *SCALE, forgetting=0.99)
+    fresh = RecursiveArx(6, *SCALE, SAMPLE_TIME_S, forgetting=0.99)
     _run(fresh, v, w)
     np.testing.assert_allclose(model.arx.alpha, fresh.arx.alpha, atol=1e-4)
     assert np.abs(model.arx.alpha - before).max() > 0.01
@@ -60,7 +60,7 @@ def test_change_of_the_ship_is_followed() -> None:
 
 def test_gap_teaches_nothing_and_its_neighbours_are_left_out() -> None:
     u, y = _record(1)
-    model = RecursiveArx(6, *SCALE)
+    model = RecursiveArx(6, *SCALE, SAMPLE_TIME_S)
     _run(model, u[:500], y[:500])
     assert np.isnan(model.update(u[500], [np.nan, y[500, 1]])).all()
     errors = _run(model, u[501:508], y[501:508])
@@ -71,7 +71,7 @@ def test_gap_teaches_nothing_and_its_neighbours_are_left_out() -> None:
 
 def test_number_that_is_no_measurement_is_a_gap_and_spoils_nothing() -> None:
     u, y = _record(1)
-    spoiled, gapped = RecursiveArx(6, *SCALE), RecursiveArx(6, *SCALE)
+    spoiled, gapped = RecursiveArx(6, *SCALE, SAMPLE_TIME_S), RecursiveArx(6, *SCALE, SAMPLE_TIME_S)
     for model, value in ((spoiled, 1e300), (gapped, np.nan)):
         v = u.copy()
         v[700] = value
@@ -83,7 +83,7 @@ def test_number_that_is_no_measurement_is_a_gap_and_spoils_nothing() -> None:
 @pytest.mark.slow
 def test_stays_stable_over_half_a_day_with_hours_of_still_water() -> None:
     # 200000 samples of 0.2 s are 11 hours; the middle half has no signal but the last bit of noise
-    model = RecursiveArx(4, *SCALE, forgetting=0.99)
+    model = RecursiveArx(4, *SCALE, SAMPLE_TIME_S, forgetting=0.99)
     u, y = _record(1)
     for _ in range(20):
         _run(model, u, y)
@@ -93,7 +93,7 @@ def test_stays_stable_over_half_a_day_with_hours_of_still_water() -> None:
     for _ in range(20):
         errors = _run(model, u, y)
     assert model.updates > 199_000
-    fresh = RecursiveArx(4, *SCALE, forgetting=0.99)
+    fresh = RecursiveArx(4, *SCALE, SAMPLE_TIME_S, forgetting=0.99)
     _run(fresh, u, y)
     np.testing.assert_allclose(model.arx.alpha, fresh.arx.alpha, atol=1e-6)
     assert np.isfinite(errors[4:]).all()
@@ -103,10 +103,10 @@ def test_stays_stable_over_half_a_day_with_hours_of_still_water() -> None:
 
 def test_bad_parameters_are_refused() -> None:
     with pytest.raises(ValueError, match="forgetting"):
-        RecursiveArx(4, *SCALE, forgetting=0.0)
+        RecursiveArx(4, *SCALE, SAMPLE_TIME_S, forgetting=0.0)
     with pytest.raises(ValueError, match="order"):
-        RecursiveArx(0, *SCALE)
+        RecursiveArx(0, *SCALE, SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="scales"):
-        RecursiveArx(4, [0.0], [1.0])
+        RecursiveArx(4, [0.0], [1.0], SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="sample_time_s"):
         RecursiveArx(4, *SCALE, sample_time_s=-1)

@@ -61,8 +61,13 @@ def test_response_is_that_of_the_state_space_model() -> None:
 def test_exact_data_stay_exact() -> None:
     u, truth = pulses(1), plant()
     y = truth.respond(u, 0 * u)
-    result = okid(u, y, 30)
-    assert response_error(refine(era(result.markov, 4), result, u, y).system, truth).max() < 1e-9
+    result = okid(u, y, 30, sample_time_s=SAMPLE_TIME_S)
+    assert (
+        response_error(
+            refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y).system, truth
+        ).max()
+        < 1e-9
+    )
 
 
 def modal(theta: FloatArray) -> tuple[control.StateSpace, FloatArray]:
@@ -110,8 +115,8 @@ def test_white_noise_gives_the_least_output_error_that_scipy_finds() -> None:
     u, truth = pulses(1), plant()
     clean = truth.respond(u, 0 * u)
     y = noisy(clean, 0.01, 1)
-    result = okid(u, y, 60)
-    refined = refine(era(result.markov, 4), result, u, y)
+    result = okid(u, y, 60, sample_time_s=SAMPLE_TIME_S)
+    refined = refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y)
     assert refined.noise_order == 0
     best = least_output_error(u, y, 0.01 * np.std(clean, axis=0), truth)
     # the weight of one output against the other is estimated, which moves the optimum a little
@@ -125,8 +130,8 @@ def test_short_memory_of_the_sensors_is_found() -> None:
     clean = truth.respond(u, 0 * u)
     e = 0.01 * np.std(clean, axis=0) * np.random.default_rng(1).standard_normal(clean.shape)
     y = clean + lfilter([1.0], [1.0, -1.2, 0.6], e, axis=0)
-    result = okid(u, y, 120)
-    refined = refine(era(result.markov, 4), result, u, y)
+    result = okid(u, y, 120, sample_time_s=SAMPLE_TIME_S)
+    refined = refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y)
     assert refined.noise_order == 2
     found = refined.confidence
     right = np.abs(truth.poles_rad_s())
@@ -136,8 +141,8 @@ def test_short_memory_of_the_sensors_is_found() -> None:
 def test_order_of_okid_too_low_for_the_ship_is_overcome() -> None:
     u, truth = pulses(1), plant()
     y = noisy(truth.respond(u, 0 * u), 0.01, 1)
-    result = okid(u, y, 4)
-    system = era(result.markov, 4)
+    result = okid(u, y, 4, sample_time_s=SAMPLE_TIME_S)
+    system = era(result.markov, 4, sample_time_s=SAMPLE_TIME_S)
     refined = refine(system, result, u, y)
     assert response_error(system, truth).max() > 0.01
     assert refined.noise_order == 0
@@ -150,8 +155,8 @@ def test_regular_wave_and_gaps_are_taken_along() -> None:
     y = noisy(truth.respond(u, 2e7 * np.cos(0.6 * time_s)), 0.01, 1)
     y[900:910] = np.nan
     u[[1700, 1702]] = np.nan  # a stretch of one row between them
-    result = okid(u, y, 60, disturbance_frequencies_rad_s=[0.6])
-    refined = refine(era(result.markov, 4), result, u, y)
+    result = okid(u, y, 60, disturbance_frequencies_rad_s=[0.6], sample_time_s=SAMPLE_TIME_S)
+    refined = refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y)
     assert response_error(refined.system, truth).max() < 0.005
     assert refined.gain >= 0
     assert refined.noise_order == 0
@@ -168,8 +173,8 @@ def test_ahead_of_era_in_an_irregular_sea() -> None:
         pumped, rolled = truth.respond(u, 0 * u), truth.respond(0 * u, jonswap_moment(2500, seed))
         wave = rolled * np.std(pumped[:, 0]) / np.std(rolled[:, 0])
         y = noisy(pumped + wave, 0.01, seed)
-        result = okid(u, y, 120)
-        system = era(result.markov, 4)
+        result = okid(u, y, 120, sample_time_s=SAMPLE_TIME_S)
+        system = era(result.markov, 4, sample_time_s=SAMPLE_TIME_S)
         refined = refine(system, result, u, y)
         assert refined.noise_order == 120  # OKID's noise model stays
         errors.append([response_error(system, truth)[0], response_error(refined.system, truth)[0]])
@@ -192,8 +197,8 @@ def test_spread_is_at_the_cramer_rao_bound_with_white_noise(
     found, stated = np.empty((runs, 4)), np.empty((runs, 4))
     for run in range(runs):
         y = noisy(clean, noise, run)
-        result = okid(u, y, 120)
-        modes = refine(era(result.markov, 4), result, u, y).confidence
+        result = okid(u, y, 120, sample_time_s=SAMPLE_TIME_S)
+        modes = refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y).confidence
         found[run] = np.concatenate([modes.modes.frequency_rad_s, modes.modes.damping_ratio])
         stated[run] = np.concatenate([modes.frequency_std_rad_s, modes.damping_ratio_std])
     spread = np.std(found, axis=0)
@@ -211,6 +216,6 @@ def test_spread_is_at_the_cramer_rao_bound_with_white_noise(
 def test_parts_that_do_not_belong_together_are_refused() -> None:
     u, truth = pulses(1), plant()
     y = truth.respond(u, 0 * u)
-    result = okid(u, y, 10)
+    result = okid(u, y, 10, sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="do not belong to a record"):
-        refine(era(result.markov, 4), result, u, y[:, 0])
+        refine(era(result.markov, 4, sample_time_s=SAMPLE_TIME_S), result, u, y[:, 0])

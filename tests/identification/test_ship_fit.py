@@ -44,7 +44,9 @@ def respond(ship: RollShip, tank: Tank, u: FloatArray, moment_nm: FloatArray) ->
 
 
 def fitted(u: FloatArray, y: FloatArray, outputs: int, order: int, tank: Tank = TANK) -> ShipFit:
-    result = okid(u, y[:, :outputs], order, disturbance_polynomial_degree=0)
+    result = okid(
+        u, y[:, :outputs], order, disturbance_polynomial_degree=0, sample_time_s=SAMPLE_TIME_S
+    )
     return fit_ship(result, u, DesignPlant(CONFIGURED, tank, DELAY_S, LAG_S), MEASURED[:outputs])
 
 
@@ -85,8 +87,15 @@ def test_stated_deviations_are_the_errors_over_seas(outputs: int, order: int) ->
         u, ship = pulses(seed, SLOW_PUMP), ship_of(12.6)
         y = respond(ship, TANK, u, jonswap_moment(len(u), 50 + seed, 2.5e7))
         u, y = u[:2000], noisy(y, 5e-3, seed)[:2000, :outputs]  # as the retuner does
-        waves = find_disturbance_frequencies(u, y)
-        found = okid(u, y, order, SAMPLE_TIME_S, waves, 0)
+        waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
+        found = okid(
+            u,
+            y,
+            order,
+            sample_time_s=SAMPLE_TIME_S,
+            disturbance_frequencies_rad_s=waves,
+            disturbance_polynomial_degree=0,
+        )
         fit = fit_ship(found, u, DesignPlant(CONFIGURED, TANK, DELAY_S, LAG_S), MEASURED[:outputs])
         ratios = [getattr(fit.ship, name) / getattr(ship, name) for name in NUMBERS]
         ratios += [fit.tank.damping_ratio / TANK.damping_ratio, period_s(fit) / 12.6]
@@ -131,6 +140,6 @@ def test_what_the_record_does_not_show_stays_as_configured() -> None:
 def test_outputs_that_do_not_fit_the_model_are_refused() -> None:
     u = pulses(1, SLOW_PUMP)
     y = respond(CONFIGURED, TANK, u, np.zeros(len(u)))
-    result = okid(u, noisy(y, 1e-3, 2), 10)
+    result = okid(u, noisy(y, 1e-3, 2), 10, sample_time_s=SAMPLE_TIME_S)
     with pytest.raises(ValueError, match="outputs"):
         fit_ship(result, u, DesignPlant(CONFIGURED, TANK), ("roll_rad",))

@@ -68,7 +68,7 @@ def test_wrong_input_path_goes_with_the_input_and_low_order_is_not_white() -> No
     model, u, y = _arx_record(1)
     wrong = validate(ARX(model.alpha, model.beta * 1.2, 0.2), u, y)
     assert np.all(wrong.independence_probability < 1e-6)
-    low = validate(okid(u, y, 1).arx, u, y)
+    low = validate(okid(u, y, 1, sample_time_s=SAMPLE_TIME_S).arx, u, y)
     assert low.whiteness_probability.min() < 1e-6
 
 
@@ -86,7 +86,7 @@ def test_free_run_of_an_exact_model_is_exact_through_gaps_and_waves() -> None:
 
 def test_held_out_record_of_the_ship_is_predicted() -> None:
     truth, u, v = plant(), pulses(1), pulses(2)
-    model = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60).arx
+    model = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60, sample_time_s=SAMPLE_TIME_S).arx
     result = validate(model, v, noisy(truth.respond(v, 0 * v), 0.01, 2))
     assert result.one_step_fit.min() > 0.985
     assert result.simulation_fit.min() > 0.985
@@ -147,8 +147,8 @@ def test_units_of_the_record_do_not_matter() -> None:
 
 def test_true_modes_stay_and_spurious_ones_wander_in_the_stabilization_diagram() -> None:
     truth, u = plant(), pulses(1)
-    result = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60)
-    points = stabilization(result.markov, [4, 6, 8, 10])
+    result = okid(u, noisy(truth.respond(u, 0 * u), 0.01, 1), 60, sample_time_s=SAMPLE_TIME_S)
+    points = stabilization(result.markov, [4, 6, 8, 10], SAMPLE_TIME_S)
     right = np.abs(truth.poles_rad_s())
     assert not any(p.frequency_stable for p in points if p.order == 4)
     for order in (6, 8, 10):

@@ -45,7 +45,7 @@ def _record(period_s: float, seed: int, duration_s: float, wave_nm: float) -> Fl
     wave = sample(
         coupled_model(ship, TANK)[list(names), ["wave_moment_nm"]], SAMPLE_TIME_S, 0.0, 0.0
     )
-    u = random_pulses(duration_s, PumpLimits(pressure_pa=20e3), seed)
+    u = random_pulses(duration_s, PumpLimits(pressure_pa=20e3), seed, sample_time_s=SAMPLE_TIME_S)
     moment_nm = wave_nm * np.cos(0.6 * SAMPLE_TIME_S * np.arange(len(u)))
     record = np.zeros((len(u), 3))
     record[:, 0] = u

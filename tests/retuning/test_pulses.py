@@ -56,10 +56,10 @@ def test_pulses_keep_within_pressure_rate_roll_and_level(kind: str, added_roll_r
 def test_each_kind_is_the_signal_of_that_name() -> None:
     within = PumpLimits(pressure_pa=30e3, rate_pa_s=LIMITS.rate_pa_s)
     expected = {
-        "random_pulses": random_pulses(500.0, within, 1, (0.6, 3.0)),
-        "prbs": prbs(500.0, within, 1, 0.6),
-        "multisine": multisine(500.0, within, 1, (0.3, 0.9)),
-        "chirp": chirp(500.0, within, (0.3, 0.9)),
+        "random_pulses": random_pulses(500.0, within, 1, (0.6, 3.0), sample_time_s=0.2),
+        "prbs": prbs(500.0, within, 1, 0.6, sample_time_s=0.2),
+        "multisine": multisine(500.0, within, 1, (0.3, 0.9), sample_time_s=0.2),
+        "chirp": chirp(500.0, within, (0.3, 0.9), sample_time_s=0.2),
     }
     for kind in KINDS:
         swept = kind in ("multisine", "chirp")

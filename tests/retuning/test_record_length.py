@@ -38,7 +38,14 @@ def test_least_record_is_identified_and_validated(order: int, outputs: int) -> N
     samples = least_samples(order, outputs)
     u, y = rng.standard_normal((samples, 1)), rng.standard_normal((samples, outputs))
     first = estimation_samples(samples)
-    found = okid(u[:first], y[:first], order, 0.2, (0.6,), 0)
+    found = okid(
+        u[:first],
+        y[:first],
+        order,
+        sample_time_s=0.2,
+        disturbance_frequencies_rad_s=(0.6,),
+        disturbance_polynomial_degree=0,
+    )
     checked = validate(found.arx, u[first:], y[first:], (0.6,), LAGS, 0)
     assert checked.rows >= 100
 

@@ -101,8 +101,8 @@ def speed(quick: bool) -> dict[str, Any]:
             names,
             best_of(
                 repeats,
-                lambda: okid(u, y, 200),
-                lambda: okid(slow_u, slow_y, 200),
+                lambda: okid(u, y, 200, sample_time_s=SAMPLE_TIME_S),
+                lambda: okid(slow_u, slow_y, 200, sample_time_s=SAMPLE_TIME_S),
                 regression.matrix,
                 lambda: np.linalg.lstsq(matrix, targets, rcond=None),
                 lambda: normal_equations(matrix, targets),
@@ -123,7 +123,7 @@ def speed(quick: bool) -> dict[str, Any]:
         "lstsq_over_okid_slow_pump": times["lstsq"] / times["okid, slow pump"],
         "relative_error": {k: float(np.linalg.norm(v - right) / size) for k, v in errors.items()},
         "memory_mb": {
-            "okid": peak_mb(lambda: okid(u, y, 200)),
+            "okid": peak_mb(lambda: okid(u, y, 200, sample_time_s=SAMPLE_TIME_S)),
             "lstsq": peak_mb(lambda: np.linalg.lstsq(*regression.matrix(), rcond=None)),
         },
     }
@@ -158,7 +158,7 @@ def recursive() -> list[dict[str, Any]]:
     u, y = record()
     rows = []
     for order in (4, 20, 60, 120):
-        model = RecursiveArx(order, np.std(y, axis=0), np.std(u, keepdims=True))
+        model = RecursiveArx(order, np.std(y, axis=0), np.std(u, keepdims=True), SAMPLE_TIME_S)
         count = 500
         for k in range(order + 1):
             model.update(u[k : k + 1], y[k])

@@ -60,9 +60,9 @@ Method = Callable[[FloatArray, FloatArray], Matrices]
 
 def realized(order: int, refined: bool, u: FloatArray, y: FloatArray) -> Matrices:
     """OKID with frequencies found from the data, ERA, and refinement."""
-    waves = find_disturbance_frequencies(u, y)
-    result = okid(u, y, order, disturbance_frequencies_rad_s=waves)
-    system = era(result.markov, TRUE_ORDER)
+    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
+    result = okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S)
+    system = era(result.markov, TRUE_ORDER, sample_time_s=SAMPLE_TIME_S)
     if refined:
         system = refine(system, result, u, y).system
     a, b, c, d = (np.asarray(part) for part in (system.A, system.B, system.C, system.D))
@@ -71,8 +71,8 @@ def realized(order: int, refined: bool, u: FloatArray, y: FloatArray) -> Matrice
 
 def physical(order: int, u: FloatArray, y: FloatArray) -> Matrices:
     """Ship and tank fitted to OKID's model."""
-    waves = find_disturbance_frequencies(u, y)
-    result = okid(u, y, order, disturbance_frequencies_rad_s=waves)
+    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
+    result = okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S)
     expected = dataclasses.replace(
         SHIP,
         stiffness_nm_rad=1.4 * SHIP.stiffness_nm_rad,

@@ -64,7 +64,7 @@ def record(
     sea : {"calm", "one wave", "storm"}
     seed : int
     """
-    pressure = random_pulses(samples * SAMPLE_TIME_S, limits, seed)
+    pressure = random_pulses(samples * SAMPLE_TIME_S, limits, seed, sample_time_s=SAMPLE_TIME_S)
     y = respond(pressure, np.zeros(samples))
     time_s = np.arange(samples) * SAMPLE_TIME_S
     if sea != "calm":

@@ -130,8 +130,8 @@ def bound(
 
 def found(u: FloatArray, y: FloatArray) -> dict[str, Matrices]:
     """What each method makes of a record."""
-    result = okid(u, y, ORDER)
-    realized = era(result.markov, 4)
+    result = okid(u, y, ORDER, sample_time_s=SAMPLE_TIME_S)
+    realized = era(result.markov, 4, sample_time_s=SAMPLE_TIME_S)
     refined = refine(realized, result, u, y).system
     # begun with a ship of another loading
     ship = dataclasses.replace(SHIP, stiffness_nm_rad=1.4 * SHIP.stiffness_nm_rad)

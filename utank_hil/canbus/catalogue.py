@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
 
 from utank_hil.canbus.codec import FRAME_BYTES, Codec, Signal, compile_codec, field_kind
@@ -41,6 +42,11 @@ class Catalogue:
         self.version = version
         self.can_ids = frozenset(codec.can_id for codec in codecs.values())
         self._codecs = dict(codecs)
+
+    @property
+    def codecs(self) -> Mapping[tuple[type[Any], Address], Codec[Any]]:
+        """Codecs of all messages, by type and sender."""
+        return MappingProxyType(self._codecs)
 
     def codec(self, message_type: type[T], source: Address | None = None) -> Codec[T]:
         """Return the codec of a message.

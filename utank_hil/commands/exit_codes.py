@@ -26,9 +26,9 @@ class ExitCode(IntEnum):
     OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
     REFUSED = (
         1,
-        "`check`, `identify`, `init`",
-        "A law misses its margins, a model or its law is refused, or no tank can be for a ship. Of "
-        "any command, with a traceback: an error in the program.",
+        "`check`, `identify`, `init`, `replay`",
+        "A law misses its margins, a model or its law is refused, no tank can be for a ship, or a "
+        "replay differs. Of any command, with a traceback: an error in the program.",
     )
     USAGE = (
         2,

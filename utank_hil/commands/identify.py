@@ -32,7 +32,12 @@ PICTURE = "identification.png"
 
 def identify_log(
     context: typer.Context,
-    log: Annotated[Path, typer.Argument(help="Recording (.rrd) with pulses of the pump in it.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="With pulses of the pump in it: .rrd, .frames, .log, .asc, .blf, .csv, .parquet."
+        ),
+    ],
     config: Annotated[
         Path, typer.Argument(help="Controller configuration: signals, design, ship to begin with.")
     ],
@@ -49,13 +54,21 @@ def identify_log(
 ) -> None:
     """Identify ship and tank from a recording, validate, and write a configuration for them.
 
+    A table of anybody's (.csv, .parquet) names its columns with their units: time_s,
+    pressure_command_pa or _kpa, roll_rad or roll_deg (docs/how-to/logs.md).
+
     Exit code 0: model and law passed every check. 1: refused; the reasons are printed and no
     configuration is written, nor left from an earlier time. 2: a file or an option is wrong.
 
     [bold]Example:[/bold] utank-hil identify out/bench.rrd configs/controllers/dpc.yaml --from 200
     """
     from utank_hil.pictures.identification import draw_identification
-    from utank_hil.telemetry import read_recording
+    from utank_hil.telemetry.signal_files import (
+        TABLE_SUFFIXES,
+        even_rows,
+        read_signals,
+        require,
+    )
 
     for option, value in (("--from", from_s), ("--to", to_s)):
         if value is not None and not math.isfinite(value):
@@ -68,12 +81,17 @@ def identify_log(
     prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
-        runs = read_recording(log)
+        runs = read_signals(log)
         name = list(runs)[-1] if run is None else run
         if name not in runs:
             fail(f"{log} has no run {name!r}; it has {', '.join(runs)}")
         sample_time_s = task.design.predictor.sample_time_s
-        record = logged_samples(runs[name], measured, sample_time_s, from_s, to_s)
+        signals = runs[name]
+        require(log, signals, "time_s", "pressure_command_pa", *measured)
+        if log.suffix.lower() in TABLE_SUFFIXES:
+            signals = even_rows(log, signals, sample_time_s, from_s, to_s)
+            from_s = to_s = None
+        record = logged_samples(signals, measured, sample_time_s, from_s, to_s)
         for path in results:  # what stands there afterwards is of this recording
             path.unlink(missing_ok=True)
     except (OSError, ValueError) as error:

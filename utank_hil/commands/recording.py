@@ -10,8 +10,11 @@ from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter, Rotation
+from utank_hil.telemetry.bus_records import ROW, ring_rows
+from utank_hil.telemetry.frame_log import SUFFIX
 
 NAME: Final = "run-{}.rrd"
+FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
 """A recording goes on in another file after so long: 50 MB."""
 RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
@@ -25,8 +28,11 @@ class RecordingSummary:
     ----------
     file : str or None
         None if there is none.
-    rows, lost : int or None
-        Rows recorded, and rows that the recorder was too slow for; None if it failed.
+    frames : str or None
+        The frame log, which `utank-hil replay` reads.
+    rows, lost, records_lost : int or None
+        Rows recorded, and rows that the recorder was too slow for, of the recording and of the
+        frame log; None if it failed.
     parts : int or None
         Files; `file` is the first. None if it failed.
     error : str or None
@@ -34,8 +40,10 @@ class RecordingSummary:
     """
 
     file: str | None = None
+    frames: str | None = None
     rows: int | None = None
     lost: int | None = None
+    records_lost: int | None = None
     parts: int | None = None
     error: str | None = None
 
@@ -54,6 +62,8 @@ class RunRecording:
         Name of the run's ring of events, to be recorded beside the rows.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`).
+    head : mapping, optional
+        Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional
         The folder's oldest recordings are removed beyond so much; without it none are.
 
@@ -69,37 +79,44 @@ class RunRecording:
         live: bool = False,
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
+        head: Mapping[str, Any] | None = None,
         keep_bytes: int | None = None,
     ) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
+        self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
         reason = why_not_writable(folder)
         if reason is not None:
             self.summary.error = reason
             return
         try:
-            (file,) = claimed_files(folder, NAME)
+            files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]))
         except OSError as error:
             self.summary.error = str(error)
             return
         try:
             self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
+            if head is not None:
+                self._records = RingWriter(ROW, capacity=RING_ROWS)
             self._recorder = RecorderProcess(
                 self._ring.name,
-                file,
+                files[0],
                 live=live,
                 events=events,
                 about=about,
                 rotation=Rotation(PART_S, keep_bytes),
+                frames=None if self._records is None else self._records.name,
+                head=head,
             )
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
             self.stop()
+        for file in files:
             if file.exists() and file.stat().st_size == 0:
                 file.unlink()  # nothing in it
-        if file.exists():
-            self.summary.file = str(file)
+        names = [str(file) if file.exists() else None for file in files]
+        self.summary.file, self.summary.frames = (*names, None)[:2]
 
     @property
     def url(self) -> str | None:
@@ -111,11 +128,25 @@ class RunRecording:
         if self._ring is not None:
             self._ring.write(row)
 
+    @property
+    def keeps_records(self) -> bool:
+        """Whether a frame log is being written."""
+        return self._records is not None
+
+    def write_records(self, records: bytes, time_ns: int) -> None:  # noqa: ARG002
+        """Take the `bus_records` of one tick; never waits."""
+        if self._records is not None:
+            for row in ring_rows(records):
+                self._records.write(row)
+
     def stop(self) -> None:
         """Have the last rows written and the summary completed; idempotent."""
+        records, self._records = self._records, None
+        if records is not None:
+            records.close()  # before the other, whose end is what ends the recorder
         ring, self._ring = self._ring, None
         if ring is not None:
-            ring.close()  # first: what ends the recorder is the end of the ring
+            ring.close()
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             try:
@@ -124,4 +155,5 @@ class RunRecording:
                 self.summary.error = str(error)
             else:
                 self.summary.rows, self.summary.lost = report.rows, report.lost
+                self.summary.records_lost = report.records_lost
                 self.summary.parts = report.parts

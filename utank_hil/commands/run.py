@@ -36,10 +36,10 @@ from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.provenance import describe
 from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
+    Node,
     RealTimeLoop,
     real_time_scheduling,
     stop_on_signals,
@@ -49,6 +49,8 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
 from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
+from utank_hil.telemetry.replay_head import replay_head
 
 
 def run(
@@ -111,11 +113,15 @@ def run(
                 notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
         recording = None
         if folder is not None:
+            head = replay_head(
+                "run", loaded, law, folder, options=context.params, retuner=work is not None
+            )
             recording = RunRecording(
                 folder,
                 live=view,
                 events=None if announcer is None else announcer.ring,
-                about=describe("run", loaded, folder, options=context.params),
+                about=head["about"],
+                head=head,
                 keep_bytes=None if keep is None else round(keep * 1e6),
             )
             stack.callback(recording.stop)
@@ -140,14 +146,20 @@ def run(
             if announcer is not None:
                 announcer.write(event, start_ns)
 
+        records = recording is not None and recording.keeps_records
+        tap = RetunerTap(retuner) if records and retuner is not None else None
         node = build_controller_node(
             loaded,
             law,
-            retuner=retuner,
+            retuner=tap or retuner,
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=told,
         )
+
+        on_bus: Node = node
+        if recording is not None and records:
+            on_bus = NodeTap(node, recording.write_records, tap)
 
         def ended() -> bool:
             manager.progress(statistics.ticks)
@@ -160,7 +172,7 @@ def run(
                 notes.print(line, soft_wrap=True)
             notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
             manager.ready(f"{loaded.name} on {bus}")
-            RealTimeLoop([node], port, statistics=statistics).run(
+            RealTimeLoop([on_bus], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
             )
         manager.stopping()
@@ -247,6 +259,11 @@ def _tell(console: Console, recording: RecordingSummary) -> None:
             said += f", {recording.rows} rows, {recording.lost} lost"
         if recording.parts is not None and recording.parts > 1:
             said += f", in {recording.parts} files"
+        console.print(escape(said), soft_wrap=True)
+    if recording.frames is not None:
+        said = f"frame log: {shown(Path(recording.frames))}"
+        if recording.records_lost:
+            said += f", {recording.records_lost} rows lost"
         console.print(escape(said), soft_wrap=True)
     if recording.error is not None:
         console.print(f"[red]recording failed:[/red] {escape(recording.error)}", soft_wrap=True)

@@ -52,7 +52,7 @@ class Realization:
     column_scale: FloatArray
 
 
-def era(markov: FloatArray, order: int | None = None, sample_time_s: float = 0.2) -> "StateSpace":
+def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -> "StateSpace":
     """Realize a discrete state-space model by ERA.
 
     Parameters
@@ -83,7 +83,8 @@ def era_with_observer(
     markov: FloatArray,
     observer_gain: FloatArray,
     order: int | None = None,
-    sample_time_s: float = 0.2,
+    *,
+    sample_time_s: float,
 ) -> tuple["StateSpace", FloatArray]:
     """Realize the model and its identified observer (Juang, Applied System Identification, 6.3).
 
@@ -124,9 +125,7 @@ def era_with_observer(
     return _state_space(found.a, found.b, found.c, markov[0], sample_time_s), gain
 
 
-def era_dc(
-    markov: FloatArray, order: int | None = None, sample_time_s: float = 0.2
-) -> "StateSpace":
+def era_dc(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -> "StateSpace":
     """Realize a discrete state-space model by ERA with data correlations.
 
     The Hankel matrices of Markov parameters are correlated with the first of them before the

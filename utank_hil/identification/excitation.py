@@ -19,7 +19,8 @@ def random_pulses(
     limits: PumpLimits,
     seed: int,
     hold_s: tuple[float, float] = (1.0, 5.0),
-    sample_time_s: float = 0.2,
+    *,
+    sample_time_s: float,
 ) -> FloatArray:
     """Pulses of random amplitude and length, the excitation of thesis 3.7.
 
@@ -58,7 +59,8 @@ def prbs(
     limits: PumpLimits,
     seed: int,
     clock_s: float = 1.0,
-    sample_time_s: float = 0.2,
+    *,
+    sample_time_s: float,
 ) -> FloatArray:
     """Pseudo-random binary signal of full pressure, with a random sign every `clock_s`.
 
@@ -76,7 +78,8 @@ def multisine(
     limits: PumpLimits,
     seed: int,
     band_rad_s: tuple[float, float] = (0.2, 1.2),
-    sample_time_s: float = 0.2,
+    *,
+    sample_time_s: float,
 ) -> FloatArray:
     """Multisine: equal amplitudes and random phases at all harmonics of the duration in a band.
 
@@ -113,7 +116,8 @@ def chirp(
     duration_s: float,
     limits: PumpLimits,
     band_rad_s: tuple[float, float] = (0.2, 1.2),
-    sample_time_s: float = 0.2,
+    *,
+    sample_time_s: float,
 ) -> FloatArray:
     """Linear chirp: a sine with a frequency that rises from one end of a band to the other.
 

@@ -46,7 +46,7 @@ class RecursiveArx:
         order: int,
         output_scale: FloatArray,
         input_scale: FloatArray,
-        sample_time_s: float = 0.2,
+        sample_time_s: float,
         forgetting: float = 0.999,
     ) -> None:
         y_scale, u_scale = np.atleast_1d(output_scale), np.atleast_1d(input_scale)

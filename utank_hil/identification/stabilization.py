@@ -36,7 +36,7 @@ class StabilizationPoint:
 
 
 def stabilization(
-    markov: FloatArray, orders: Sequence[int], sample_time_s: float = 0.2
+    markov: FloatArray, orders: Sequence[int], sample_time_s: float
 ) -> tuple[StabilizationPoint, ...]:
     """Modes of ERA models of increasing order.
 
@@ -57,7 +57,7 @@ def stabilization(
     size = np.sqrt(np.sum(np.asarray(markov)[1:] ** 2, axis=(0, 2)))
     size[size == 0] = 1.0
     for order in orders:
-        now = modal_parameters(era(markov, order, sample_time_s))
+        now = modal_parameters(era(markov, order, sample_time_s=sample_time_s))
         for j, frequency in enumerate(now.frequency_rad_s):
             stable = (False, False, False)
             if before is not None:

@@ -29,7 +29,7 @@ _EVIDENCE = 30.0  # least F statistic of a line; noise reaches 6, an irregular s
 def find_disturbance_frequencies(
     u: FloatArray,
     y: FloatArray,
-    sample_time_s: float = 0.2,
+    sample_time_s: float,
     most: int = 1,
     band_rad_s: tuple[float, float] = (0.2, 2.0),
 ) -> tuple[float, ...]:

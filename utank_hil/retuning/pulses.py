@@ -33,13 +33,18 @@ def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: f
     duration_s, seed = settings.identification_s, settings.seed
     match settings.excitation.kind:
         case "random_pulses":
-            pulses = random_pulses(duration_s, bounds, seed, settings.pulse_hold_s, sample_time_s)
+            pulses = random_pulses(
+                duration_s, bounds, seed, settings.pulse_hold_s, sample_time_s=sample_time_s
+            )
         case "prbs":
-            pulses = prbs(duration_s, bounds, seed, settings.pulse_hold_s[0], sample_time_s)
+            clock_s = settings.pulse_hold_s[0]
+            pulses = prbs(duration_s, bounds, seed, clock_s, sample_time_s=sample_time_s)
         case "multisine":
-            pulses = multisine(duration_s, bounds, seed, settings.excitation.band, sample_time_s)
+            band = settings.excitation.band
+            pulses = multisine(duration_s, bounds, seed, band, sample_time_s=sample_time_s)
         case "chirp":
-            pulses = chirp(duration_s, bounds, settings.excitation.band, sample_time_s)
+            band = settings.excitation.band
+            pulses = chirp(duration_s, bounds, band, sample_time_s=sample_time_s)
     sampled = plant.sampled(("roll_rad", "level_m"), sample_time_s)
     model = ARX.from_state_space(sampled, len(sampled.A))
     response_limits = np.array([settings.added_roll_rad, limits.level_m])

@@ -185,7 +185,7 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
         u,
         y,
         task.order,
-        predictor.sample_time_s,
+        sample_time_s=predictor.sample_time_s,
         disturbance_frequencies_rad_s=waves,
         disturbance_polynomial_degree=OFFSET,
     )

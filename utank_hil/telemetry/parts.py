@@ -12,7 +12,7 @@ from utank_hil.closing import Closing
 from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, time_index, write_about
-from utank_hil.telemetry.rotation import Rotation, remove_oldest
+from utank_hil.telemetry.rotation import Rotation, bytes_of, part_of, remove_oldest
 from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.viewer import LOOPBACK
 
@@ -84,7 +84,7 @@ class RecordingParts(Closing):
             self._begin_s = begin_s
         if self._rotation is not None and begin_s - self._begin_s >= self._rotation.part_s:
             self._end()
-            self._begin(self._file.stat().st_size)
+            self._begin(bytes_of(self._file))
             self._begin_s = begin_s
         self._rows += len(rows)
         for log in self._logs():
@@ -121,8 +121,7 @@ class RecordingParts(Closing):
     def _begin(self, expected_bytes: int) -> None:
         """Begin the next file, which may grow as large as expected."""
         self.count += 1
-        if self.count > 1:
-            self._file = self._first.with_stem(f"{self._first.stem}-part{self.count:03d}")
+        self._file = part_of(self._first, self.count)
         if self._rotation is not None and self._rotation.keep_bytes is not None:
             room_bytes = round(_GROWTH * expected_bytes)  # compression differs from file to file
             remove_oldest(self._file, self._rotation.keep_bytes - room_bytes)

@@ -1,5 +1,8 @@
 """The recorder: a process that writes rows and events to a Rerun file and to live viewers.
 
+Beside it, it writes the frame log: what the controller was handed and what it answered. Where Rerun
+is not installed, that is all it writes.
+
 `RecorderProcess` starts it from a bench or from the deployed controller; `python -m
 utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
 is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with all rows written. The
@@ -16,13 +19,17 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from utank_hil.closing import Closing
+from utank_hil.telemetry.bus_records import RECORD, Kind, records_of
 from utank_hil.telemetry.event_ring import EventReader
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLogWriter
 from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.viewer import free_tcp_port, live_url, rerun_environment
@@ -48,12 +55,15 @@ class RecorderReport:
     lost : int
         Rows the ring overwrote before they were read.
     parts : int
-        Files.
+        Files; of the frame log, where there is no other.
+    records_lost : int
+        Rows of the frame log that its ring overwrote before they were read.
     """
 
     rows: int
     lost: int
     parts: int = 1
+    records_lost: int = 0
 
 
 def record_ring(
@@ -63,6 +73,8 @@ def record_ring(
     events: str | None = None,
     about: Mapping[str, Any] | None = None,
     rotation: Rotation | None = None,
+    frames: str | None = None,
+    head: Mapping[str, Any] | None = None,
 ) -> RecorderReport:
     """Record a ring until it ends or a signal stops it; main function of the process.
 
@@ -80,6 +92,10 @@ def record_ring(
         Where it comes from (`utank_hil.provenance`).
     rotation : Rotation, optional
         Where it goes on in another file; without it there is one.
+    frames : str, optional
+        Name of the ring of `bus_records`; they go into a frame log beside the file.
+    head : mapping, optional
+        Head of the frame log (`replay_head`).
 
     Raises
     ------
@@ -90,37 +106,99 @@ def record_ring(
     RuntimeError
         If the file can't be finished.
     """
-    from utank_hil.telemetry.parts import RecordingParts
-
     stop = _stop_pipe()
     with ExitStack() as stack:
         reader = stack.enter_context(RingReader(ring))
         event_reader = None if events is None else stack.enter_context(EventReader(events))
-        parts = RecordingParts(file, reader.columns, rotation, live_port, about)
+        parts = None
+        if find_spec("rerun") is not None:
+            from utank_hil.telemetry.parts import RecordingParts
+
+            parts = RecordingParts(file, reader.columns, rotation, live_port, about)
+        log = None
+        if frames is not None:
+            if rotation is not None and parts is not None:
+                rotation = replace(rotation, keep_bytes=None)  # the recording makes the room
+            log = stack.enter_context(FrameRecording(frames, file, head or {}, rotation))
         _print_json({"ready": 1})
         recorded = reported_rows = reported_events = 0
         while True:
             last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
             rows = reader.read()
-            if reader.lost > reported_rows:
-                parts.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
-                reported_rows = reader.lost
-            if len(rows):
-                parts.write(rows)
-                recorded += len(rows)
+            recorded += len(rows)
             new_events = [] if event_reader is None else event_reader.read()
-            parts.write_events(new_events)
-            if event_reader is not None and event_reader.lost > reported_events:
-                parts.note(
-                    f"{event_reader.lost - reported_events} events lost: the recorder was too slow"
-                )
-                reported_events = event_reader.lost
-            if len(rows) or new_events:
-                parts.flush()
+            if log is not None:
+                log.write()
+            if parts is not None:
+                if reader.lost > reported_rows:
+                    parts.note(
+                        f"{reader.lost - reported_rows} rows lost: the recorder was too slow"
+                    )
+                    reported_rows = reader.lost
+                if len(rows):
+                    parts.write(rows)
+                parts.write_events(new_events)
+                if event_reader is not None and event_reader.lost > reported_events:
+                    lost = event_reader.lost - reported_events
+                    parts.note(f"{lost} events lost: the recorder was too slow")
+                    reported_events = event_reader.lost
+                if len(rows) or new_events:
+                    parts.flush()
             if last:
                 break
-        parts.close()
-        return RecorderReport(recorded, reader.lost, parts.count)
+        count = 0 if log is None else log.count
+        if parts is not None:
+            parts.close()
+            count = parts.count
+        return RecorderReport(recorded, reader.lost, count, 0 if log is None else log.lost)
+
+
+class FrameRecording(Closing):
+    """Writes a ring of `bus_records` into a frame log.
+
+    Parameters
+    ----------
+    ring : str
+        Its name.
+    file : Path
+        The recording beside which the log is written.
+    head : mapping
+    rotation : Rotation, optional
+
+    Attributes
+    ----------
+    lost : int
+        Rows that were overwritten before they were read.
+    """
+
+    def __init__(
+        self, ring: str, file: Path, head: Mapping[str, Any], rotation: Rotation | None
+    ) -> None:
+        self._reader = RingReader(ring)
+        self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head, rotation)
+        self.lost = 0
+
+    @property
+    def count(self) -> int:
+        """Files begun."""
+        return self._writer.count
+
+    def write(self) -> None:
+        """Write what has come since the last call."""
+        rows = self._reader.read()
+        records = records_of(rows)
+        lost = self._reader.lost - self.lost
+        if lost and len(records):
+            self.lost += lost
+            gap = np.zeros(1, dtype=RECORD)
+            gap["kind"], gap["number"], gap["time_ns"] = Kind.LOST, lost, records["time_ns"][0]
+            records = np.concatenate([gap, records])
+        self._writer.write(records)
+
+    def close(self) -> None:
+        """Close ring and file; idempotent."""
+        self._reader.close()
+        self._writer.close()
 
 
 class RecorderProcess(Closing):
@@ -143,6 +221,10 @@ class RecorderProcess(Closing):
         Where it comes from (`utank_hil.provenance`).
     rotation : Rotation, optional
         Where it goes on in another file; without it there is one.
+    frames : str, optional
+        Name of the ring of `bus_records`; they go into a frame log beside the file.
+    head : mapping, optional
+        Head of the frame log (`replay_head`).
 
     Attributes
     ----------
@@ -163,14 +245,19 @@ class RecorderProcess(Closing):
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
         rotation: Rotation | None = None,
+        frames: str | None = None,
+        head: Mapping[str, Any] | None = None,
     ) -> None:
-        if find_spec("rerun") is None:
+        if find_spec("rerun") is None and frames is None:
             raise RecorderError("it needs rerun-sdk: pip install 'utank-hil[viewer]'")
+        given = {"about": about, "head": head} if about is not None or head is not None else None
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
         if events is not None:
             command += ["--events", events]
-        if about is not None:
-            command += ["--about"]
+        if frames is not None:
+            command += ["--frames", frames]
+        if given is not None:
+            command += ["--given"]
         if rotation is not None:
             command += ["--part-s", str(rotation.part_s)]
             if rotation.keep_bytes is not None:
@@ -183,15 +270,15 @@ class RecorderProcess(Closing):
         self._report: RecorderReport | None = None
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL if about is None else subprocess.PIPE,
+            stdin=subprocess.DEVNULL if given is None else subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=rerun_environment(),
             start_new_session=True,
             text=True,
         )
         if self._process.stdin is not None:
-            with contextlib.suppress(BrokenPipeError), self._process.stdin as given:
-                json.dump(about, given)  # where it has ended already, its reason follows
+            with contextlib.suppress(BrokenPipeError), self._process.stdin as content:
+                json.dump(given, content)  # where it has ended already, its reason follows
         output = self._process.stdout
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
@@ -243,11 +330,12 @@ def _main() -> None:
     parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
     parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
     parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
-    parser.add_argument("--about", action="store_true", help="its origin is JSON on standard input")
+    parser.add_argument("--frames", metavar="NAME", help="ring of the frame log's records")
+    parser.add_argument("--given", action="store_true", help="origins are JSON on standard input")
     parser.add_argument("--part-s", type=float, help="begin another file after so long")
     parser.add_argument("--keep-bytes", type=int, help="remove the oldest files beyond so much")
     arguments = parser.parse_args()
-    about = json.load(sys.stdin) if arguments.about else None
+    given = json.load(sys.stdin) if arguments.given else {}
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
@@ -256,8 +344,10 @@ def _main() -> None:
             arguments.file,
             arguments.live_port,
             arguments.events,
-            about,
+            given.get("about"),
             None if arguments.part_s is None else Rotation(arguments.part_s, arguments.keep_bytes),
+            arguments.frames,
+            given.get("head"),
         )
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:

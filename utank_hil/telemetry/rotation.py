@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+SUFFIXES: Final = (".rrd", ".frames")
+"""Files of one recording, which come and go together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +25,17 @@ class Rotation:
     keep_bytes: int | None = None
 
 
+def part_of(file: Path, number: int) -> Path:
+    """Name of the part of a recording with a number; the first has the recording's own."""
+    return file if number == 1 else file.with_stem(f"{file.stem}-part{number:03d}")
+
+
+def bytes_of(file: Path) -> int:
+    """Size of a recording, all its files together."""
+    files = (file.with_suffix(suffix) for suffix in SUFFIXES)
+    return sum(path.stat().st_size for path in files if path.exists())
+
+
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     """Remove the oldest recordings of a folder until the rest is no larger than some bytes.
 
@@ -36,15 +51,20 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     list of Path
         What was removed.
     """
-    alike = file.parent.glob(f"{file.stem.partition('-')[0]}-*{file.suffix}")
-    found = [(path.stat(), path) for path in alike if path != file]
-    found.sort(key=lambda each: (each[0].st_mtime_ns, each[1].stem))
-    left = sum(status.st_size for status, _ in found)
+    alike: dict[str, list[Path]] = {}
+    for suffix in SUFFIXES:
+        for path in file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}"):
+            if path.stem != file.stem:
+                alike.setdefault(path.stem, []).append(path)
+    found = [([path.stat() for path in paths], paths) for paths in alike.values()]
+    found.sort(key=lambda each: (max(s.st_mtime_ns for s in each[0]), each[1][0].stem))
+    left = sum(status.st_size for statuses, _ in found for status in statuses)
     removed = []
-    for status, path in found:
+    for statuses, paths in found:
         if left <= keep_bytes:
             break
-        path.unlink(missing_ok=True)
-        left -= status.st_size
-        removed.append(path)
+        for path in paths:
+            path.unlink(missing_ok=True)
+        left -= sum(status.st_size for status in statuses)
+        removed += paths
     return removed

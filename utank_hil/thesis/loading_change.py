@@ -77,7 +77,9 @@ class Adaptation:
     def excitation(self) -> FloatArray:
         """The pulses, pressures at the samples."""
         limits = PumpLimits(pressure_pa=self.pulse_pa, rate_pa_s=10 * self.pulse_pa)
-        return random_pulses(NEW_LAW_S - PULSES_S, limits, _SEED, self.pulse_s)
+        return random_pulses(
+            NEW_LAW_S - PULSES_S, limits, _SEED, self.pulse_s, sample_time_s=SAMPLE_TIME_S
+        )
 
     def old_law(self, ship: RollShip, tank: Tank) -> PredictiveLaw:
         """The law designed on the ship before the change."""
@@ -177,9 +179,11 @@ def _identified(
     y = states[:, [STATES.index(name) for name in adaptation.measured]]
     random = np.random.default_rng(_SEED).standard_normal(y.shape)
     y = y + noise * y.std(axis=0) * random
-    waves = find_disturbance_frequencies(u, y)
-    found = okid(u, y, adaptation.order, disturbance_frequencies_rad_s=waves)
-    return era(found.markov, SYSTEM_ORDER, SAMPLE_TIME_S)
+    waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
+    found = okid(
+        u, y, adaptation.order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S
+    )
+    return era(found.markov, SYSTEM_ORDER, sample_time_s=SAMPLE_TIME_S)
 
 
 def _modes(a: FloatArray) -> tuple[float, ...]:

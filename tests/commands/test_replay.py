@@ -1,0 +1,173 @@
+"""``utank-hil replay``: exact for what was recorded, and a change is named."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from ship_in_the_port import ShipInThePort
+from typer.testing import CliRunner, Result
+
+from utank_hil.canbus import Mode, PumpCommand, load_catalogue
+from utank_hil.commands import run as run_module
+from utank_hil.commands.common import new_app
+from utank_hil.commands.replay import replay
+from utank_hil.commands.run import run
+from utank_hil.telemetry.bus_records import Kind
+from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter
+from utank_hil.telemetry.replay import entries_of
+
+pytestmark = pytest.mark.slow
+
+COMMANDS = load_catalogue().codec(PumpCommand)
+WIDE = {"TERM": "dumb", "COLUMNS": "300", "NO_COLOR": "1"}
+
+
+def invoke(command: Any, *words: object) -> Result:
+    app = new_app()
+    app.command()(command)
+    return CliRunner(env=WIDE).invoke(app, [str(word) for word in words])
+
+
+def controller(folder: Path, gain: float = -1.5e5) -> Path:
+    """A law in matrices, in a data file, on a machine that may be busy."""
+    system = {"A": [[0.5]], "B": [[1.0]], "C": [[gain]], "D": [[2 * gain]], "dt": 0.1}
+    (folder / "law.json").write_text(json.dumps(system))
+    content = {
+        "name": "matrices",
+        "vessel": str(Path("configs/ships/thesis_first.yaml").resolve()),
+        "law": {"kind": "state_space", "measured": ["roll_rad"], "system": "./law.json"},
+        "accept_low_margins": True,
+        "safety": {
+            "overruns_in_ten": None,
+            "long_overrun_ms": 1000,
+            **dict.fromkeys(
+                ("motion_age_ms", "tank_degraded_age_ms", "drive_age_ms", "echo_age_ms"), 500
+            ),
+        },
+    }
+    path = folder / "controller.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the frame log of a run in real time, in which the pump was driven."""
+    folder = tmp_path_factory.mktemp("run")
+    config = controller(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "SocketCanPort", ShipInThePort)
+        words = (config, "--bus", "any0", "--duration", 3.5, "--out", folder, "--json")
+        result = invoke(run, *words)
+    report = json.loads(result.stdout)
+    assert report["mode"] == Mode.ACTIVE.name
+    assert report["recording"]["records_lost"] == 0
+    assert Path(report["recording"]["frames"]) == log_of(folder)
+    return folder
+
+
+def log_of(folder: Path) -> Path:
+    (log,) = folder.glob("run-*.frames")
+    return log
+
+
+def test_a_run_in_real_time_is_replayed_bit_for_bit(folder: Path) -> None:
+    result = invoke(replay, log_of(folder), "--json")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["exact"]
+    assert found["causes"] == []
+    assert found["ticks"] > 200
+    assert found["frames"] > found["ticks"] / 2
+    drove = [
+        data
+        for kind, _, _, number, _, data in entries_of(FrameLog(log_of(folder)).blocks())
+        if kind == Kind.SENT and number == COMMANDS.can_id and COMMANDS.decode(data).pressure_pa
+    ]
+    assert drove
+
+
+def test_the_last_bit_of_a_gain_is_named_even_where_no_frame_shows_it(
+    folder: Path, tmp_path: Path
+) -> None:
+    other = controller(tmp_path, float(np.nextafter(-1.5e5, 0)))
+    result = invoke(replay, log_of(folder), "--config", other, "--json")
+    assert result.exit_code == 1
+    found = json.loads(result.stdout)
+    assert not found["exact"]
+    assert any(
+        line.startswith("law, ") and "recorded -150000.0, replayed -149999.99999999997" in line
+        for line in found["causes"]
+    )
+    assert any(line.startswith("configuration, law.system") for line in found["causes"])
+
+
+def test_another_gain_is_named_by_tick_message_and_signal(folder: Path, tmp_path: Path) -> None:
+    result = invoke(replay, log_of(folder), "--config", controller(tmp_path, -2e5), "--json")
+    assert result.exit_code == 1
+    found = json.loads(result.stdout)
+    first = found["first_difference"]
+    assert (first["message"], first["signal"]) == ("PUMP_CMD", "pressure_pa")
+    assert float(first["recorded"]) != float(first["replayed"])
+    # nothing but the pressure's own frames can differ, since the inputs are the recorded ones
+    assert set(found["different_frames"]) <= {"PUMP_CMD", "CTRL_STATUS"}
+    assert first["tick"] > 80  # armed after 0.8 s
+    text = invoke(replay, log_of(folder), "--config", controller(tmp_path, -2e5)).stdout
+    assert f"first at tick {first['tick']}" in text
+    assert "configuration, law.system" in text
+
+
+def test_a_cut_log_is_compared_up_to_where_it_is_whole(folder: Path, tmp_path: Path) -> None:
+    content = log_of(folder).read_bytes()
+    cut = tmp_path / "run-x.frames"
+    cut.write_bytes(content[: len(content) * 3 // 4])
+    found = json.loads(invoke(replay, cut, "--json").stdout)
+    assert found["exact"]
+    assert 0 < found["ticks"] < 350
+    assert "is cut at byte" in found["cut"]
+
+
+def test_a_log_of_another_program_state_says_what_is_not_the_same(
+    folder: Path, tmp_path: Path
+) -> None:
+    log = FrameLog(log_of(folder))
+    log.head["about"]["commit"] = "0123456789ab"
+    log.head["packages"]["numpy"] = "1.0"
+    changed = tmp_path / "run-x.frames"
+    with FrameLogWriter(changed, log.head) as writer:
+        for block in log.blocks():
+            writer.write(block)
+    found = json.loads(invoke(replay, changed, "--json").stdout)
+    assert found["exact"]
+    assert [line.split(":")[0] for line in found["causes"]] == ["commit", "numpy"]
+
+
+def test_a_part_from_the_middle_of_a_run_is_refused(folder: Path, tmp_path: Path) -> None:
+    part = tmp_path / "run-x-part002.frames"
+    part.write_bytes(log_of(folder).read_bytes())
+    result = invoke(replay, part)
+    assert result.exit_code == 2
+    assert "give the run's first part" in result.stderr
+
+
+def test_a_log_does_not_choose_code_to_run(folder: Path, tmp_path: Path) -> None:
+    log = FrameLog(log_of(folder))
+    law = {"kind": "python", "factory": "os:system", "measured": ["roll_rad"]}
+    log.head["about"]["configuration"]["law"] = law | {"parameters": {"command": "false"}}
+    changed = tmp_path / "run-x.frames"
+    FrameLogWriter(changed, log.head).close()
+    result = invoke(replay, changed)
+    assert result.exit_code == 2
+    assert "os:system, which a log must not choose" in result.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing like it"])
+def test_a_file_that_is_no_log_is_an_error_with_its_name(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "x.frames"
+    file.write_bytes(content)
+    result = invoke(replay, file)
+    assert result.exit_code == 2
+    assert "x.frames: is no frame log" in result.stderr

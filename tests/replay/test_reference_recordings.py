@@ -1,0 +1,111 @@
+"""The controller of today answers the kept recordings as it did when they were accepted.
+
+A difference is a change of behaviour. If it is meant, ``python -m tools.reference_recordings
+--accept`` records anew and prints what was accepted; that text belongs into the commit's message.
+"""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tools.reference_recordings.cases import CASES, record
+from tools.reference_recordings.comparison import LOGS, compare
+from utank_hil.assembly import build_law
+from utank_hil.canbus import ControllerStatus, Fault, Mode, RetuningState, load_catalogue
+from utank_hil.telemetry.bus_records import Kind
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.law_values import law_values
+from utank_hil.telemetry.replay import entries_of, replay
+from utank_hil.telemetry.replay_head import causes, recorded_config
+
+STATUS = load_catalogue().codec(ControllerStatus)
+ACCEPT = "if this is meant: python -m tools.reference_recordings --accept"
+MOST_BYTES = 600_000
+
+
+@cache
+def statuses(name: str) -> tuple[ControllerStatus, ...]:
+    """What the controller said of itself in a recording."""
+    entries = entries_of(FrameLog(LOGS / f"{name}.frames").blocks())
+    sent = (STATUS.decode(data) for kind, _, _, number, _, data in entries
+            if kind == Kind.SENT and number == STATUS.can_id)  # fmt: skip
+    return tuple(status for status in sent if status is not None)
+
+
+@pytest.mark.parametrize("name", [case.name for case in CASES])
+def test_every_frame_is_answered_as_recorded(name: str) -> None:
+    said = compare(LOGS / f"{name}.frames")
+    assert not said, f"{said}; {ACCEPT}"
+
+
+def test_the_recordings_are_those_of_the_cases_and_small() -> None:
+    files = sorted(LOGS.glob("*.frames"))
+    assert [file.stem for file in files] == sorted(case.name for case in CASES)
+    assert len(files) >= 10
+    assert sum(file.stat().st_size for file in files) < MOST_BYTES
+
+
+def test_between_them_they_meet_every_mode_many_faults_and_a_whole_retuning() -> None:
+    met = [status for case in CASES for status in statuses(case.name)]
+    assert {status.mode for status in met} == set(Mode)
+    assert {status.fault for status in met} >= {
+        Fault.MOTION_SILENT, Fault.TANK_SILENT, Fault.MOTION_SIGN_FLIP, Fault.LEVEL_LIMIT,
+        Fault.DRIVE_FAULT, Fault.OVERRUN, Fault.BUS_LOST, Fault.OPERATOR_SILENT,
+    }  # fmt: skip
+    assert any(status.degraded and status.mode is Mode.ACTIVE for status in met)
+    assert {status.retuning for status in statuses("retuned-and-undone")} >= {
+        RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL, RetuningState.RETUNED,
+        RetuningState.UNDONE,
+    }  # fmt: skip
+
+
+def test_one_bit_of_one_gain_is_named() -> None:
+    log = FrameLog(LOGS / "every-mode.frames")
+    with recorded_config(log.head) as config:
+        law = build_law(config)
+        controller = law.controller()
+        bits = law_values(controller)["gains"].view("u8")  # the controller's own memory
+        bits[0, 100] ^= 1
+        changed = replace(law, controller=lambda: controller)
+        (why,) = causes(log.head, config, changed, LOGS)
+    assert why.startswith("law, gains[0, 100]: recorded ")
+
+
+def test_a_changed_limit_is_named_by_tick_signal_and_key() -> None:
+    path = LOGS / "every-mode.frames"
+    with recorded_config(FrameLog(path).head) as config:
+        slower = replace(config.limits, rate_pa_s=config.limits.rate_pa_s / 2)
+    said = compare(path, {"limits": slower})
+    assert ", PUMP_CMD, pressure_pa: recorded " in said
+    assert "configuration, limits.rate_pa_s: recorded " in said
+
+
+def test_a_changed_reaction_is_named_by_the_mode_that_differs() -> None:
+    path = LOGS / "motion-silent.frames"
+    with recorded_config(FrameLog(path).head) as config:
+        patient = replace(config.safety, motion_age_ms=1000.0)
+    said = compare(path, {"safety": patient})
+    assert "recorded" in said
+    assert "configuration, safety.motion_age_ms: recorded 30.0, replayed 1000.0" in said
+
+
+def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
+    log = FrameLog(LOGS / "retuned-and-undone.frames")
+    entries = (entry for entry in entries_of(log.blocks()) if entry[0] != Kind.ANSWER)
+    with recorded_config(log.head) as config:
+        result = replay(entries, config, build_law(config), retuner=True)
+    assert result.first is not None
+    assert result.different  # it waits for an answer, and goes on without a trial
+
+
+def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:
+    (case,) = (case for case in CASES if case.name == "drive-fault")
+    first, again = tmp_path / "first", tmp_path / "again"
+    for folder in (first, again):
+        folder.mkdir()
+        record(case, folder)
+    assert (first / "drive-fault.frames").read_bytes() == (
+        again / "drive-fault.frames"
+    ).read_bytes()

@@ -1,0 +1,115 @@
+"""A run on a SocketCAN interface is replayed exactly, and canplayer plays what is exported."""
+
+import re
+import subprocess
+import time
+from itertools import takewhile
+from pathlib import Path
+
+import pytest
+from busy_machine import first_that_can_be_judged, judged_by
+from two_processes import (
+    CHANNEL,
+    LINE,
+    Candump,
+    Program,
+    Watcher,
+    patient_controller,
+    running,
+    set_link,
+)
+
+from utank_hil.assembly import build_law
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.telemetry.bus_logs import write_bus_log
+from utank_hil.telemetry.bus_records import Kind
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.replay import ReplayResult, entries_of, replay
+from utank_hil.telemetry.replay_head import causes, recorded_config
+
+pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+
+STORM = Path("configs/scenarios/storm.yaml")
+KEPT = Path("tests/replay/every-mode.frames")
+LISTENERS = Path("/proc/net/can/rcvlist_all")
+PLAYED_NS = 2_500_000_000
+
+
+def driven(folder: Path) -> Path:
+    """The frame log of a run in which the pump was driven, and then the interface was down."""
+    watcher = Watcher()
+    ship = Program(folder, "firmware-sim", STORM, "--bus", CHANNEL, "--duration", 600, "--json")
+    words = ("run", patient_controller(folder), "--bus", CHANNEL, "--out", folder, "--json")
+    try:
+        with (
+            judged_by(watcher.machine.failure),
+            running(ship),
+            running(Program(folder, "utank-hil", *words)) as controller,
+        ):
+            watcher.wait_in_charge(1e3)
+            watcher.watch(2.0)
+            set_link(up=False)
+            watcher.watch(0.3)
+            set_link(up=True)
+            watcher.watch(0.5)
+            report, _ = controller.end(ExitCode.BUS_LOST)
+    finally:
+        set_link(up=True)
+        watcher.close()
+    recording = report["recording"]
+    assert isinstance(recording, dict)
+    assert recording["records_lost"] == 0
+    return Path(recording["frames"])
+
+
+def wait_for_listener() -> None:
+    """Wait until candump's socket takes every frame."""
+    deadline = time.monotonic() + 30.0
+    while not re.search(rf"{CHANNEL}.*\braw\b", LISTENERS.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> None:
+    path = first_that_can_be_judged(driven, tmp_path)
+    log = FrameLog(path)
+    kinds = {entry[0] for entry in entries_of(log.blocks())}
+    assert {Kind.STARTED, Kind.LINK_ERROR, Kind.STOP} <= kinds
+    with recorded_config(log.head) as config:
+        law = build_law(config)
+        assert causes(log.head, config, law, path.parent) == []
+        result: ReplayResult = replay(entries_of(log.blocks()), config, law)
+    assert result.first is None, result.first
+    assert result.ticks > 250
+    assert result.frames > 200
+    assert log.cut == ""
+
+
+def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path) -> None:
+    entries = list(entries_of(FrameLog(KEPT).blocks()))
+    first = list(takewhile(lambda entry: entry[4] < PLAYED_NS, entries))
+    file = tmp_path / "kept.log"
+    write_bus_log(file, first)
+    candump = Candump(tmp_path)
+    try:
+        wait_for_listener()
+        player = subprocess.run(
+            ["canplayer", "-I", str(file), f"{CHANNEL}=can0"],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert player.returncode == 0, player.stderr
+    finally:
+        candump.close()
+    heard = [
+        (int(parts["id"], 16), bytes.fromhex(parts["data"]))
+        for line in (tmp_path / "candump.log").read_text().splitlines()
+        if (parts := re.fullmatch(LINE, line))
+    ]
+    assert heard == [
+        (number, data)
+        for kind, _, _, number, _, data in first
+        if kind in (Kind.RECEIVED, Kind.SENT)
+    ]

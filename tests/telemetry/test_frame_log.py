@@ -1,0 +1,123 @@
+"""A frame log that is cut or damaged anywhere is whole up to a second before."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from utank_hil.telemetry import Rotation
+from utank_hil.telemetry.bus_records import LAYOUT, RECORD, Kind, Records
+from utank_hil.telemetry.frame_log import BlockSink, FrameLog, FrameLogError, FrameLogWriter
+
+TICK_NS = 10_000_000
+SECOND_NS = 1_000_000_000
+HEAD = {"about": {"version": "1"}, "law": [1.5, 2.5]}
+
+
+def tick(number: int, source: random.Random) -> bytes:
+    """What a tick has: some noisy frames, the tick, an answer."""
+    time_ns = number * TICK_NS
+    frames = [
+        LAYOUT.pack(Kind.RECEIVED, 8, 0, 0x08FF3082 + i, time_ns - i, source.randbytes(8))
+        for i in range(3)
+    ]
+    sent = LAYOUT.pack(Kind.SENT, 8, 0, 0x08FF1080, time_ns, source.randbytes(8))
+    return b"".join([*frames, LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b""), sent])
+
+
+def write_log(
+    file: Path, ticks: int, rotation: Rotation | None = None, *, small: bool = False
+) -> tuple[bytes, list[tuple[int, int]]]:
+    """Write a log; all its records, and (size of the file, time in ns) after each tick."""
+    source = random.Random(1)
+    whole, sizes = b"", []
+    with FrameLogWriter(file, HEAD, rotation, small=small) as writer:
+        sink = BlockSink(writer)
+        for number in range(ticks):
+            records = tick(number, source)
+            whole += records
+            sink.write(records, number * TICK_NS)
+            sizes.append((file.stat().st_size, number * TICK_NS))
+        sink.flush()
+    return whole, sizes
+
+
+def read(path: Path) -> tuple[Records, FrameLog]:
+    log = FrameLog(path)
+    blocks = list(log.blocks())
+    return np.concatenate(blocks) if blocks else np.empty(0, dtype=RECORD), log
+
+
+@pytest.mark.parametrize("small", [False, True])
+def test_a_whole_log_gives_back_head_and_records(tmp_path: Path, small: bool) -> None:
+    whole, _ = write_log(tmp_path / "a.frames", 230, small=small)
+    records, log = read(tmp_path / "a.frames")
+    assert records.tobytes() == whole
+    assert (log.head, log.cut, log.first_part) == (HEAD, "", True)
+
+
+def test_cut_at_200_random_bytes_it_lacks_less_than_a_second(tmp_path: Path) -> None:
+    file = tmp_path / "a.frames"
+    whole, sizes = write_log(file, 2000)
+    content = file.read_bytes()
+    begin = sizes[0][0]
+    for place in random.Random(2).sample(range(begin, len(content)), 200):
+        cut = tmp_path / "cut.frames"
+        cut.write_bytes(content[:place])
+        records, log = read(cut)
+        assert whole.startswith(records.tobytes())
+        # the latest tick at which the log had not yet grown past this byte
+        reached_ns = max(time_ns for size, time_ns in sizes if size <= place)
+        last_ns = int(records["time_ns"][-1]) if len(records) else 0
+        assert reached_ns - last_ns < SECOND_NS
+        assert bool(log.cut) == (place not in {size for size, _ in sizes})
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_a_flipped_bit_ends_the_reading_before_it(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    file = tmp_path_factory.mktemp("log") / "a.frames"
+    whole, sizes = write_log(file, 150)
+    content = bytearray(file.read_bytes())
+    place = data.draw(st.integers(sizes[0][0], len(content) - 1))
+    content[place] ^= 1 << data.draw(st.integers(0, 7))
+    file.write_bytes(content)
+    records, log = read(file)
+    assert whole.startswith(records.tobytes())
+    assert len(records) < len(whole) // LAYOUT.size
+    assert log.cut
+
+
+def test_parts_are_read_as_one_log_and_each_has_the_head(tmp_path: Path) -> None:
+    whole, _ = write_log(tmp_path / "run-a.frames", 300, Rotation(part_s=1.0))
+    names = ["run-a.frames", "run-a-part002.frames", "run-a-part003.frames"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+    records, _ = read(tmp_path / names[0])
+    assert records.tobytes() == whole
+    later, middle = read(tmp_path / names[1])
+    assert whole.endswith(later.tobytes())
+    assert (middle.head, middle.first_part) == (HEAD, False)
+
+
+def test_the_oldest_logs_make_room_for_the_next_part(tmp_path: Path) -> None:
+    old = tmp_path / "run-0.frames"
+    old.write_bytes(bytes(100_000))
+    write_log(tmp_path / "run-1.frames", 250, Rotation(1.0, keep_bytes=50_000))
+    assert not old.exists()
+    assert (tmp_path / "run-1.frames").exists()
+
+
+def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
+    for content in (b"", b"time_s,roll_rad\n0,1\n"):
+        (tmp_path / "a.frames").write_bytes(content)
+        with pytest.raises(FrameLogError, match=r"a\.frames: is no frame log"):
+            FrameLog(tmp_path / "a.frames")
+    write_log(tmp_path / "b.frames", 1)
+    (tmp_path / "b.frames").write_bytes((tmp_path / "b.frames").read_bytes()[:30])
+    with pytest.raises(FrameLogError, match=r"b\.frames is cut at byte 30"):
+        FrameLog(tmp_path / "b.frames")

@@ -1,0 +1,118 @@
+"""The recorder writes the frame log: all of it, or all but a second, and says what it lost."""
+
+import signal
+import subprocess
+import sys
+import time
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RecorderProcess, RingWriter
+from utank_hil.telemetry.bus_records import LAYOUT, ROW, Kind, Records, ring_rows
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.recorder import FrameRecording
+
+pytestmark = pytest.mark.slow
+
+TICK_NS = 10_000_000
+HEAD = {"about": {"x": 1}}
+NO_RERUN = """
+import sys
+sys.modules["rerun"] = None
+from utank_hil.telemetry.recorder import _main
+_main()
+"""
+
+
+def tick(number: int) -> bytes:
+    """A tick with as many frames as can't be in one row."""
+    time_ns = number * TICK_NS
+    frame = LAYOUT.pack(Kind.RECEIVED, 8, 0, number, time_ns, number.to_bytes(8, "little"))
+    return frame * 10 + LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b"")
+
+
+def feed(ring: RingWriter, numbers: range) -> bytes:
+    data = b"".join(map(tick, numbers))
+    for number in numbers:
+        for row in ring_rows(tick(number)):
+            ring.write(row)
+    return data
+
+
+def read(file: Path) -> Records:
+    log = FrameLog(file)
+    assert log.head == HEAD
+    return np.concatenate(list(log.blocks()))
+
+
+def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> None:
+    file = tmp_path / "run-a.rrd"
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+        data = feed(frames, range(50))  # before the recorder is there
+        recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
+        data += feed(frames, range(50, 200))
+        ring.write(np.zeros(len(SIGNALS)))
+    report = recorder.stop()
+    assert report.records_lost == 0
+    assert file.exists()
+    assert read(file.with_suffix(".frames")).tobytes() == data
+
+
+def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
+    file = tmp_path / "run-a.rrd"
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+        recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
+        begin_s, data = time.monotonic(), b""
+        for number in count():
+            data += feed(frames, range(number, number + 1))
+            time.sleep(0.01)
+            if time.monotonic() - begin_s > 2.0:
+                break
+        recorder._process.send_signal(signal.SIGKILL)
+        recorder._process.wait()
+        recorder._output.close()
+    left = read(file.with_suffix(".frames"))
+    assert data.startswith(left.tobytes())
+    assert left["time_ns"][-1] > (number - 150) * TICK_NS  # half a second more for the machine
+
+
+def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Path) -> None:
+    with RingWriter(ROW, capacity=64) as frames:
+        feed(frames, range(10))
+        recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD, None)
+        recording.write()
+        feed(frames, range(10, 110))  # two rows each
+        recording.write()
+        recording.close()
+    records = read(tmp_path / "a.frames")
+    (place,) = np.flatnonzero(records["kind"] == Kind.LOST)
+    assert recording.lost == records["number"][place] == 2 * 100 - 64
+    assert records["time_ns"][place - 1] == 9 * TICK_NS
+    assert records["time_ns"][place + 1] == (10 + 68) * TICK_NS
+
+
+def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -> None:
+    file = tmp_path / "run-a.rrd"
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+        data = feed(frames, range(20))
+        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--given"]
+        process = subprocess.Popen(
+            [sys.executable, "-c", NO_RERUN, *words],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write('{"about": null, "head": {"about": {"x": 1}}}')
+        process.stdin.close()
+        assert process.stdout.readline() == '{"ready": 1}\n'
+    with process.stdout as output:
+        assert '"parts": 1' in output.read()
+    assert process.wait() == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["run-a.frames"]
+    assert read(tmp_path / "run-a.frames").tobytes() == data

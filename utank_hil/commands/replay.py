@@ -1,0 +1,138 @@
+"""``utank-hil replay``: the recorded bus handed to the controller again."""
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from utank_hil.assembly import build_law
+from utank_hil.commands.common import Json, fail, load
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.parameters import ParameterError
+from utank_hil.telemetry.bus_logs import (
+    BUS_SUFFIXES,
+    begins_with_the_controller,
+    read_bus_log,
+)
+from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
+from utank_hil.telemetry.replay import ReplayResult, entries_of
+from utank_hil.telemetry.replay import replay as run_replay
+from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
+
+
+def replay(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help=f"Frame log ({SUFFIX}) of a run, its first part; or .log (candump), .asc, .blf."
+        ),
+    ],
+    config: Annotated[
+        Path | None,
+        typer.Option(help="Controller configuration to replay with, instead of the recorded one."),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Hand a recorded bus to the controller again and compare every frame that it sends.
+
+    Exit code 0: all frames are equal bit for bit, by the same law. 1: something differs; the first
+    difference is printed with its tick, message and signal, and what may be its cause. 2: the log
+    or an option is wrong.
+
+    [bold]Example:[/bold] utank-hil replay out/run-20261122T093000Z.frames
+    """
+    cut = ""
+    try:
+        if log.suffix.lower() in BUS_SUFFIXES:
+            result, why = _replay_bus_log(log, config)
+        else:
+            recording = FrameLog(log)
+            if not recording.first_part:
+                fail(
+                    f"{log} begins in the middle of a run, in which the controller's memory is "
+                    "not known: give the run's first part"
+                )
+            with _configuration(config, recording.head) as chosen:
+                law = build_law(chosen)
+                why = causes(recording.head, chosen, law, log.parent)
+                result = run_replay(
+                    entries_of(recording.blocks()), chosen, law, retuner=recording.head["retuner"]
+                )
+            cut = recording.cut
+    except (OSError, ValueError) as error:
+        fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)
+    if result.lost_rows:
+        why.insert(0, f"the recorder lost {result.lost_rows} rows of the log")
+    exact = result.exact and not any(line.startswith("law, ") for line in why)
+    if json_:
+        sys.stdout.write(json.dumps(_as_json(result, why, cut, exact)) + "\n")
+    else:
+        _print(Console(highlight=False), result, why, cut)
+    raise typer.Exit(ExitCode.OK if exact else ExitCode.REFUSED)
+
+
+def _replay_bus_log(log: Path, config: Path | None) -> tuple[ReplayResult, list[str]]:
+    """Replay a log that knows of no configuration and no ticks."""
+    if config is None:
+        fail(f"{log} says nothing of the controller: name its configuration by --config")
+    chosen = load(config, ControllerConfig)
+    entries = read_bus_log(log)
+    if not begins_with_the_controller(entries):
+        fail(
+            f"{log} begins in the middle of a run, or has no controller in it: its first frame of "
+            "the controller must be the address claim, with which it starts"
+        )
+    result = run_replay(entries, chosen, build_law(chosen))
+    if result.exact:
+        return result, []
+    return result, [
+        "the log is one of the bus: when the controller was handed each frame is a guess, and "
+        "answers of a retuner are not in it"
+    ]
+
+
+@contextmanager
+def _configuration(path: Path | None, head: dict[str, Any]) -> Iterator[ControllerConfig]:
+    if path is not None:
+        yield load(path, ControllerConfig)
+        return
+    with recorded_config(head) as config:
+        yield config
+
+
+def _as_json(result: ReplayResult, why: list[str], cut: str, exact: bool) -> dict[str, Any]:
+    return {
+        "exact": exact,
+        "ticks": result.ticks,
+        "frames": result.frames,
+        "different_frames": dict(result.different),
+        "first_difference": None if result.first is None else asdict(result.first),
+        "causes": why,
+        "cut": cut,
+    }
+
+
+def _print(console: Console, result: ReplayResult, why: list[str], cut: str) -> None:
+    said = f"{result.ticks} ticks, {result.frames} frames of the controller"
+    if result.first is None:
+        console.print(f"[green]equal bit for bit:[/green] {said}", soft_wrap=True)
+    else:
+        counts = ", ".join(f"{name} {count}" for name, count in result.different.items())
+        console.print(f"[red]different:[/red] {escape(counts)}, of {said}", soft_wrap=True)
+        console.print(f"first at {escape(str(result.first))}", soft_wrap=True)
+    if why:
+        console.print("not the same as when it was recorded:")
+        for line in why:
+            console.print(f"  {escape(line)}", soft_wrap=True)
+    elif result.first is not None:
+        console.print("version, configuration and law are the same: the program was changed")
+    if cut:
+        console.print(f"[yellow]{escape(cut)}[/yellow]: compared up to there", soft_wrap=True)

@@ -1,0 +1,170 @@
+"""Logs of the bus in other programs' formats: candump (.log), ASC (.asc) and BLF (.blf).
+
+They hold frames and the times at which they were on the bus, not what a controller was handed in
+which tick. So what is read from them has ticks on a grid of their own: from the controller's first
+frame on, or where it is silent from the log's first frame on.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    ControllerStatus,
+    Frame,
+    PumpCommand,
+    ValveCommand,
+    load_catalogue,
+)
+from utank_hil.telemetry.bus_records import Kind
+from utank_hil.telemetry.replay import Entry
+from utank_hil.tick import TICK_NS
+
+if TYPE_CHECKING:
+    import can
+
+BUS_SUFFIXES: Final = (".log", ".asc", ".blf")
+_EARLY_NS: Final = TICK_NS // 5
+"""A frame may be so much earlier than the controller's first one was in its tick."""
+
+
+class BusLogError(ValueError):
+    """The file is no log of its kind, or not what is needed; the message says why."""
+
+
+def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
+    """Write the frames of a recording; times count in seconds from its first record.
+
+    Parameters
+    ----------
+    path : Path
+        Overwritten; its suffix, one of `BUS_SUFFIXES`, says the format. Times of candump and ASC
+        are rounded to a microsecond.
+    entries : iterable of Entry
+        Frames of the controller are marked as transmitted.
+
+    Returns
+    -------
+    int
+        Frames written.
+    """
+    from can import Message
+
+    count, begin_ns = 0, None
+    with _writer(path) as writer:
+        for kind, _, _, number, time_ns, data in entries:
+            begin_ns = time_ns if begin_ns is None else begin_ns
+            if kind not in (Kind.RECEIVED, Kind.SENT):
+                continue
+            count += 1
+            message = Message(
+                timestamp=max(0, time_ns - begin_ns) * 1e-9,
+                arbitration_id=number,
+                is_extended_id=True,
+                data=data,
+                is_rx=kind == Kind.RECEIVED,
+            )
+            writer.on_message_received(message)
+    return count
+
+
+def read_bus_log(path: Path) -> list[Entry]:
+    """Read a log as what a controller on that bus was handed and answered.
+
+    Raises
+    ------
+    BusLogError
+        If it can't be read to its end, or holds no frame of the catalogue.
+    OSError
+        If there is no such file.
+    """
+    catalogue = load_catalogue()
+    own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
+    messages = list(_messages(path))
+    if not any(message.arbitration_id in catalogue.can_ids for message in messages):
+        raise BusLogError(
+            f"{path}: no frame in it is one of the catalogue's (docs/can-catalogue.md)"
+        )
+    # what the log's own program sent is marked, where the controller was that program
+    marked = any(not m.is_rx and m.arbitration_id in own_ids for m in messages)
+    begin_s = messages[0].timestamp
+    received: list[Entry] = []
+    sent: list[tuple[int, Frame]] = []
+    for message in messages:
+        time_ns = round((message.timestamp - begin_s) * 1e6) * 1000
+        frame = Frame(message.arbitration_id, bytes(message.data))
+        if not message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+            received.append((Kind.OTHERS, 0, 0, 1, time_ns, b""))
+        elif not message.is_rx if marked else frame.can_id in own_ids:
+            sent.append((time_ns, frame))
+        else:
+            received.append((Kind.RECEIVED, len(frame.data), 0, frame.can_id, time_ns, frame.data))
+    return list(_in_ticks(received, sent))
+
+
+def begins_with_the_controller(entries: Iterable[Entry]) -> bool:
+    """Whether the first frame that the controller sent is its address claim."""
+    claim = load_catalogue().codec(AddressClaim, Address.CONTROLLER).can_id
+    first = next((entry for entry in entries if entry[0] == Kind.SENT), None)
+    return first is not None and first[3] == claim
+
+
+def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[Entry]:
+    """Entries with the ticks between them; a tick's own frames follow it."""
+    begin_ns = sent[0][0] if sent else received[0][4]
+    by_tick: dict[int, list[Frame]] = {}
+    for time_ns, frame in sent:
+        by_tick.setdefault((time_ns - begin_ns + _EARLY_NS) // TICK_NS, []).append(frame)
+    catalogue = load_catalogue()
+    status = catalogue.codec(ControllerStatus)
+    commands = {catalogue.codec(kind).can_id for kind in (PumpCommand, ValveCommand)}
+    said = next((status.decode(f.data) for _, f in sent if f.can_id == status.can_id), None)
+    yield Kind.STARTED, 1, 0, 0, begin_ns, bytes([said is None or not said.not_realtime])
+    last_ns = max([received[-1][4] if received else 0, sent[-1][0] if sent else 0])
+    last_own = max(by_tick, default=-1)
+    waiting = iter(received)
+    entry = next(waiting, None)
+    for tick in range(math.ceil((last_ns - begin_ns) / TICK_NS) + 1):
+        now_ns = begin_ns + tick * TICK_NS
+        while entry is not None and entry[4] <= now_ns:
+            yield entry
+            entry = next(waiting, None)
+        # the last frames of all may be what a controller leaves behind, after its last tick
+        leaves = tick == last_own and commands.issuperset(frame.can_id for frame in by_tick[tick])
+        yield Kind.STOP if leaves else Kind.TICK, 0, 0, 0, now_ns, b""
+        for can_id, data in by_tick.get(tick, ()):
+            yield Kind.SENT, len(data), 0, can_id, now_ns, data
+
+
+def _messages(path: Path) -> Iterator["can.Message"]:
+    """Messages of a log."""
+    from can import ASCReader, BLFReader, CanutilsLogReader
+
+    readers: dict[str, Callable[[Any], Any]] = {
+        ".log": CanutilsLogReader,
+        ".asc": ASCReader,
+        ".blf": BLFReader,
+    }
+    suffix, count = path.suffix.lower(), 0
+    with path.open("rb") if suffix == ".blf" else path.open(errors="replace") as content:
+        try:
+            for message in readers[suffix](content):
+                yield message
+                count += 1
+        except Exception as error:  # the readers let out whatever a wrong byte makes them meet
+            raise BusLogError(
+                f"{path}: can't be read as {suffix[1:]} after {count} frames: {error}"
+            ) from error
+    if not count:
+        raise BusLogError(f"{path}: no frames in it")
+
+
+def _writer(path: Path) -> Any:
+    from can import ASCWriter, BLFWriter, CanutilsLogWriter
+
+    if path.suffix.lower() == ".log":
+        return CanutilsLogWriter(path, channel="can0")
+    return (ASCWriter if path.suffix.lower() == ".asc" else BLFWriter)(path)

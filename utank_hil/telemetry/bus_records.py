@@ -1,0 +1,124 @@
+"""What a controller node was handed and what it answered, as records of one fixed layout.
+
+A node without I/O is a function of what it is handed, so these records, in order, are all that its
+behaviour follows from beside its configuration: frames received and sent, ticks, bus errors, frames
+of other kinds, and the retuner's answers.
+"""
+
+import struct
+from collections.abc import Iterator
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
+
+PAYLOAD_BYTES: Final = 8
+RECORD: Final = np.dtype(
+    [
+        ("kind", "u1"),
+        ("length", "u1"),
+        ("spare", "<u2"),
+        ("number", "<u4"),
+        ("time_ns", "<i8"),
+        ("data", "u1", (PAYLOAD_BYTES,)),
+    ]
+)
+"""`number` is the identifier of a frame, or a count; `time_ns` is the node's time."""
+LAYOUT: Final = struct.Struct("<BBHIq8s")
+"""The same for one record."""
+
+Records = npt.NDArray[np.void]
+"""Records, shape (n,), of type `RECORD`."""
+
+IN_A_ROW: Final = 8
+"""Records in one row of a ring; a tick has five or so."""
+_WORDS: Final = LAYOUT.size // 8
+_ROW_BYTES: Final = IN_A_ROW * LAYOUT.size
+ROW: Final = ("records", *(f"word_{number}" for number in range(IN_A_ROW * _WORDS)))
+"""Columns of such a ring: how many records there are, and their bytes."""
+
+
+class Kind(IntEnum):
+    """What a record says.
+
+    What comes before a TICK was handed to the node for it, or in it; what it sent comes after.
+    """
+
+    RECEIVED = 1
+    """A frame was handed over."""
+    SENT = 2
+    """A frame was returned by the tick, or the stop, before."""
+    TICK = 3
+    OTHERS = 4
+    """`number` frames of other kinds were on the bus."""
+    LINK_ERROR = 5
+    STOP = 6
+    STARTED = 7
+    """First of all: whether the loop runs with a real-time policy (first byte)."""
+    ALIVE = 8
+    """Whether the retuner lives (first byte), when the controller asked."""
+    ANSWER = 9
+    """A piece of the retuner's answer of `number` bytes, when the controller took it."""
+    LOST = 10
+    """`number` rows were lost before they could be written."""
+
+
+def ring_rows(records: bytes) -> Iterator[FloatArray]:
+    """Packed records as rows of a ring, `IN_A_ROW` in each."""
+    for start in range(0, len(records), _ROW_BYTES):
+        piece = records[start : start + _ROW_BYTES]
+        row = np.zeros(len(ROW))
+        row[0] = len(piece) // LAYOUT.size
+        row[1:].view(np.uint8)[: len(piece)] = np.frombuffer(piece, dtype=np.uint8)
+        yield row
+
+
+def records_of(rows: FloatArray) -> Records:
+    """The records in rows of a ring, shape (n, len(ROW)), in order."""
+    records = np.ascontiguousarray(rows[:, 1:]).view(RECORD)
+    return records[np.arange(IN_A_ROW) < rows[:, :1]]
+
+
+def pack(records: Records) -> bytes:
+    """Arrange records so that they compress well: column by column, payloads by identifier."""
+    head = np.zeros((len(records), 7), dtype=np.uint8)
+    head[:, 0], head[:, 1] = records["kind"], records["length"]
+    head[:, 3:] = records["number"].astype("<u4").view(np.uint8).reshape(-1, 4)
+    steps_ns = np.diff(records["time_ns"], prepend=np.int64(0)).astype("<i8")
+    times = steps_ns.view(np.uint8).reshape(-1, 8)
+    payloads = records["data"][_by_sender(head)]
+    planes = [np.ascontiguousarray(part.T).tobytes() for part in (head, times, payloads)]
+    return struct.pack("<I", len(records)) + b"".join(planes)
+
+
+def unpack(packed: bytes) -> Records:
+    """The inverse of `pack`.
+
+    Raises
+    ------
+    ValueError
+        If it is anything else.
+    """
+    count = int.from_bytes(packed[:4], "little")
+    planes = np.frombuffer(packed, dtype=np.uint8, offset=4)
+    if planes.size != count * (7 + 8 + PAYLOAD_BYTES):
+        raise ValueError(f"{planes.size} bytes are not {count} records")
+    head, times, payloads = (
+        np.ascontiguousarray(part.T)
+        for part in np.split(planes.reshape(-1, count) if count else planes.reshape(23, 0), [7, 15])
+    )
+    records = np.zeros(count, dtype=RECORD)
+    records["kind"], records["length"] = head[:, 0], head[:, 1]
+    records["number"] = np.ascontiguousarray(head[:, 3:]).view("<u4").ravel()
+    records["time_ns"] = np.cumsum(times.view("<i8").ravel())
+    records["data"][_by_sender(head)] = payloads
+    return records
+
+
+def _by_sender(head: npt.NDArray[np.uint8]) -> npt.NDArray[np.intp]:
+    """Order in which records of one kind and identifier stand together, each in its own order."""
+    keys = head.astype(np.int64) @ (1 << np.arange(0, 56, 8))
+    return np.argsort(keys, kind="stable")

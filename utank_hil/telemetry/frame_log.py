@@ -1,0 +1,223 @@
+"""The frame log: a file that grows by blocks and is readable up to the last whole one.
+
+After the mark of the file come blocks: kind, length, CRC-32, then that many bytes, compressed. The
+first block is the head, JSON that says where the log comes from; the others hold `bus_records`. A
+block is written every half second, so a file that is cut at any byte lacks less than a second.
+"""
+
+import json
+import lzma
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from utank_hil.closing import Closing
+from utank_hil.telemetry.bus_records import RECORD, Records, pack, unpack
+from utank_hil.telemetry.rotation import Rotation, part_of, remove_oldest
+
+SUFFIX: Final = ".frames"
+BLOCK_NS: Final = 500_000_000
+_MARK: Final = b"UTANKHIL frames 1\n"
+_BLOCK: Final = struct.Struct("<4sII")
+_HEAD: Final = b"HEAD"
+_QUICK: Final = b"BUSZ"  # zlib
+_SMALL: Final = b"BUSX"  # xz
+
+
+class FrameLogError(ValueError):
+    """The file is no frame log, or lacks its beginning."""
+
+
+class FrameLogWriter(Closing):
+    """Writes a frame log; every call of `write` adds one block and brings it to the disk.
+
+    Parameters
+    ----------
+    file : Path
+        Overwritten.
+    head : mapping
+        Where it comes from, see `utank_hil.telemetry.replay_head`.
+    rotation : Rotation, optional
+        When the log goes on in another file, ``<its stem>-part002.frames`` and so on, and how much
+        of older ones is kept; without it there is one file.
+    small : bool
+        Compress as well as possible, for logs to be kept.
+
+    Attributes
+    ----------
+    count : int
+        Files begun.
+
+    Raises
+    ------
+    OSError
+        If it can't be written.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        head: Mapping[str, Any],
+        rotation: Rotation | None = None,
+        *,
+        small: bool = False,
+    ) -> None:
+        self._first = file
+        self._head = json.dumps(head).encode()
+        self._rotation = rotation
+        self._small = small
+        self._begin_ns: int | None = None
+        self.count = 0
+        self._begin()
+
+    def write(self, records: Records) -> None:
+        """Append records, if there are any; begins the next file where it is time."""
+        if not len(records):
+            return
+        begin_ns = int(records["time_ns"][0])
+        if self._begin_ns is None:
+            self._begin_ns = begin_ns
+        rotation = self._rotation
+        if rotation is not None and begin_ns - self._begin_ns >= rotation.part_s * 1e9:
+            self._content.close()
+            self._begin_ns = begin_ns
+            self._begin()
+        packed = pack(records)
+        if self._small:
+            self._append(_SMALL, lzma.compress(packed, preset=9 | lzma.PRESET_EXTREME))
+        else:
+            self._append(_QUICK, zlib.compress(packed))
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        self._content.close()
+
+    def _begin(self) -> None:
+        self.count += 1
+        file = part_of(self._first, self.count)
+        if self._rotation is not None and self._rotation.keep_bytes is not None:
+            remove_oldest(file, self._rotation.keep_bytes)
+        self._content = file.open("wb")
+        self._content.write(_MARK)
+        self._append(_HEAD, zlib.compress(self._head))
+
+    def _append(self, kind: bytes, payload: bytes) -> None:
+        header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))
+        self._content.write(header + payload)
+        self._content.flush()
+        os.fsync(self._content.fileno())
+
+
+class BlockSink:
+    """Collects records of a run in simulated time into blocks of `BLOCK_NS`.
+
+    Parameters
+    ----------
+    writer : FrameLogWriter
+    block_ns : int
+        Longer blocks make smaller files.
+    """
+
+    def __init__(self, writer: FrameLogWriter, block_ns: int = BLOCK_NS) -> None:
+        self._writer = writer
+        self._block_ns = block_ns
+        self._waiting = bytearray()
+        self._begin_ns: int | None = None
+
+    def write(self, records: bytes, time_ns: int) -> None:
+        """Take packed records of one tick."""
+        if self._begin_ns is None:
+            self._begin_ns = time_ns
+        self._waiting += records
+        if time_ns - self._begin_ns >= self._block_ns:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has been collected."""
+        self._writer.write(np.frombuffer(self._waiting, dtype=RECORD))
+        self._waiting = bytearray()
+        self._begin_ns = None
+
+
+class FrameLog:
+    """A frame log, read block by block; a log of several parts is read as one.
+
+    Parameters
+    ----------
+    path : Path
+        Its first part, or one of them to be read from there on.
+
+    Attributes
+    ----------
+    head : dict
+    first_part : bool
+        Whether it begins where the run did.
+    cut : str
+        Where and why reading ended before the end of a file, after all `blocks` were taken; empty
+        if it did not.
+
+    Raises
+    ------
+    FrameLogError
+        If it is no frame log, or its head is not whole.
+    OSError
+        If it can't be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._paths = _parts_from(path)
+        self.first_part = _number_of(path) == 1
+        self.cut = ""
+        kind, payload = next(self._read(path), (b"", b""))
+        if kind != _HEAD:
+            raise FrameLogError(f"{path}: {self.cut or 'its head is missing'}")
+        self.head: dict[str, Any] = json.loads(zlib.decompress(payload))
+
+    def blocks(self) -> Iterator[Records]:
+        """Records of one block after another."""
+        self.cut = ""
+        for path in self._paths:
+            for kind, payload in self._read(path):
+                if kind == _QUICK:
+                    yield unpack(zlib.decompress(payload))
+                elif kind == _SMALL:
+                    yield unpack(lzma.decompress(payload))
+
+    def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
+        with path.open("rb") as content:
+            if content.read(len(_MARK)) != _MARK:
+                raise FrameLogError(f"{path}: is no frame log of this version")
+            while header := content.read(_BLOCK.size):
+                place = content.tell() - len(header)
+                kind, length, checksum = (
+                    _BLOCK.unpack(header) if len(header) == _BLOCK.size else (b"", 1, 0)
+                )
+                payload = content.read(length)
+                if len(payload) < length:
+                    self.cut = f"{path.name} is cut at byte {place + len(header) + len(payload)}"
+                    return
+                if zlib.crc32(payload, zlib.crc32(kind)) != checksum:
+                    self.cut = f"{path.name} is damaged at byte {place}"
+                    return
+                yield kind, payload
+
+
+def _number_of(path: Path) -> int:
+    """Number of a part, from its name."""
+    number = path.stem.rpartition("-part")[2]
+    return int(number) if "-part" in path.stem and number.isdecimal() else 1
+
+
+def _parts_from(path: Path) -> list[Path]:
+    """The part that is named, and those that follow it."""
+    number = _number_of(path)
+    first = path if number == 1 else path.with_stem(path.stem.rpartition("-part")[0])
+    paths = [path]
+    while (following := part_of(first, number + len(paths))).exists():
+        paths.append(following)
+    return paths

@@ -1,0 +1,266 @@
+"""Replay: a recorded bus is handed to the controller again, and its answers are compared.
+
+The controller is handed each record in the order of the log and with the time that it had then, so
+nothing of the machine or of the present enters. Every frame that it returns is compared with the
+recorded one, byte by byte.
+"""
+
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeAlias
+
+from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Frame, load_catalogue
+from utank_hil.configuration import ControllerConfig
+from utank_hil.control import BuiltLaw
+from utank_hil.retuning.answer import Answer, read_answer
+from utank_hil.runtime import LoopStatistics
+from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
+
+Entry: TypeAlias = tuple[int, int, int, int, int, bytes]
+"""kind, length, spare, number, time in ns, data."""
+
+_NOTHING: Final = "nothing"
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first thing that is not as recorded.
+
+    Attributes
+    ----------
+    tick : int
+        Number of the controller's tick, from 0.
+    time_s : float
+        Since its first tick.
+    message, signal : str
+        Where; the message is "retuner" if the controller and its retuner said something else.
+    recorded, replayed : str
+    """
+
+    tick: int
+    time_s: float
+    message: str
+    signal: str
+    recorded: str
+    replayed: str
+
+    def __str__(self) -> str:
+        return (
+            f"tick {self.tick} ({self.time_s:.3f} s), {self.message}, {self.signal}: "
+            f"recorded {self.recorded}, replayed {self.replayed}"
+        )
+
+
+@dataclass(slots=True)
+class ReplayResult:
+    """How a replay went.
+
+    Attributes
+    ----------
+    ticks, frames : int
+        Ticks run, and recorded frames of the controller that were compared.
+    different : Counter of str
+        Frames that differ, by message.
+    first : Difference or None
+        None if every frame is equal bit for bit.
+    lost_rows : int
+        Rows that the recorder lost: from there on nothing can be exact.
+    """
+
+    ticks: int = 0
+    frames: int = 0
+    different: Counter[str] = field(default_factory=Counter)
+    first: Difference | None = None
+    lost_rows: int = 0
+
+    @property
+    def exact(self) -> bool:
+        """Whether all of it is as recorded."""
+        return self.first is None
+
+
+class RecordedRetuner:
+    """Gives the answers of a recording, in the ticks in which they were taken.
+
+    Attributes
+    ----------
+    astray : str
+        What the controller asked that it had not asked then; empty if nothing.
+    """
+
+    def __init__(self) -> None:
+        self.astray = ""
+        self._alive: deque[bool] = deque()
+        self._answer = bytearray()
+
+    @property
+    def alive(self) -> bool:
+        """Whether the retuner lived."""
+        if not self._alive:
+            self.astray = "asked whether the retuner lives"
+            return False
+        return self._alive.popleft()
+
+    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+        """Take a record: its answer is known."""
+
+    def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
+        """The answer, if it was taken in this tick."""
+        if not self._answer:
+            return None
+        answer = read_answer(bytes(self._answer))
+        self._answer.clear()
+        return answer
+
+    def take(self, kind: int, data: bytes) -> None:
+        """Take a record for the next tick."""
+        if kind == Kind.ALIVE:
+            self._alive.append(bool(data[0]))
+        else:
+            self._answer += data
+
+    def left_over(self) -> str:
+        """What was not asked in this tick though it had been; cleared."""
+        left = "took the retuner's answer" if self._answer else ""
+        left = "asked whether the retuner lives" if self._alive else left
+        self._alive.clear()
+        self._answer.clear()
+        return left
+
+
+def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
+    """Records one by one, their data cut to its length."""
+    for block in blocks:
+        for kind, length, spare, number, time_ns, data in LAYOUT.iter_unpack(block.tobytes()):
+            yield kind, length, spare, number, time_ns, data[:length]
+
+
+def replay(
+    entries: Iterable[Entry], config: ControllerConfig, law: BuiltLaw, *, retuner: bool = False
+) -> ReplayResult:
+    """Hand recorded entries to a new controller and compare what it sends.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Of a whole run, from the controller's start.
+    config : ControllerConfig
+    law : BuiltLaw
+        Of the configuration.
+    retuner : bool
+        Whether the controller had a retuner.
+    """
+    answers = RecordedRetuner()
+    statistics = LoopStatistics()
+    node = build_controller_node(
+        config, law, retuner=answers if retuner else None, statistics=statistics
+    )
+    result = ReplayResult()
+    comparison = _Comparison(result)
+    sent: list[Frame] = []
+    recorded: list[Frame] = []
+    waiting = False
+    for kind, _, _, number, time_ns, data in entries:
+        if kind == Kind.SENT:
+            recorded.append(Frame(number, data))
+            continue
+        if waiting:
+            comparison.compare(recorded, sent)
+            waiting = False
+            recorded = []
+        if kind == Kind.RECEIVED:
+            node.receive(Frame(number, data), time_ns)
+        elif kind == Kind.TICK:
+            sent, waiting = list(node.tick(time_ns)), True
+            comparison.at(result.ticks, (time_ns - node.start_ns) * 1e-9)
+            result.ticks += 1
+            comparison.retuner(answers)
+        elif kind == Kind.STOP:
+            sent, waiting = list(node.stop(time_ns)), True
+        elif kind == Kind.OTHERS:
+            node.other_frames(number)
+        elif kind == Kind.LINK_ERROR:
+            node.link_error(time_ns, "")
+        elif kind == Kind.STARTED:
+            statistics.real_time = bool(data[0])
+        elif kind in (Kind.ALIVE, Kind.ANSWER):
+            answers.take(kind, data)
+        elif kind == Kind.LOST:
+            result.lost_rows += number
+    if waiting:
+        comparison.compare(recorded, sent)
+    return result
+
+
+class _Comparison:
+    """Compares the frames of one tick after another."""
+
+    def __init__(self, result: ReplayResult) -> None:
+        self._result = result
+        self._codecs = {codec.can_id: codec for codec in load_catalogue().codecs.values()}
+        self._tick, self._time_s = 0, 0.0
+
+    def at(self, tick: int, time_s: float) -> None:
+        """Go on to a tick."""
+        self._tick, self._time_s = tick, time_s
+
+    def retuner(self, answers: RecordedRetuner) -> None:
+        """Compare what the controller asked of its retuner."""
+        left = answers.left_over()
+        if answers.astray or left:
+            self._note("retuner", "asked", left or _NOTHING, answers.astray or _NOTHING)
+            answers.astray = ""
+
+    def compare(self, recorded: list[Frame], sent: list[Frame]) -> None:
+        """Compare the frames of a tick."""
+        self._result.frames += len(recorded)
+        if recorded == sent:
+            return
+        ids = dict.fromkeys(frame.can_id for frame in (*recorded, *sent))
+        for can_id in ids:
+            before = [frame.data for frame in recorded if frame.can_id == can_id]
+            now = [frame.data for frame in sent if frame.can_id == can_id]
+            name = self._name(can_id)
+            for data, again in zip(before, now, strict=False):
+                if data != again:
+                    self._note(name, *self._signal(can_id, data, again))
+            for data in before[len(now) :]:
+                self._note(name, "frame", data.hex(" "), "none")
+            for data in now[len(before) :]:
+                self._note(name, "frame", "none", data.hex(" "))
+        if sorted(recorded) == sorted(sent):
+            order = (", ".join(map(self._name, (f.can_id for f in fs))) for fs in (recorded, sent))
+            self._note("frames", "order", *order)
+
+    def _note(self, message: str, signal: str, recorded: str, replayed: str) -> None:
+        result = self._result
+        result.different[message] += 1
+        if result.first is None:
+            result.first = Difference(self._tick, self._time_s, message, signal, recorded, replayed)
+
+    def _name(self, can_id: int) -> str:
+        codec = self._codecs.get(can_id)
+        return f"{can_id:08X}" if codec is None else codec.name
+
+    def _signal(self, can_id: int, data: bytes, again: bytes) -> tuple[str, str, str]:
+        """The first signal that differs, and its two values."""
+        codec = self._codecs.get(can_id)
+        whole = codec is not None and len(data) == len(again) == PAYLOAD_BYTES
+        before = codec.decode(data) if codec and whole else None
+        now = codec.decode(again) if codec and whole else None
+        if before is not None and now is not None:
+            for name in before._fields:
+                values = _said(getattr(before, name)), _said(getattr(now, name))
+                if values[0] != values[1]:
+                    return name, *values
+            if data[1] & 15 != again[1] & 15:
+                return "counter", str(data[1] & 15), str(again[1] & 15)
+        return "bytes", data.hex(" "), again.hex(" ")
+
+
+def _said(value: Any) -> str:
+    """A signal's value, exact."""
+    return str(getattr(value, "name", None) or repr(value))
