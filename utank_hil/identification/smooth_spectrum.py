@@ -2,8 +2,9 @@
 
 The spectrum S is sought. An estimate I scatters like chi-square with 2 K degrees of freedom about S
 plus a known noise n, so its likelihood is (S + n)^-K exp(-K I / (S + n)), after Whittle. The prior
-says that log S is smooth over the logarithm of frequency, and nothing of its level. Its mode is found by Fisher scoring, the likelihood of the whole by Laplace's approximation there
-(Rasmussen and Williams, Gaussian Processes for Machine Learning, 3.4).
+says that log S is smooth over the logarithm of frequency, and nothing of its level. Its mode is
+found by Fisher scoring, the likelihood of the whole by Laplace's approximation there (Rasmussen and
+Williams, Gaussian Processes for Machine Learning, 3.4).
 """
 
 from typing import NamedTuple
