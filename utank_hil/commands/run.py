@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
@@ -27,7 +27,6 @@ from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.provenance import describe
-from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
     RealTimeLoop,
@@ -92,9 +91,9 @@ def run(
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
         folder = OUT if out is None and view else out
-        work = retuner_work(loaded)
+        helped = any(works_of(loaded))
         announcer = None
-        if work is not None or folder is not None:
+        if helped or folder is not None:
             announcer = _announcer(config, loaded, folder)
             stack.callback(announcer.stop)
             if announcer.error is not None:
@@ -115,9 +114,11 @@ def run(
                 )
             elif recording.url is not None:
                 _show(recording.url, stack)
-        retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
-        if retuner is not None and not retuner.alive:
-            notes.print("[red]the retuner did not start:[/red] nothing will be retuned")
+        retuner, estimating = stack.enter_context(retuner_process(loaded))
+        if any(desk is not None and not desk.alive for desk in (retuner, estimating)):
+            notes.print(
+                "[red]the retuner did not start:[/red] nothing will be retuned or estimated"
+            )
         try:
             alarms = AlarmLines()
         except OSError as error:
@@ -134,6 +135,7 @@ def run(
             loaded,
             law,
             retuner=retuner,
+            estimating=estimating,
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=told,
