@@ -189,7 +189,7 @@ def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
 def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
     def stiffness(k: int) -> float:
         # 12,000 samples are 40 minutes
-        return 1.25 if k in range(12000, 13500) or k > 40000 else 1.0
+        return 1.25 if k in range(12000, 14500) or k > 40000 else 1.0
 
     rig = Rig(ToyRetuner(Refusal(("no",))), CHANGE, stiffness=stiffness)
     rig.run(40000)

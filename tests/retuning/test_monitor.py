@@ -15,7 +15,8 @@ FOUND = replace(DESIGNED, stiffness_deviation=0.02, period_deviation=0.01)
 
 def told(ship: ShipFigures | None, verdict: Verdict = Verdict.GOOD) -> float:
     monitor = ChangeMonitor(DESIGNED)
-    monitor.watch(MotionEstimate(Verdict.GOOD, verdict, ship))
+    for _ in range(2):
+        monitor.watch(MotionEstimate(Verdict.GOOD, verdict, ship))
     return monitor.change
 
 
@@ -48,9 +49,18 @@ def test_what_can_not_be_told_is_no_change(verdict: Verdict) -> None:
     assert told(None) == 1.0
 
 
+def test_one_estimate_alone_is_no_change() -> None:
+    monitor = ChangeMonitor(DESIGNED)
+    for factor, expected in ((1.5, False), (0.6, False), (1.5, False), (1.5, True), (0.6, True)):
+        ship = replace(FOUND, stiffness_nm_rad=factor * FOUND.stiffness_nm_rad)
+        monitor.watch(MotionEstimate(Verdict.GOOD, Verdict.GOOD, ship))
+        assert (monitor.change > 1) == expected
+
+
 def test_restart_takes_the_present_ship_for_the_laws_own() -> None:
     monitor = ChangeMonitor(DESIGNED)
     estimate = MotionEstimate(Verdict.GOOD, Verdict.GOOD, replace(FOUND, stiffness_nm_rad=9e8))
+    monitor.watch(estimate)
     monitor.watch(estimate)
     assert monitor.change > 1.3
     monitor.restart()

@@ -44,7 +44,7 @@ from utank_hil.sea import SlopeSpectrum
 
 SPREAD: Final = (0.7, 0.1, 0.5)
 """Prior deviations of the logarithms of stiffness, inertia and damping, for any loading."""
-KNOWN_SPREAD: Final = (0.05, 0.05, 0.5)
+KNOWN_SPREAD: Final = (0.02, 0.02, 0.3)
 """The same of a ship that is known."""
 BAND: Final = (0.25, 3.2)
 """Frequencies that tell of the ship, over the given ship's natural frequency."""
@@ -81,6 +81,8 @@ class MotionFit:
         Relative standard deviation of the root mean square of `waves`.
     clear : float
         Part of the moment's energy in bands where it exceeds the sensors' noise.
+    log_likelihood : float
+        Of the motion, without constants; to compare fits to one record.
     """
 
     ship: RollShip
@@ -89,6 +91,7 @@ class MotionFit:
     waves: SlopeSpectrum
     rms_deviation: float
     clear: float
+    log_likelihood: float
 
 
 def fit_motion(
@@ -127,7 +130,7 @@ def fit_motion(
     theta = minimize(cost, first, method="Nelder-Mead", options=options).x
     covariance = _INFLATION**2 * _inverse_curvature(cost, theta, prior)
     whole = _Record(motion, plant, sample_time_s, max(BAND[1] * natural, TOP_RAD_S))
-    return whole.fit(theta, covariance)
+    return whole.fit(theta, covariance, record.likelihood(theta).log_likelihood)
 
 
 class _Record:
@@ -200,7 +203,7 @@ class _Record:
         change = 2 * self._tapers * float(np.log(passive).sum())
         return found._replace(log_likelihood=found.log_likelihood + change)
 
-    def fit(self, theta: FloatArray, covariance: FloatArray) -> MotionFit:
+    def fit(self, theta: FloatArray, covariance: FloatArray, log_likelihood: float) -> MotionFit:
         """The outcome for the likeliest ship."""
         stiffness, inertia, damping = np.exp(theta).tolist()
         ship = self._ship
@@ -232,6 +235,7 @@ class _Record:
             SlopeSpectrum(self.omega, density, density * np.sqrt(log_covariance.diagonal())),
             0.5 * math.sqrt(density @ log_covariance @ density) / energy,
             float(density[density > noise].sum() / energy),
+            log_likelihood,
         )
 
 

@@ -1,7 +1,8 @@
 """Whether the ship is still the one that a law was made for.
 
 Compares the ship that the motion tells (`MotionEstimate`) with the law's, whatever the sea is. A
-difference counts where it exceeds three standard deviations, and in either direction.
+difference counts where it exceeds three standard deviations, and in either direction, and where the
+estimate before it was of the same ship.
 """
 
 import math
@@ -36,25 +37,30 @@ class ChangeMonitor:
 
     def watch(self, estimate: MotionEstimate) -> None:
         """Take a new estimate; one that does not tell the ship changes nothing."""
-        now, then = estimate.ship, self._ship
+        now, before = estimate.ship, self._latest
         if estimate.of_ship is not Verdict.GOOD or now is None:
             return
         self._latest = now
-        self.change = max(
-            _significant(
-                now.roll_period_s / then.roll_period_s,
-                math.hypot(now.period_deviation, then.period_deviation),
-            ),
-            _significant(
-                math.sqrt(now.stiffness_nm_rad / then.stiffness_nm_rad),
-                math.hypot(now.stiffness_deviation, then.stiffness_deviation) / 2,
-            ),
-        )
+        if before is not None and _factor(now, before) == 1:
+            self.change = _factor(now, self._ship)
 
     def restart(self) -> None:
         """Take the latest ship for the law's own."""
         self._ship = self._latest or self._ship
         self.change = 1.0
+
+
+def _factor(now: ShipFigures, then: ShipFigures) -> float:
+    """Factor, 1 or more, by which two ships differ; 1 if that is not significant."""
+    by_period = _significant(
+        now.roll_period_s / then.roll_period_s,
+        math.hypot(now.period_deviation, then.period_deviation),
+    )
+    by_stiffness = _significant(
+        math.sqrt(now.stiffness_nm_rad / then.stiffness_nm_rad),
+        math.hypot(now.stiffness_deviation, then.stiffness_deviation) / 2,
+    )
+    return max(by_period, by_stiffness)
 
 
 def _significant(ratio: float, deviation: float) -> float:

@@ -13,16 +13,21 @@ from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_mot
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import COLUMNS
 
-LEAST_PERIODS: Final = 30.0
+LEAST_PERIODS: Final = 45.0
 """Natural roll periods below which a record is too short."""
 MOST_MISSING: Final = 0.05
 """Largest share of missing samples; the rest is interpolated."""
 LEAST_CLEAR: Final = 0.8
 """Least part of the wave moment's energy in bands that stand out from the sensors' noise."""
-SHIP_DEVIATION: Final = 0.05
-"""Largest relative deviation of stiffness and of roll period, for the ship to count as told."""
+STIFFNESS_DEVIATION: Final = 0.03
+PERIOD_DEVIATION: Final = 0.05
+"""Largest relative deviations for the ship to count as told. With less to go by, waves are taken
+for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
+"""
 SEA_DEVIATION: Final = 0.2
 """Largest relative deviation of the moment's root mean square, for the sea to count as told."""
+CONTRADICTED: Final = 20.0
+"""Logarithm of likelihood by which another ship may explain the motion better than the known."""
 SAME: Final = 3.0
 """Standard deviations by which the ship of the record's last half may differ from the whole's."""
 
@@ -51,7 +56,7 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
 
     The ship is fitted to the whole record and to its last half. Where they contradict each other
     she was loaded meanwhile, and the half counts. Where the motion does not tell the ship, the
-    waves are those of the known one.
+    waves are those of the known one, and uncertain if another would explain the motion far better.
 
     Parameters
     ----------
@@ -75,7 +80,9 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
         if _told(late) and (_apart(late, fit) or not _told(fit)):
             fit, motion = late, half
     of_ship = Verdict.GOOD if _told(fit) else Verdict.UNCERTAIN
+    contradicted = False
     if of_ship is not Verdict.GOOD:
+        likeliest = fit.log_likelihood
         ship = dataclasses.replace(
             task.plant.ship,
             stiffness_nm_rad=known[0],
@@ -84,11 +91,13 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
         )
         plant = dataclasses.replace(task.plant, ship=ship)
         fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)
+        contradicted = likeliest - fit.log_likelihood > CONTRADICTED
     if fit.clear < LEAST_CLEAR:
         return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
     ship, waves = fit.ship, fit.waves
+    sea_told = fit.rms_deviation <= SEA_DEVIATION and not contradicted
     return MotionEstimate(
-        Verdict.GOOD if fit.rms_deviation <= SEA_DEVIATION else Verdict.UNCERTAIN,
+        Verdict.GOOD if sea_told else Verdict.UNCERTAIN,
         of_ship,
         ShipFigures(
             ship.stiffness_nm_rad,
@@ -109,7 +118,9 @@ _MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
 def _told(fit: MotionFit) -> bool:
-    return max(float(fit.deviation[0]), fit.period_deviation) <= SHIP_DEVIATION
+    return bool(fit.deviation[0] <= STIFFNESS_DEVIATION) and (
+        fit.period_deviation <= PERIOD_DEVIATION
+    )
 
 
 def _apart(late: MotionFit, whole: MotionFit) -> bool:
