@@ -1,8 +1,7 @@
 """One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -13,13 +12,12 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.arrays import FloatArray
-from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import SocketCanPort
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning import (
     Retuner,
-    RetunerProcess,
     RetuningEvent,
     SimulatedRetuner,
 )
@@ -193,9 +191,11 @@ class ControllerRun:
 def run_lockstep(job: Job, watch: Watch) -> Run:
     """Run in simulated time; the same job gives the same rows, bit for bit."""
     ship, truth, truth_log = _ship(job)
-    work = retuner_work(job.controller)
-    retuner = work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
-    controller, log = _controller(job, retuner)
+    retuner, estimating = (
+        work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
+        for work in works_of(job.controller)
+    )
+    controller, log = _controller(job, retuner, estimating)
     lockstep = Lockstep(
         [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
     )
@@ -218,8 +218,8 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
     _load_kernel(job)
     ship, truth, truth_log = _ship(job)
     statistics = LoopStatistics()
-    with _retuner(job.controller) as retuner:
-        controller, log = _controller(job, retuner, statistics)
+    with retuner_process(job.controller) as desks:
+        controller, log = _controller(job, *desks, statistics)
         loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
     rows = _side_by_side(log.rows, truth_log.rows)
     return Run(
@@ -246,8 +246,8 @@ def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
-    with _retuner(job.controller) as retuner:
-        controller, log = _controller(job, retuner, statistics)
+    with retuner_process(job.controller) as desks:
+        controller, log = _controller(job, *desks, statistics)
         loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(
         log.rows,
@@ -319,29 +319,22 @@ def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
 
 
 def _controller(
-    job: Job, retuner: Retuner | None, statistics: LoopStatistics | None = None
+    job: Job,
+    retuner: Retuner | None,
+    estimating: Retuner | None,
+    statistics: LoopStatistics | None = None,
 ) -> tuple[ControllerNode, MemoryLog]:
     log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
     node = build_controller_node(
         job.controller,
         job.law,
         retuner=retuner,
+        estimating=estimating,
         statistics=statistics,
         sink=log.write,
         sink_every=RECORD_TICKS,
     )
     return node, log
-
-
-@contextmanager
-def _retuner(controller: ControllerConfig) -> Iterator[Retuner | None]:
-    """The retuner's process, if the controller has one."""
-    work = retuner_work(controller)
-    if work is None:
-        yield None
-    else:
-        with RetunerProcess(*work) as retuner:
-            yield retuner
 
 
 def _run_loop(

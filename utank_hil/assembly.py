@@ -1,7 +1,8 @@
 """From a configuration to a controller on the bus: the one place where a law is built."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,10 +12,20 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
-from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign, wave_arx
+from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.parameters import ParameterError
-from utank_hil.retuning import AdaptiveController, RetuneFunction, Retuner, make_pulses
+from utank_hil.retuning import (
+    AdaptiveController,
+    Desk,
+    Estimator,
+    Retuner,
+    RetunerProcess,
+    ShipFigures,
+    Work,
+    make_pulses,
+)
+from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runtime.controller_node import (
     ControllerNode,
     ControllerSettings,
@@ -121,6 +132,7 @@ def build_controller_node(
     law: BuiltLaw | None = None,
     *,
     retuner: Retuner | None = None,
+    estimating: Retuner | None = None,
     statistics: LoopStatistics | None = None,
     sink: Callable[[FloatArray], None] | None = None,
     sink_every: int = 1,
@@ -136,6 +148,8 @@ def build_controller_node(
     retuner : Retuner, optional
         Who identifies and designs, if the configuration has the controller retune itself; without
         one it does not.
+    estimating : Retuner, optional
+        Who tells waves and ship from the motion, if the configuration asks for it.
     statistics, sink, sink_every, event_sink
         As `ControllerNode` takes them.
     """
@@ -145,6 +159,11 @@ def build_controller_node(
     retuning = None
     if retuner is not None and config.retuning is not None:
         retuning = _adaptive(config, law, retuner)
+    estimator = None
+    if estimating is not None and config.sea_estimate is not None:
+        estimator = Estimator(
+            config.sea_estimate, estimating, config.vessel.ship, tank, config.vessel.least_gm_m
+        )
     timeout_s = config.command_timeout_ms * 1e-3
     valve = None
     if config.vessel.valve is not None:
@@ -173,6 +192,7 @@ def build_controller_node(
             compares=law.closes_loop,
         ),
         retuning=retuning,
+        estimator=estimator,
         statistics=statistics,
         sink=sink,
         sink_every=sink_every,
@@ -207,7 +227,7 @@ def retuning_task(
     return RetuningTask(design, config.plant, order, ModelLimits(roll_period_range_s))
 
 
-def retuner_work(config: ControllerConfig) -> tuple[RetuneFunction, tuple[int, int]] | None:
+def retuner_work(config: ControllerConfig) -> Work | None:
     """The retuner's work for a configuration and the shape of its longest record, if it has any.
 
     The work may be handed to another process.
@@ -224,15 +244,45 @@ def retuner_work(config: ControllerConfig) -> tuple[RetuneFunction, tuple[int, i
     return partial(retune, task=task), (rows, 1 + len(predictor.measured))
 
 
+def estimator_work(config: ControllerConfig) -> Work | None:
+    """The estimator's work for a configuration and its longest request, if it has any."""
+    settings = config.sea_estimate
+    if settings is None:
+        return None
+    from utank_hil.retuning.estimating import EstimateTask, estimate  # here: scipy.optimize
+
+    task = EstimateTask(config.plant, ESTIMATE_SAMPLE_TIME_S, settings.effective_slope)
+    return partial(estimate, task=task), settings.longest_request
+
+
+def works_of(config: ControllerConfig) -> tuple[Work | None, Work | None]:
+    """What the retuner's process does for a configuration: `retuner_work`, `estimator_work`."""
+    return retuner_work(config), estimator_work(config)
+
+
+@contextmanager
+def retuner_process(config: ControllerConfig) -> Iterator[tuple[Desk | None, Desk | None]]:
+    """The process that retunes and estimates, while it is wanted: a desk for each of `works_of`."""
+    works = works_of(config)
+    wanted = [work for work in works if work is not None]
+    if not wanted:
+        yield None, None
+        return
+    with RetunerProcess(*wanted) as process:
+        desks = iter(process.desks)
+        retuner, estimating = (None if work is None else next(desks) for work in works)
+        yield retuner, estimating
+
+
 def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> AdaptiveController:
     """A controller that begins with `law` and retunes itself."""
-    settings, design = config.retuning, config.law
+    settings, design, ship = config.retuning, config.law, config.vessel.ship
     assert settings is not None
     assert isinstance(design, PredictiveDesign)
     assert law.linear is not None
     return AdaptiveController(
         law.linear,
-        wave_arx(design.predictor, config.plant),
+        ShipFigures(ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad),
         design.predictor.measured.index("roll_rad"),
         settings,
         make_pulses(settings, config.plant, law.linear.sample_time_s),

@@ -95,7 +95,7 @@ def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
     log = FrameLog(LOGS / "retuned-and-undone.frames")
     entries = (entry for entry in entries_of(log.blocks()) if entry[0] != Kind.ANSWER)
     with recorded_config(log.head) as config:
-        result = replay(entries, config, build_law(config), retuner=True)
+        result = replay(entries, config, build_law(config), retuner=True, estimating=True)
     assert result.first is not None
     assert result.different  # it waits for an answer, and goes on without a trial
 

@@ -1,20 +1,22 @@
 """Laws, candidates and retuners for the tests of this folder and of faults."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import Mode, OperatorCommand, RetuningState
-from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.canbus import Mode, OperatorCommand, RetuningState, Verdict
+from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import (
     AdaptiveController,
     Answer,
     Candidate,
     ModelSummary,
+    MotionEstimate,
     RetuningOrder,
     RetuningSettings,
+    ShipFigures,
 )
 
 SAMPLE_TIME_S = 0.2
@@ -34,15 +36,12 @@ def law_of(gain: float, order: int = 3, outputs: int = 1) -> PredictiveLaw:
     return PredictiveLaw(input_gains, output_gains, np.zeros((5, 1, outputs)), SAMPLE_TIME_S)
 
 
-def model_of(outputs: int = 1) -> ARX:
-    """Predicts that nothing changes."""
-    return ARX(np.eye(outputs)[None], np.zeros((2, outputs, 1)), SAMPLE_TIME_S)
+SHIP = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
+TOLD_EVERY = 900
 
 
 def candidate_of(gain: float, washout_rad_s: float = 0.0, **sizes: int) -> Candidate:
-    return Candidate(
-        law_of(gain, **sizes), washout_rad_s, model_of(sizes.get("outputs", 1)), SUMMARY
-    )
+    return Candidate(law_of(gain, **sizes), washout_rad_s, SUMMARY)
 
 
 @dataclass
@@ -67,7 +66,8 @@ class ToyRetuner:
 class Rig:
     """An adaptive controller stepped as the node does it; the pump follows at once.
 
-    `roll` is a function of the sample's number and of the command.
+    `roll` is a function of the sample's number and of the command, `stiffness` of the number alone:
+    by what factor the ship is stiffer than her law's.
     """
 
     def __init__(
@@ -75,13 +75,15 @@ class Rig:
         retuner: ToyRetuner,
         settings: RetuningSettings = SETTINGS,
         roll: Callable[[int, float], float] = lambda k, u: 0.02 * np.sin(0.1 * k),
+        stiffness: Callable[[int], float] = lambda k: 1.0,
     ) -> None:
         count = round(settings.identification_s / SAMPLE_TIME_S)
         self.pulses_pa = 1e3 * np.where(np.arange(count) % 7 < 3, 1.0, -1.0)
         self.controller = AdaptiveController(
-            law_of(1e5), model_of(), 0, settings, self.pulses_pa, retuner
+            law_of(1e5), SHIP, 0, settings, self.pulses_pa, retuner
         )
         self.roll = roll
+        self.stiffness = stiffness
         self.samples = 0
         self.command_pa = 0.0
         self.commands: list[float] = []
@@ -104,6 +106,9 @@ class Rig:
             controller.update(
                 self.samples * SAMPLE_NS, pressed, engaged=self.engaged, fresh=self.fresh
             )
+            if self.samples % TOLD_EVERY == 0:
+                found = replace(SHIP, stiffness_nm_rad=self.stiffness(self.samples) * 1e9)
+                controller.note(MotionEstimate(Verdict.GOOD, Verdict.GOOD, found))
             y = np.array([self.roll(self.samples, self.command_pa)])
             self.command_pa = float(controller.step(y)[0])
             self.commands.append(self.command_pa)

@@ -5,18 +5,18 @@ import pytest
 from retuning_toys import (
     SAMPLE_TIME_S,
     SETTINGS,
+    SHIP,
+    SUMMARY,
     Rig,
     ToyRetuner,
     candidate_of,
     law_of,
-    model_of,
     states,
 )
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import RetuningState
-from utank_hil.control import ARX
-from utank_hil.retuning import Candidate, Refusal, adaptive
+from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.retuning import Candidate, MotionEstimate, Refusal, adaptive
 from utank_hil.retuning.adaptive import TRIAL_PATIENCE
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_bank import FADE_SAMPLES
@@ -31,10 +31,6 @@ def candidate_with(**gains: FloatArray) -> Candidate:
     """A candidate with other gains than it should have."""
     candidate = candidate_of(1e5)
     return replace(candidate, law=replace(candidate.law, **gains))
-
-
-def long_model(order: int) -> ARX:
-    return ARX(np.zeros((order, 1, 1)), np.zeros((order + 1, 1, 1)), SAMPLE_TIME_S)
 
 
 def test_without_an_order_it_is_the_law_it_was_given() -> None:
@@ -172,9 +168,8 @@ def test_no_answer_in_time_is_a_refusal() -> None:
         (candidate_with(input_gains=np.full((3, 1, 1), 1.7e308)), "gains"),
         (candidate_with(input_gains=np.full((3, 1, 1), np.nan)), "gains"),
         (candidate_with(output_gains=np.full((3, 1, 1), np.inf)), "gains"),
-        (replace(candidate_of(1e5), model=long_model(KEPT + 1)), "looks back"),
-        (replace(candidate_of(1e5), model=model_of(2)), "model is for other signals"),
         (candidate_of(1e5, float("inf")), "washout"),
+        (replace(candidate_of(1e5), summary=replace(SUMMARY, stiffness_nm_rad=-1.0)), "stiffness"),
     ],
 )
 def test_candidate_is_looked_at_once_more_before_it_is_taken(candidate, word: str) -> None:
@@ -193,13 +188,11 @@ def test_identification_is_given_up_when_the_roll_is_above_its_limit() -> None:
     assert rig.samples < 325
 
 
-def test_model_as_long_as_what_is_kept_is_taken_and_watched() -> None:
-    rig = Rig(ToyRetuner(replace(candidate_of(9e4), model=long_model(KEPT))))
-    rig.run(2 * KEPT)
+def test_an_estimate_is_no_answer_to_a_request_for_a_law() -> None:
+    rig = Rig(ToyRetuner(MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP)))
     rig.press(retune=True)
-    rig.run_until(RETUNED)
-    rig.run(3 * KEPT)
-    assert rig.controller.laws.accepted.monitor.change >= 1.0
+    rig.run_until(REFUSED)
+    assert "another question" in rig.reasons
 
 
 @pytest.mark.parametrize("fresh_of", [0, 3, 10])

@@ -7,16 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from retuning_toys import SUMMARY, Rig, ToyRetuner, candidate_of, law_of
 
-from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.canbus import Verdict
+from utank_hil.control import PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
-from utank_hil.retuning import Candidate, Refusal
+from utank_hil.retuning import Candidate, MotionEstimate, Refusal, ShipFigures
 from utank_hil.retuning.admission import Admission, WarmUp
 from utank_hil.retuning.admission import _candidate_gains as admission_gains
 from utank_hil.retuning.admission import _gains as gains_of
 from utank_hil.retuning.answer import LONGEST_BYTES, answer_bytes, read_answer
 from utank_hil.retuning.history import SampleHistory
+from utank_hil.sea import SlopeSpectrum
 
 
 @pytest.mark.parametrize("washout_rad_s", [0.0, 0.02])
@@ -30,8 +32,6 @@ def test_candidate_crosses_bit_for_bit(washout_rad_s: float, outputs: int) -> No
     assert isinstance(came.whole_law(), WashoutLaw) == (washout_rad_s > 0)
     for name in ("input_gains", "output_gains", "reference_gains"):
         assert np.array_equal(getattr(came.law, name), getattr(sent.law, name))
-    assert np.array_equal(came.model.alpha, sent.model.alpha)
-    assert np.array_equal(came.model.beta, sent.model.beta)
     y = np.full(outputs, 0.01)
     assert came.law.controller().step(y) == sent.law.controller().step(y)
     assert came.law.sample_time_s == law_of(1.0).sample_time_s
@@ -44,12 +44,26 @@ def test_refusal_crosses_with_its_reasons(reasons: tuple[str, ...]) -> None:
 
 @given(st.binary(max_size=400))
 def test_nonsense_is_refused(data: bytes) -> None:
-    for head in (b"", b"CANDIDAT"):
+    for head in (b"", b"CANDIDAT", b"ESTIMATE"):
         try:
             answer = read_answer(head + data)
         except ValueError:
             continue
         assert isinstance(answer, Refusal)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_an_estimate_crosses_bit_for_bit(told: bool) -> None:
+    sent = MotionEstimate(Verdict.RECORD_SHORT, Verdict.MOTION_SMALL)
+    if told:
+        omega = np.linspace(0.2, 2.0, 50)
+        waves = SlopeSpectrum(omega, np.exp(-omega), 0.1 * np.exp(-omega))
+        ship = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
+        sent = MotionEstimate(Verdict.GOOD, Verdict.UNCERTAIN, ship, waves, 0.05, 3.2, 9.1, 1200.0)
+    came = read_answer(answer_bytes(sent))
+    assert isinstance(came, MotionEstimate)
+    assert answer_bytes(came) == answer_bytes(sent)
+    assert (came.of_sea, came.of_ship, came.ship) == (sent.of_sea, sent.of_ship, sent.ship)
 
 
 def law_of_size(order: int, horizon: int, outputs: int, gain: float = 0.0) -> Candidate:
@@ -59,10 +73,7 @@ def law_of_size(order: int, horizon: int, outputs: int, gain: float = 0.0) -> Ca
         np.full((horizon, 1, outputs), gain),
         0.2,
     )
-    model = ARX(
-        np.full((order, outputs, outputs), gain), np.full((order + 1, outputs, 1), gain), 0.2
-    )
-    return Candidate(law, 0.02, model, SUMMARY)
+    return Candidate(law, 0.02, SUMMARY)
 
 
 def test_the_largest_answer_that_a_configuration_can_ask_for_fits_its_mailbox() -> None:
@@ -96,7 +107,7 @@ def test_admission_of_the_largest_law_allocates_no_square_of_its_order(
         law_of_size(MOST_ORDER, MOST_SAMPLES, outputs, 1e-3), washout_rad_s=washout_rad_s
     )
     configured, history = law_of(1e5, outputs=outputs), SampleHistory(1000, outputs)
-    admission = Admission(configured, history, 0)
+    admission = Admission(configured, history)
     tracemalloc.start()
     try:
         warm_up = admission.admit(candidate)

@@ -20,6 +20,7 @@ from utank_hil.canbus import RetuningState
 from utank_hil.retuning import Refusal
 from utank_hil.retuning.adaptive import MOST_TRIES, RETRY_NS
 
+CHANGE = replace(SETTINGS, change_factor=1.05)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
 
@@ -75,12 +76,16 @@ def test_a_dead_retuner_is_looked_at_every_ten_minutes_however_short_the_schedul
     assert len(states(rig)) == 7
 
 
-def test_changed_ship_is_noticed_and_a_higher_sea_is_not() -> None:
+@pytest.mark.parametrize("factor", [0.8, 1.25])
+def test_changed_ship_is_noticed_and_another_sea_is_not(factor: float) -> None:
     def roll(k: int, u: float) -> float:
-        # at first a wave of one period, then twice as high, then of half the period
-        return float((0.02 if k < 6000 else 0.04) * np.sin((0.1 if k < 12000 else 0.3) * k))
+        # at first a wave of one period, then twice as high, then of a third of the period
+        return float((0.02 if k < 3000 else 0.04) * np.sin((0.1 if k < 6000 else 0.3) * k))
 
-    rig = Rig(ToyRetuner(Refusal(("no",))), replace(SETTINGS, change_factor=1.5), roll)
+    def stiffness(k: int) -> float:
+        return 1.0 if k < 12000 else factor
+
+    rig = Rig(ToyRetuner(Refusal(("no",))), CHANGE, roll, stiffness)
     rig.run(12000)
     assert states(rig) == []
     rig.run_until(IDENTIFY)
@@ -140,21 +145,26 @@ def test_interruption_counts_anew_what_the_trial_is_compared_with() -> None:
 
 
 def changing(rig_flags: list[int]) -> Callable[[int, float], float]:
-    """A wave that gets shorter after 40 minutes; one roll above the limit for each flag."""
+    """A wave; one roll above the limit for each flag."""
 
     def roll(k: int, u: float) -> float:
         if rig_flags and rig_flags[0] == 1:
             rig_flags.pop(0)
             return 0.31
-        return float(0.02 * np.sin((0.1 if k < 12000 else 0.3) * k))
+        return float(0.02 * np.sin(0.1 * k))
 
     return roll
+
+
+def stiffer(k: int) -> float:
+    """A ship that is loaded after 40 minutes."""
+    return 1.0 if k < 12000 else 1.25
 
 
 @pytest.mark.slow
 def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_times() -> None:
     retuner = ToyRetuner(Refusal(("no",)))
-    rig = Rig(retuner, replace(SETTINGS, change_factor=1.5), changing([]))
+    rig = Rig(retuner, CHANGE, changing([]), stiffer)
     rig.run(40000)
     begun = [event for event in rig.controller.events if event.state is IDENTIFY]
     assert len(begun) == MOST_TRIES
@@ -167,7 +177,7 @@ def test_change_is_not_forgotten_after_a_refusal_and_tried_a_bounded_number_of_t
 @pytest.mark.slow
 def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
     flags: list[int] = []
-    rig = Rig(ToyRetuner(candidate_of(9e4)), replace(SETTINGS, change_factor=1.5), changing(flags))
+    rig = Rig(ToyRetuner(candidate_of(9e4)), CHANGE, changing(flags), stiffer)
     for _ in range(MOST_TRIES + 1):  # rolls above the limit, each time
         rig.run_until(IDENTIFY, 20000)
         flags[:] = [1]
@@ -177,11 +187,11 @@ def test_identifications_that_told_nothing_of_the_ship_do_not_count() -> None:
 
 @pytest.mark.slow
 def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
-    def roll(k: int, u: float) -> float:
-        shorter = k in range(12000, 13500) or k > 40000  # 12,000 samples are 40 minutes
-        return float(0.02 * np.sin((0.3 if shorter else 0.1) * k))
+    def stiffness(k: int) -> float:
+        # 12,000 samples are 40 minutes
+        return 1.25 if k in range(12000, 14500) or k > 40000 else 1.0
 
-    rig = Rig(ToyRetuner(Refusal(("no",))), replace(SETTINGS, change_factor=1.5), roll)
+    rig = Rig(ToyRetuner(Refusal(("no",))), CHANGE, stiffness=stiffness)
     rig.run(40000)
     before = states(rig).count(IDENTIFY)
     assert 0 < before < MOST_TRIES
@@ -192,7 +202,7 @@ def test_change_that_went_away_leaves_the_next_one_all_its_tries() -> None:
 def test_change_is_tried_again_after_a_refusal_and_found() -> None:
     flags: list[int] = [0]
     retuner = ToyRetuner(candidate_of(9e4))
-    rig = Rig(retuner, replace(SETTINGS, change_factor=1.5), changing(flags))
+    rig = Rig(retuner, CHANGE, changing(flags), stiffer)
     rig.run_until(IDENTIFY, 20000)
     flags[:] = [1]
     rig.run_until(REFUSED)
@@ -202,7 +212,7 @@ def test_change_is_tried_again_after_a_refusal_and_found() -> None:
 
 @pytest.mark.parametrize("how", ["forbidden", "disarmed"])
 def test_change_is_not_forgotten_when_an_identification_is_given_up(how: str) -> None:
-    rig = Rig(ToyRetuner(candidate_of(9e4)), replace(SETTINGS, change_factor=1.5), changing([]))
+    rig = Rig(ToyRetuner(candidate_of(9e4)), CHANGE, changing([]), stiffer)
     rig.run_until(IDENTIFY, 20000)
     rig.order = QUIET._replace(forbid_retuning=how == "forbidden")
     rig.engaged = how != "disarmed"

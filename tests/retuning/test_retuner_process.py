@@ -57,7 +57,7 @@ def answers_with_too_much(record: FloatArray) -> Answer:
 
 @contextmanager
 def running(work: RetuneFunction, hangs_after_s: float = 600.0) -> Iterator[RetunerProcess]:
-    with RetunerProcess(work, SHAPE, hangs_after_s) as retuner:
+    with RetunerProcess((work, SHAPE), hangs_after_s=hangs_after_s) as retuner:
         yield retuner
     assert not _alive(retuner.pid)
     _wait(lambda: not _group_lives(retuner.pid))
@@ -89,7 +89,7 @@ def _wait(condition: Callable[[], bool]) -> None:
 def _answer(retuner: RetunerProcess, number: int) -> Answer | None:
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
-        answer = retuner.answer(number, 0)
+        answer = retuner.desks[0].answer(number, 0)
         if answer is not None:
             return answer
         time.sleep(0.02)
@@ -99,21 +99,21 @@ def _answer(retuner: RetunerProcess, number: int) -> Answer | None:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A heart that has not beaten for 1.5 s, not 5 s, is no sign of life."""
-    monkeypatch.setattr("utank_hil.retuning.retuner_process._ALIVE_NS", 1_500_000_000)
+    monkeypatch.setattr("utank_hil.retuning.desk._ALIVE_NS", 1_500_000_000)
 
 
 def test_each_record_gets_its_own_answer() -> None:
     with running(answers_with_the_sum) as retuner:
         for number, rows in ((1, 6), (2, 3)):
-            retuner.submit(number, RECORD[:rows], 0)
+            retuner.desks[0].submit(number, RECORD[:rows], 0)
             answer = _answer(retuner, number)
             assert answer == Refusal((f"({rows}, 2) {RECORD[:rows].sum():g}",))
-            assert retuner.answer(number + 1, 0) is None
+            assert retuner.desks[0].answer(number + 1, 0) is None
 
 
 def test_law_comes_back() -> None:
     with running(answers_with_a_law) as retuner:
-        retuner.submit(1, RECORD, 0)
+        retuner.desks[0].submit(1, RECORD, 0)
         answer = _answer(retuner, 1)
     assert isinstance(answer, Candidate)
     assert answer.law.output_gains.shape == (200, 1, 1)
@@ -121,12 +121,12 @@ def test_law_comes_back() -> None:
 
 def test_sleep_does_not_keep_the_controller_waiting() -> None:
     with running(sleeps) as retuner:
-        retuner.submit(1, RECORD, 0)
+        retuner.desks[0].submit(1, RECORD, 0)
         begin_s = time.monotonic()
         for _ in range(100):
-            assert retuner.answer(1, 0) is None
+            assert retuner.desks[0].answer(1, 0) is None
             time.sleep(0.005)
-        retuner.submit(2, RECORD, 0)
+        retuner.desks[0].submit(2, RECORD, 0)
         # any wait for the process would have taken a minute
         assert time.monotonic() - begin_s < 30.0
 
@@ -141,15 +141,15 @@ def test_it_is_alive_when_it_is_made_and_dead_when_it_is_closed() -> None:
 
 def test_work_that_fails_is_a_refusal_with_the_reason_and_the_next_order_is_worked_off() -> None:
     with running(fails_on_seven) as retuner:
-        retuner.submit(1, RECORD + 7, 0)
+        retuner.desks[0].submit(1, RECORD + 7, 0)
         assert _answer(retuner, 1) == Refusal(("the retuner failed: KeyError: 'seven'",))
-        retuner.submit(2, RECORD, 0)
+        retuner.desks[0].submit(2, RECORD, 0)
         assert _answer(retuner, 2) == Refusal(("no",))
 
 
 def test_answer_too_long_for_the_mailbox_is_a_refusal() -> None:
     with running(answers_with_too_much) as retuner:
-        retuner.submit(1, RECORD, 0)
+        retuner.desks[0].submit(1, RECORD, 0)
         answer = _answer(retuner, 1)
     assert isinstance(answer, Refusal)
     assert "too long" in answer.reasons[0]
@@ -157,32 +157,32 @@ def test_answer_too_long_for_the_mailbox_is_a_refusal() -> None:
 
 def test_worker_that_died_is_told_and_replaced() -> None:
     with running(dies_on_seven) as retuner:
-        retuner.submit(1, RECORD + 7, 0)
+        retuner.desks[0].submit(1, RECORD + 7, 0)
         answer = _answer(retuner, 1)
         assert answer == Refusal(("the retuner ended with code 3, and was restarted",))
-        retuner.submit(2, RECORD, 0)  # not the order that it did not survive
+        retuner.desks[0].submit(2, RECORD, 0)  # not the order that it did not survive
         assert _answer(retuner, 2) == Refusal(("no",))
 
 
 @pytest.mark.usefixtures("impatient")
 def test_worker_that_hangs_shows_no_sign_of_life_and_is_replaced() -> None:
     with running(sleeps_on_seven, hangs_after_s=3.0) as retuner:
-        retuner.submit(1, RECORD + 7, 0)
+        retuner.desks[0].submit(1, RECORD + 7, 0)
         _wait(lambda: not retuner.alive)
         answer = _answer(retuner, 1)
         assert answer == Refusal(("the retuner was busy for more than 3 s, and was restarted",))
         _wait(lambda: retuner.alive)
-        retuner.submit(2, RECORD, 0)
+        retuner.desks[0].submit(2, RECORD, 0)
         assert _answer(retuner, 2) == Refusal(("no",))
 
 
 @pytest.mark.usefixtures("impatient")
 def test_without_its_keeper_it_ends_and_shows_no_sign_of_life() -> None:
-    with RetunerProcess(answers_with_the_sum, SHAPE) as retuner:
+    with RetunerProcess((answers_with_the_sum, SHAPE)) as retuner:
         os.kill(retuner.pid, signal.SIGKILL)
         _wait(lambda: not retuner.alive)
-        retuner.submit(1, RECORD, 0)
-        assert retuner.answer(1, 0) is None
+        retuner.desks[0].submit(1, RECORD, 0)
+        assert retuner.desks[0].answer(1, 0) is None
 
 
 def worker_of(retuner: RetunerProcess) -> int | None:
@@ -222,8 +222,8 @@ def test_worker_killed_at_any_instant_is_replaced_and_every_record_is_answered(k
 
 @pytest.mark.parametrize("orphaned", [False, True])
 def test_closed_it_leaves_nothing_behind_that_hangs(orphaned: bool) -> None:
-    with RetunerProcess(sleeps, SHAPE) as retuner:
-        retuner.submit(1, RECORD, 0)
+    with RetunerProcess((sleeps, SHAPE)) as retuner:
+        retuner.desks[0].submit(1, RECORD, 0)
         time.sleep(0.5)
         if orphaned:
             os.kill(retuner.pid, signal.SIGKILL)
@@ -234,8 +234,8 @@ def test_retuner_ends_when_its_controller_is_killed_even_if_it_hangs() -> None:
     read, write = os.pipe()
     child = os.fork()
     if child == 0:  # a controller that is killed has no time to end anything
-        retuner = RetunerProcess(sleeps, SHAPE)
-        retuner.submit(1, RECORD, 0)
+        retuner = RetunerProcess((sleeps, SHAPE))
+        retuner.desks[0].submit(1, RECORD, 0)
         os.write(write, retuner.pid.to_bytes(8, "little"))
         time.sleep(60)
         os._exit(0)
@@ -250,6 +250,6 @@ def test_retuner_ends_when_its_controller_is_killed_even_if_it_hangs() -> None:
 def test_nonsense_in_the_mailbox_is_a_refusal() -> None:
     with running(answers_with_the_sum) as retuner:
         retuner._answers.post(1, b"CANDIDATxyz")
-        answer = retuner.answer(1, 0)
+        answer = retuner.desks[0].answer(1, 0)
     assert isinstance(answer, Refusal)
     assert "nonsense" in answer.reasons[0]

@@ -86,8 +86,8 @@ def compute(record: FloatArray) -> Answer:
 @contextmanager
 def beside_a_retuner() -> Iterator[None]:
     """A retuner's processes at work on a record."""
-    with RetunerProcess(compute, RECORD) as retuner:
-        retuner.submit(1, np.random.default_rng(1).standard_normal(RECORD), 0)
+    with RetunerProcess((compute, RECORD)) as retuner:
+        retuner.desks[0].submit(1, np.random.default_rng(1).standard_normal(RECORD), 0)
         time.sleep(1.0)
         yield
 

@@ -29,10 +29,16 @@ from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.control import PredictiveDesign, wave_arx
+from utank_hil.control import PredictiveDesign
 from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import sample
-from utank_hil.retuning import AdaptiveController, RetunerProcess, RetuningOrder, make_pulses
+from utank_hil.retuning import (
+    AdaptiveController,
+    RetunerProcess,
+    RetuningOrder,
+    ShipFigures,
+    make_pulses,
+)
 from utank_hil.runtime import (
     Lockstep,
     LoopStatistics,
@@ -83,7 +89,8 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
     work = retuner_work(config)
     assert work is not None
     rows = []
-    with RetunerProcess(*work) as retuner:
+    with RetunerProcess(work) as process:
+        (retuner,) = process.desks
         node = build_controller_node(
             config,
             retuner=retuner,
@@ -123,10 +130,13 @@ def retune_once(config: ControllerConfig, times: dict[str, list[float]]) -> None
     assert settings is not None
     assert work is not None
     period_s = design.predictor.sample_time_s
-    with RetunerProcess(*work) as retuner:
+    with RetunerProcess(work) as process:
+        (retuner,) = process.desks
         controller = AdaptiveController(
             design.law(plant),
-            wave_arx(design.predictor, plant),
+            ShipFigures(
+                plant.ship.stiffness_nm_rad, plant.ship.inertia_kg_m2, plant.ship.damping_nms_rad
+            ),
             design.predictor.measured.index("roll_rad"),
             settings,
             make_pulses(settings, plant, period_s),

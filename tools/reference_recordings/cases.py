@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.assembly import build_controller_node, build_law, retuner_work
+from utank_hil.assembly import build_controller_node, build_law, works_of
 from utank_hil.canbus import (
     DriveFault,
     DriveStatus2,
@@ -28,7 +28,7 @@ from utank_hil.runtime import Lockstep, Node
 from utank_hil.runtime.node import Selective
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
-from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
+from utank_hil.telemetry.node_tap import NodeTap, RetunerTap, estimator_tap
 from utank_hil.telemetry.replay_head import replay_head
 
 SCENARIOS: Final = Path("configs/scenarios")
@@ -262,9 +262,17 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
     """
     scenario, config = _scenario(case), _config(case)
     seed = scenario.seed
-    law, work = build_law(config), retuner_work(config)
+    law = build_law(config)
+    retuning, estimating = works_of(config)
     head = replay_head(
-        "reference", config, law, home or folder, options={}, retuner=work is not None, seed=seed
+        "reference",
+        config,
+        law,
+        home or folder,
+        options={},
+        retuner=retuning is not None,
+        estimating=estimating is not None,
+        seed=seed,
     )
     # what differs from one machine and day to another is not what is compared
     about = {name: head["about"][name] for name in ("command", "configuration", "data")}
@@ -272,10 +280,15 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
     file = folder / f"{case.name}.frames"
     with FrameLogWriter(file, head, small=True) as writer:
         sink = BlockSink(writer, block_ns=_WHOLE_NS)
-        tap = None
-        if work is not None:
-            tap = RetunerTap(SimulatedRetuner(work[0], scenario.retuner_latency_s))
-        node = NodeTap(build_controller_node(config, law, retuner=tap), sink.write, tap)
+        latency_s = scenario.retuner_latency_s
+        retuner = sea = None
+        if retuning is not None:
+            retuner = RetunerTap(SimulatedRetuner(retuning[0], latency_s))
+        if estimating is not None:
+            sea = estimator_tap(SimulatedRetuner(estimating[0], latency_s))
+        taps = [tap for tap in (retuner, sea) if tap is not None]
+        controller = build_controller_node(config, law, retuner=retuner, estimating=sea)
+        node = NodeTap(controller, sink.write, taps)
         script = tuple(TimedAction(*timed) for timed in case.script)
         nodes: list[Node] = [*build_ship_side(scenario, seed, script).nodes, node]
         if case.intruder_s is not None:

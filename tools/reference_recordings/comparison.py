@@ -28,7 +28,13 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
             chosen: ControllerConfig = config.model_copy(update=changes or {})
             law = build_law(chosen)
             why = causes(log.head, chosen, law, path.parent)
-            result = replay(entries_of(log.blocks()), chosen, law, retuner=log.head["retuner"])
+            result = replay(
+                entries_of(log.blocks()),
+                chosen,
+                law,
+                retuner=log.head["retuner"],
+                estimating=log.head["estimating"],
+            )
     except ReplayHeadError as error:
         return str(error)
     return "; ".join([str(result.first), *why]) if result.first is not None else ""

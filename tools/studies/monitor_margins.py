@@ -20,7 +20,7 @@ from rich.table import Table
 from firmware_sim.run import SECOND_NS
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.assembly import build_controller_node, works_of
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.retuning import SimulatedRetuner
@@ -82,9 +82,10 @@ class Onlooker:
 def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
     """Margins of one run."""
     config = scenario.controllers[name]
-    work = retuner_work(config)
-    retuner = None if work is None else SimulatedRetuner(work[0], scenario.retuner_latency_s)
-    node = build_controller_node(config, retuner=retuner)
+    retuner, estimating = (
+        work and SimulatedRetuner(work[0], scenario.retuner_latency_s) for work in works_of(config)
+    )
+    node = build_controller_node(config, retuner=retuner, estimating=estimating)
     onlooker = Onlooker(node)
     ship = build_ship_side(scenario, seed, scenario.operator)
     lockstep = Lockstep([*ship.nodes, node, onlooker], SimulatedBus(bit_rate=config.bit_rate))

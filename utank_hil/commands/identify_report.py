@@ -17,7 +17,7 @@ from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification import IdentificationError, ModalConfidence, modal_confidence
-from utank_hil.retuning import Answer, Candidate
+from utank_hil.retuning import Candidate, Refusal
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
 STATES: Final = 4
@@ -33,7 +33,9 @@ def realized_modes(found: Identification) -> ModalConfidence | None:
         return None
 
 
-def figures(found: Identification, answer: Answer, files: Mapping[str, Path]) -> dict[str, Any]:
+def figures(
+    found: Identification, answer: Candidate | Refusal, files: Mapping[str, Path]
+) -> dict[str, Any]:
     """All that was found, for ``--json``; deviations are standard ones, as parts of the values."""
     fit, validation = found.fit, found.validation
     modes = realized_modes(found)
@@ -83,7 +85,7 @@ def print_report(
     console: Console,
     found: Identification,
     task: RetuningTask,
-    answer: Answer,
+    answer: Candidate | Refusal,
     files: Mapping[str, Path],
 ) -> None:
     """Print what an engineer asks: which ship, how sure, does it hold, and is it accepted."""

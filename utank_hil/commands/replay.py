@@ -64,7 +64,11 @@ def replay(
                 law = build_law(chosen)
                 why = causes(recording.head, chosen, law, log.parent)
                 result = run_replay(
-                    entries_of(recording.blocks()), chosen, law, retuner=recording.head["retuner"]
+                    entries_of(recording.blocks()),
+                    chosen,
+                    law,
+                    retuner=recording.head["retuner"],
+                    estimating=recording.head["estimating"],
                 )
             cut = recording.cut
     except (OSError, ValueError) as error:

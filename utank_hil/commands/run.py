@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
@@ -36,7 +36,6 @@ from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.retuning import RetunerProcess
 from utank_hil.runtime import (
     LoopStatistics,
     Node,
@@ -49,7 +48,7 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
 from utank_hil.telemetry.event_ring import Event
-from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
+from utank_hil.telemetry.node_tap import NodeTap, RetunerTap, estimator_tap
 from utank_hil.telemetry.replay_head import replay_head
 
 
@@ -104,9 +103,9 @@ def run(
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
         folder = OUT if out is None and view else out
-        work = retuner_work(loaded)
+        retunes, estimates = (work is not None for work in works_of(loaded))
         announcer = None
-        if work is not None or folder is not None:
+        if retunes or estimates or folder is not None:
             announcer = _announcer(config, loaded, folder)
             stack.callback(announcer.stop)
             if announcer.error is not None:
@@ -114,7 +113,13 @@ def run(
         recording = None
         if folder is not None:
             head = replay_head(
-                "run", loaded, law, folder, options=context.params, retuner=work is not None
+                "run",
+                loaded,
+                law,
+                folder,
+                options=context.params,
+                retuner=retunes,
+                estimating=estimates,
             )
             recording = RunRecording(
                 folder,
@@ -131,9 +136,11 @@ def run(
                 )
             elif recording.url is not None:
                 _show(recording.url, stack)
-        retuner = None if work is None else stack.enter_context(RetunerProcess(*work))
-        if retuner is not None and not retuner.alive:
-            notes.print("[red]the retuner did not start:[/red] nothing will be retuned")
+        retuner, estimating = stack.enter_context(retuner_process(loaded))
+        if any(desk is not None and not desk.alive for desk in (retuner, estimating)):
+            notes.print(
+                "[red]the retuner did not start:[/red] nothing will be retuned or estimated"
+            )
         try:
             alarms = AlarmLines()
         except OSError as error:
@@ -147,11 +154,14 @@ def run(
                 announcer.write(event, start_ns)
 
         records = recording is not None and recording.keeps_records
-        tap = RetunerTap(retuner) if records and retuner is not None else None
+        retuner_tap = RetunerTap(retuner) if records and retuner is not None else None
+        sea_tap = estimator_tap(estimating) if records and estimating is not None else None
+        taps = [tap for tap in (retuner_tap, sea_tap) if tap is not None]
         node = build_controller_node(
             loaded,
             law,
-            retuner=tap or retuner,
+            retuner=retuner_tap or retuner,
+            estimating=sea_tap or estimating,
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=told,
@@ -159,7 +169,7 @@ def run(
 
         on_bus: Node = node
         if recording is not None and records:
-            on_bus = NodeTap(node, recording.write_records, tap)
+            on_bus = NodeTap(node, recording.write_records, taps)
 
         def ended() -> bool:
             manager.progress(statistics.ticks)

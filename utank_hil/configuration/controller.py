@@ -16,6 +16,7 @@ from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, Pump
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.parameters import Problem, Range, refuse
+from utank_hil.retuning.estimator import EstimateSettings
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runtime.bus_model import SimulatedBus
@@ -48,6 +49,8 @@ class ControllerConfig(Section):
     bit_rate: Annotated[int, Range(least=10_000, most=1_000_000)] = 250_000
     retuning: RetuningSettings | None = None
     """How the controller may retune itself; without it, it never does."""
+    sea_estimate: EstimateSettings | None = None
+    """How waves and ship are told from the motion; without it, they are not."""
 
     @field_validator("limits", mode="before")
     @classmethod
@@ -110,6 +113,9 @@ class ControllerConfig(Section):
         if not isinstance(law, PredictiveDesign) or "roll_rad" not in law.predictor.measured:
             return [("retuning", "is for predictive laws (gpc, dpc) that measure roll_rad")]
         problems = []
+        if settings.change_factor is not None and self.sea_estimate is None:
+            reason = "needs the section sea_estimate, which tells the ship: add `sea_estimate: {}`"
+            problems.append(("change_factor", reason))
         period_s = law.predictor.sample_time_s
         if settings.order > MOST_ORDER:
             problems.append(("order", f"must be {MOST_ORDER} at most, got {settings.order}"))

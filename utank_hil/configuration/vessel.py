@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, fields
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -16,7 +16,7 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
-from utank_hil.parameters import Problem, refuse
+from utank_hil.parameters import Problem, Range, refuse
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
@@ -36,6 +36,8 @@ class Vessel(Section):
     pump: Pump | None = None
     valve: Valve | None = None
     """Without pump and valve the tank is passive."""
+    least_gm_m: Annotated[float, Range(above=0, most=1e3)] | None = None
+    """Limit of the stability booklet on the metacentric height, tank water free to move."""
     _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property
@@ -89,6 +91,8 @@ class Vessel(Section):
         if vessel.valve is not None:
             wrong = valve_problems(vessel.tank, vessel.valve)
             problems += [(f"valve.{name}", reason) for name, reason in wrong]
+        if vessel.least_gm_m is not None and not vessel.ship.displacement_n > 0:
+            problems.append(("least_gm_m", "needs ship.displacement_t, to which GM refers: add it"))
         refuse("", in_written_keys(problems, vessel._written))
         return vessel
 

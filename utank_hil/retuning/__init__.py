@@ -6,8 +6,11 @@ of their own and are not imported here.
 
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent, RetuningOrder
 from utank_hil.retuning.answer import Answer, Candidate, ModelSummary, Refusal
+from utank_hil.retuning.desk import Desk
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimator import EstimateFigures, EstimateSettings, Estimator
 from utank_hil.retuning.pulses import make_pulses
-from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner
+from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner, Work
 from utank_hil.retuning.retuner_process import RetunerProcess
 from utank_hil.retuning.settings import RetuningSettings
 
@@ -15,7 +18,12 @@ __all__ = [
     "AdaptiveController",
     "Answer",
     "Candidate",
+    "Desk",
+    "EstimateFigures",
+    "EstimateSettings",
+    "Estimator",
     "ModelSummary",
+    "MotionEstimate",
     "Refusal",
     "RetuneFunction",
     "Retuner",
@@ -23,6 +31,8 @@ __all__ = [
     "RetuningEvent",
     "RetuningOrder",
     "RetuningSettings",
+    "ShipFigures",
     "SimulatedRetuner",
+    "Work",
     "make_pulses",
 ]

@@ -34,7 +34,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
-from utank_hil.control import ARX, LinearLaw
+from utank_hil.control import LinearLaw
 from utank_hil.retuning.admission import (
     WARM_UP_CHUNK,
     WARM_UP_SAMPLES,
@@ -43,6 +43,7 @@ from utank_hil.retuning.admission import (
 )
 from utank_hil.retuning.answer import Candidate, ModelSummary, Refusal
 from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
 from utank_hil.retuning.retuner import Retuner
@@ -58,8 +59,8 @@ MOST_EVENTS: Final = 1000
 MOST_TRIES: Final = 3
 """Identifications of one change of the ship; if all are refused, the new ship counts as normal."""
 RETRY_NS: Final = 600_000_000_000
-"""Least time from one retuning to the next because of a change, for the monitor to learn; and to
-the next without an order after the retuner was found dead.
+"""Least time from one retuning to the next because of a change, and to the next without an order
+after the retuner was found dead.
 """
 
 _REQUESTED: Final = "ordered by the operator"
@@ -126,8 +127,8 @@ class AdaptiveController:
     ----------
     law : LinearLaw
         First law.
-    model : ARX
-        Prediction model of that law.
+    ship : ShipFigures
+        The ship that it was designed for.
     roll : int
         Index of the roll among the outputs.
     settings : RetuningSettings
@@ -150,7 +151,7 @@ class AdaptiveController:
     def __init__(
         self,
         law: LinearLaw,
-        model: ARX,
+        ship: ShipFigures,
         roll: int,
         settings: RetuningSettings,
         pulses_pa: FloatArray,
@@ -161,15 +162,15 @@ class AdaptiveController:
         self.events: deque[RetuningEvent] = deque(maxlen=MOST_EVENTS)
         self._untaken = 0
         self.candidate: Candidate | None = None
-        self.laws = LawBank(MonitoredLaw(law.controller(), ChangeMonitor(model, roll)))
+        self.laws = LawBank(MonitoredLaw(law.controller(), ChangeMonitor(ship)))
         self._settings = settings
         self._roll = roll
         self._retuner = retuner
         self._pulses_pa = pulses_pa
         self._history = SampleHistory(
-            max(len(pulses_pa), WARM_UP_SAMPLES + WARM_UP_CHUNK), model.outputs
+            max(len(pulses_pa), WARM_UP_SAMPLES + WARM_UP_CHUNK), law.matrices().B.shape[1]
         )
-        self._admission = Admission(law, self._history, roll)
+        self._admission = Admission(law, self._history)
         self._warm_up: WarmUp | None = None
         trial = round(settings.trial_s / law.sample_time_s)
         self._least_samples = min(trial, round(EARLIEST_VERDICT_S / law.sample_time_s))
@@ -234,7 +235,6 @@ class AdaptiveController:
                 self._trial_window.add(self._roll_rad, self._applied_pa)
             elif self.state not in _BUSY:
                 self._accepted_window.add(self._roll_rad, self._applied_pa)
-                self.laws.accepted.monitor.watch(self._history, self._applied_pa, self._roll_rad)
         self._history.add(self._applied_pa, y, fresh=self._fresh)
         command = self.laws.step(y, reference)
         if self.state is _TRIAL and self.laws.on_trial is None:
@@ -246,6 +246,11 @@ class AdaptiveController:
             self._pulses_given += 1
             command = np.full(1, pulse_pa) if self._settings.alone else command + pulse_pa
         return command
+
+    def note(self, estimate: MotionEstimate) -> None:
+        """Take what the motion tells of the ship."""
+        for law in self.laws.stepped:
+            law.monitor.watch(estimate)
 
     def applied(self, u: FloatArray) -> None:
         """Take the command that was applied; see `Controller`."""
@@ -296,7 +301,7 @@ class AdaptiveController:
             self._tries = 0  # back to normal: the next change is a new one
         else:
             change = self.laws.accepted.monitor.change
-            return f"the ship has changed: prediction errors are off the normal {change:.2f} times"
+            return f"the ship has changed: her roll is another by a factor of {change:.2f}"
         return ""
 
     @property
@@ -324,6 +329,8 @@ class AdaptiveController:
         answer = self._retuner.answer(self._request_number, self._now_ns)
         if isinstance(answer, Refusal):
             self._refuse(answer.reasons)
+        elif isinstance(answer, MotionEstimate):
+            self._abort("the retuner answered another question")
         elif answer is not None:
             warm_up = self._admission.admit(answer)
             if isinstance(warm_up, str):
@@ -366,7 +373,7 @@ class AdaptiveController:
         elif tried.full:
             self.laws.keep()
             self._accepted_window, self._trial_window = tried, self._accepted_window
-            self._relearn_normal()
+            self._tries = 0
             self._finish(RetuningState.RETUNED)
 
     def _undo(self) -> None:
@@ -401,7 +408,7 @@ class AdaptiveController:
         self._finish(RetuningState.REFUSED, *reasons)
 
     def _relearn_normal(self) -> None:
-        """Take the present ship and sea as normal for the accepted law."""
+        """Take the present ship as normal for the accepted law."""
         self._tries = 0
         self.laws.accepted.monitor.restart()
 

@@ -19,7 +19,7 @@ WARM_UP_CHUNK: Final = 50
 GAIN_FACTOR: Final = 30.0
 """Largest gains of a candidate, relative to the configured law's."""
 MOST_COEFFICIENTS: Final = 1e9
-"""Sum of a model's coefficients, or of gains on a reference: far beyond sense, and no overflow."""
+"""Sum of the gains on a reference: far beyond sense, and no overflow."""
 
 
 class Admission:
@@ -33,14 +33,11 @@ class Admission:
     configured : LinearLaw
         Reference for the bounds on the gains.
     history : SampleHistory
-        Samples for the warm-up and for the candidate's prediction model.
-    roll : int
-        Index of the roll among the outputs.
+        Samples for the warm-up.
     """
 
-    def __init__(self, configured: LinearLaw, history: SampleHistory, roll: int) -> None:
+    def __init__(self, configured: LinearLaw, history: SampleHistory) -> None:
         self._history = history
-        self._roll = roll
         self._sample_time_s = configured.sample_time_s
         on_commands, outputs = _gains(configured)
         self._most_on_commands = GAIN_FACTOR * max(1.0, on_commands)
@@ -48,18 +45,10 @@ class Admission:
 
     def admit(self, candidate: Candidate) -> "WarmUp | str":
         """Warm-up of the candidate's law, or the reason why it is not admitted."""
-        outputs, model = self._history.outputs, candidate.model
-        if candidate.law.output_gains.shape[1:] != (1, outputs):
+        if candidate.law.output_gains.shape[1:] != (1, self._history.outputs):
             return "the law is for other signals"
-        if (model.outputs, model.inputs) != (outputs, 1):
-            return "the law's model is for other signals"
-        if model.order > self._history.capacity:
-            return (
-                f"the law's model looks back {model.order} samples, {self._history.capacity} are "
-                "kept"
-            )
         try:
-            law = candidate.whole_law()
+            law, figures = candidate.whole_law(), candidate.summary.figures
         except ValueError as error:
             return str(error)
         if law.sample_time_s != self._sample_time_s:
@@ -67,12 +56,9 @@ class Admission:
         on_commands, on_outputs = _candidate_gains(candidate.law, law)
         if not (on_commands <= self._most_on_commands and on_outputs <= self._most_on_outputs):
             return "the law's gains are out of bounds"
-        if not max(map(_sum, (model.alpha, model.beta, candidate.law.reference_gains))) <= (
-            MOST_COEFFICIENTS
-        ):
-            return "the law's model is out of bounds"
-        monitor = ChangeMonitor(model, self._roll)
-        service = MonitoredLaw(law.controller(), monitor, candidate.summary)
+        if not _sum(candidate.law.reference_gains) <= MOST_COEFFICIENTS:
+            return "the law's gains on a reference are out of bounds"
+        service = MonitoredLaw(law.controller(), ChangeMonitor(figures), candidate.summary)
         return WarmUp(service, self._history)
 
 

@@ -1,6 +1,6 @@
-"""The retuner's answer: a candidate law, or a refusal with reasons.
+"""The retuner's answer: a candidate law, an estimate of waves and ship, or a refusal with reasons.
 
-Both pass between processes as plain bytes. Decoding executes no code and rejects anything else, and
+All pass between processes as plain bytes. Decoding executes no code and rejects anything else, and
 anything too large for the loop to read, to build and to step between two ticks.
 """
 
@@ -11,30 +11,26 @@ from typing import Final
 import numpy as np
 
 from utank_hil.arrays import FloatArray
-from utank_hil.control import ARX, LinearLaw, PredictiveLaw
+from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
 _CANDIDATE: Final = b"CANDIDAT"
 _REFUSAL: Final = b"REFUSAL "
+_ESTIMATE: Final = b"ESTIMATE"
 _REASONS_BYTES: Final = 4000
 _MOST_REASONS: Final = 20
 _MOST_OUTPUTS: Final = len(STATES)
-_HEAD: Final = 7
+_HEAD: Final = 6
 
 LONGEST_BYTES: Final = 8 * (
-    1
-    + _HEAD
-    + 9
-    + MOST_ORDER * (1 + _MOST_OUTPUTS)
-    + MOST_SAMPLES * _MOST_OUTPUTS
-    + MOST_ORDER * _MOST_OUTPUTS**2
-    + (MOST_ORDER + 1) * _MOST_OUTPUTS
+    1 + _HEAD + 9 + MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS
 )
-"""Of an answer that can be read: kind, head, summary, the law's gains and its model."""
+"""Of an answer that can be read: kind, head, summary and the law's gains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,24 +79,32 @@ class ModelSummary:
         """The configured tank as it was identified."""
         return replace(configured, damping_ratio=self.tank_damping_ratio)
 
+    @property
+    def figures(self) -> ShipFigures:
+        """The ship, for the change monitor; its stiffness is as uncertain as its square root is."""
+        return ShipFigures(
+            self.stiffness_nm_rad,
+            self.inertia_kg_m2,
+            self.damping_nms_rad,
+            2 * self.period_deviation,
+            self.period_deviation,
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A law that passed every check of the retuner, with its prediction model.
+    """A law that passed every check of the retuner.
 
     Attributes
     ----------
     law : PredictiveLaw
     washout_rad_s : float
         Corner frequency of the washout; 0 for none.
-    model : ARX
-        Prediction model, for the change monitor.
     summary : ModelSummary
     """
 
     law: PredictiveLaw
     washout_rad_s: float
-    model: ARX
     summary: ModelSummary
 
     def whole_law(self) -> LinearLaw:
@@ -121,14 +125,16 @@ class Refusal:
     reasons: tuple[str, ...]
 
 
-Answer = Candidate | Refusal
+Answer = Candidate | MotionEstimate | Refusal
 
 
 def answer_bytes(answer: Answer) -> bytes:
     """Encode an answer for another process; long reasons are cut."""
     if isinstance(answer, Refusal):
         return _REFUSAL + "\n".join(answer.reasons).encode(errors="replace")[:_REASONS_BYTES]
-    law, model = answer.law, answer.model
+    if isinstance(answer, MotionEstimate):
+        return _ESTIMATE + answer.numbers().tobytes()
+    law = answer.law
     order, inputs, outputs = law.output_gains.shape
     numbers: list[FloatArray | list[float]] = [
         [
@@ -136,7 +142,6 @@ def answer_bytes(answer: Answer) -> bytes:
             inputs,
             outputs,
             len(law.reference_gains),
-            model.order,
             answer.washout_rad_s,
             law.sample_time_s,
         ],
@@ -147,8 +152,6 @@ def answer_bytes(answer: Answer) -> bytes:
                 law.input_gains,
                 law.output_gains,
                 law.reference_gains,
-                model.alpha,
-                model.beta,
             )
         ),
     ]
@@ -167,11 +170,13 @@ def read_answer(data: bytes) -> Answer:
     if kind == _REFUSAL:
         reasons = content[:_REASONS_BYTES].decode(errors="replace").split("\n")
         return Refusal(tuple(reasons[:_MOST_REASONS]))
-    if kind != _CANDIDATE or len(content) % 8:
-        raise ValueError("the answer is neither a candidate nor a refusal")
+    if kind not in (_CANDIDATE, _ESTIMATE) or len(content) % 8:
+        raise ValueError("the answer is no candidate, estimate or refusal")
+    if kind == _ESTIMATE:
+        return MotionEstimate.of_numbers(np.frombuffer(content))
     values = _Values(np.frombuffer(content))
     order, inputs, outputs = values.size(MOST_ORDER), values.size(1), values.size(_MOST_OUTPUTS)
-    horizon, model_order = values.size(MOST_SAMPLES), values.size(MOST_ORDER)
+    horizon = values.size(MOST_SAMPLES)
     washout_rad_s, sample_time_s = values.take(2).tolist()
     summary = ModelSummary(*values.take(len(fields(ModelSummary))).tolist())
     law = PredictiveLaw(
@@ -180,15 +185,10 @@ def read_answer(data: bytes) -> Answer:
         values.array(horizon, inputs, outputs),
         sample_time_s,
     )
-    model = ARX(
-        values.array(model_order, outputs, outputs),
-        values.array(model_order + 1, outputs, inputs),
-        sample_time_s,
-    )
     values.end()
     if not washout_rad_s >= 0:
         raise ValueError(f"the answer's washout is {washout_rad_s} rad/s")
-    return Candidate(law, washout_rad_s, model, summary)
+    return Candidate(law, washout_rad_s, summary)
 
 
 class _Values:

@@ -1,80 +1,69 @@
-"""Detects a change of the ship by the one-step prediction error of the law's model.
+"""Whether the ship is still the one that a law was made for.
 
-The measure is the RMS of the roll's prediction error over the RMS of the roll. Wave height alone
-does not change this ratio. A change of loading does: the model fits the motion less, and the roll
-itself becomes larger or smaller. The normal ratio is learned first, in the present sea. A sea of
-another wavelength counts as a change as well, and costs an identification.
+Compares the ship that the motion tells (`MotionEstimate`) with the law's, whatever the sea is. A
+difference counts where it exceeds three standard deviations, and in either direction, and where the
+estimate before it was of the same ship.
 """
 
 import math
 from typing import Final
 
-import numpy as np
+from utank_hil.canbus import Verdict
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
-from utank_hil.arrays import FloatArray
-from utank_hil.control import ARX
-from utank_hil.retuning.history import SampleHistory
-
-_MEMORY_S: Final = 300.0
-_LEARNING_S: Final = 600.0
-_LEAST_ROLL_RAD: Final = 0.005  # below, sensor noise dominates the error
-_MOST_ERROR_RAD: Final = 10.0  # beyond any roll angle; keeps the sums finite
+SIGNIFICANT: Final = 3.0
+"""Standard deviations; less is no difference."""
 
 
 class ChangeMonitor:
-    """Compares a model's present prediction error with the normal one.
+    """Compares the present ship with a law's.
 
     Parameters
     ----------
-    model : ARX
-        One input.
-    roll : int
-        Index of the roll among its outputs.
+    ship : ShipFigures
+        The ship that the law was designed for.
 
     Attributes
     ----------
     change : float
-        Factor, 1 or more, between the present and the normal ratio; 1 while learning.
+        Factor, 1 or more, between the roll periods, or between the roots of the stiffnesses if
+        that is larger; 1 while no difference is significant.
     """
 
-    def __init__(self, model: ARX, roll: int) -> None:
-        taps = np.concatenate([model.beta[1:, roll], model.alpha[:, roll]], axis=1)
-        self._taps = np.ascontiguousarray(taps[::-1]).ravel()  # oldest first
-        self._direct = float(model.beta[0, roll, 0])
-        self._order = model.order
-        self._roll = roll
-        self._smoothing = 1.0 - math.exp(-model.sample_time_s / _MEMORY_S)
-        self._learning = round(_LEARNING_S / model.sample_time_s)
-        self.restart()
-
-    def restart(self) -> None:
-        """Discard the normal ratio and learn it again."""
-        self._samples = 0
-        self._error_square = self._roll_square = 0.0
-        self._normal = 0.0
+    def __init__(self, ship: ShipFigures) -> None:
+        self._ship = ship
+        self._latest: ShipFigures | None = None
         self.change = 1.0
 
-    def predict(self, history: SampleHistory, command_pa: float) -> float:
-        """One-step prediction of the roll in rad, for the command since the last sample."""
-        window: FloatArray = history.latest(self._order).ravel()
-        return float(self._taps @ window) + self._direct * command_pa
+    def watch(self, estimate: MotionEstimate) -> None:
+        """Take a new estimate; one that does not tell the ship changes nothing."""
+        now, before = estimate.ship, self._latest
+        if estimate.of_ship is not Verdict.GOOD or now is None:
+            return
+        self._latest = now
+        if before is not None and _factor(now, before) == 1:
+            self.change = _factor(now, self._ship)
 
-    def watch(self, history: SampleHistory, command_pa: float, roll_rad: float) -> None:
-        """Update with a new sample that is not in `history` yet."""
-        if history.count < self._order:
-            return
-        error = roll_rad - self.predict(history, command_pa)
-        if not abs(error) < _MOST_ERROR_RAD:  # also for NaN: an unstable model may overflow
-            error = _MOST_ERROR_RAD
-        self._samples += 1
-        # arithmetic mean at first, then exponential forgetting
-        weight = max(self._smoothing, 1.0 / self._samples)
-        self._error_square += weight * (error * error - self._error_square)
-        self._roll_square += weight * (roll_rad * roll_rad - self._roll_square)
-        if self._roll_square < _LEAST_ROLL_RAD**2 or self._error_square == 0.0:
-            return
-        ratio = math.sqrt(self._error_square / self._roll_square)
-        if self._normal > 0:
-            self.change = max(ratio / self._normal, self._normal / ratio)
-        elif self._samples >= self._learning:
-            self._normal = ratio
+    def restart(self) -> None:
+        """Take the latest ship for the law's own."""
+        self._ship = self._latest or self._ship
+        self.change = 1.0
+
+
+def _factor(now: ShipFigures, then: ShipFigures) -> float:
+    """Factor, 1 or more, by which two ships differ; 1 if that is not significant."""
+    by_period = _significant(
+        now.roll_period_s / then.roll_period_s,
+        math.hypot(now.period_deviation, then.period_deviation),
+    )
+    by_stiffness = _significant(
+        math.sqrt(now.stiffness_nm_rad / then.stiffness_nm_rad),
+        math.hypot(now.stiffness_deviation, then.stiffness_deviation) / 2,
+    )
+    return max(by_period, by_stiffness)
+
+
+def _significant(ratio: float, deviation: float) -> float:
+    """The ratio as a factor of 1 or more; 1 if it is within the deviations."""
+    change = abs(math.log(ratio))
+    return math.exp(change) if change > SIGNIFICANT * deviation else 1.0

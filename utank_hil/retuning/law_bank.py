@@ -26,7 +26,7 @@ _NOTHING: Final = np.zeros(1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MonitoredLaw:
-    """A law's controller, with the monitor of how well its model fits the ship.
+    """A law's controller, with the monitor of whether the ship is still the law's.
 
     Attributes
     ----------
@@ -53,6 +53,8 @@ class LawBank:
     ----------
     accepted : MonitoredLaw
     on_trial, previous : MonitoredLaw or None
+    stepped : tuple of MonitoredLaw
+        Every law of the bank, once.
     """
 
     def __init__(self, configured: MonitoredLaw) -> None:
@@ -61,7 +63,7 @@ class LawBank:
         self.previous: MonitoredLaw | None = None
         self._fading: MonitoredLaw | None = None
         self._fade = FADE_SAMPLES
-        self._stepped: tuple[MonitoredLaw, ...] = (configured,)
+        self.stepped: tuple[MonitoredLaw, ...] = (configured,)
 
     @property
     def active(self) -> MonitoredLaw:
@@ -98,7 +100,7 @@ class LawBank:
         """
         active = self.active
         command = accepted = outgoing = _NOTHING
-        for law in self._stepped:
+        for law in self.stepped:
             output = law.controller.step(y, reference)
             if law is active:
                 command = output
@@ -121,14 +123,14 @@ class LawBank:
 
     def applied(self, u: FloatArray) -> None:
         """Give every law the command that was applied."""
-        for law in self._stepped:
+        for law in self.stepped:
             law.controller.applied(u)
 
     def reset(self) -> None:
         """Reset every law, and drop a law on trial."""
         self.on_trial = None
         self._stop_fading()
-        for law in self._stepped:
+        for law in self.stepped:
             law.controller.reset()
 
     def _fade_from(self, outgoing: MonitoredLaw | None) -> None:
@@ -146,4 +148,4 @@ class LawBank:
     def _collect(self) -> None:
         """Collect the laws to step, each once."""
         every = (self.accepted, self.on_trial, self.previous, self._fading)
-        self._stepped = tuple({id(law): law for law in every if law is not None}.values())
+        self.stepped = tuple({id(law): law for law in every if law is not None}.values())

@@ -18,7 +18,6 @@ from utank_hil.control import (
     LinearLaw,
     PredictiveDesign,
     PredictiveLaw,
-    wave_arx,
 )
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.identification import (
@@ -32,7 +31,7 @@ from utank_hil.identification import (
 from utank_hil.identification.acceptance import ModelLimits, model_objections
 from utank_hil.identification.lag_regression import segment_bounds
 from utank_hil.identification.ship_fit import ShipFit, fit_ship
-from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
+from utank_hil.retuning import Candidate, ModelSummary, Refusal
 from utank_hil.retuning.record_length import (
     LAGS,
     LEAST_PREDICTIONS,
@@ -106,7 +105,7 @@ class Identification:
         return dataclasses.replace(task.plant, ship=self.fit.ship, tank=self.fit.tank)
 
 
-def retune(record: FloatArray, task: RetuningTask) -> Answer:
+def retune(record: FloatArray, task: RetuningTask) -> Candidate | Refusal:
     """Identify the ship, design a law and check it.
 
     Parameters
@@ -129,7 +128,7 @@ def retune(record: FloatArray, task: RetuningTask) -> Answer:
     return judge(record, found, task)
 
 
-def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
+def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Candidate | Refusal:
     """Judge the result of `identify`, design a law and check it: the second half of `retune`."""
     objections = model_objections(found.validation, found.fit, task.limits)
     if objections:
@@ -213,7 +212,9 @@ def _refuse_unusable(part: FloatArray) -> None:
         )
 
 
-def _design_and_check(record: FloatArray, found: Identification, task: RetuningTask) -> Answer:
+def _design_and_check(
+    record: FloatArray, found: Identification, task: RetuningTask
+) -> Candidate | Refusal:
     """A law for the identified ship, if it passes every check."""
     plant = found.plant(task)
     design, measured = task.design, task.design.predictor.measured
@@ -229,7 +230,6 @@ def _design_and_check(record: FloatArray, found: Identification, task: RetuningT
         return Refusal(objections)
     return Candidate(
         *_split_washout(law),
-        wave_arx(design.predictor, plant),
         _summary(found, report, trial),
     )
 

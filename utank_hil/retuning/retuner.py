@@ -9,6 +9,9 @@ from utank_hil.retuning.answer import Answer, answer_bytes, read_answer
 RetuneFunction = Callable[[FloatArray], Answer]
 """From a record, shape (N, 1 + m), rows (command, outputs...), to an answer."""
 
+Work = tuple[RetuneFunction, tuple[int, int]]
+"""What is done with a record, and rows and columns of the longest one."""
+
 
 class Retuner(Protocol):
     """Takes records and gives answers, some time later or never; the loop is not kept waiting."""

@@ -5,9 +5,9 @@ connection, so the loop never waits. If the retuner hangs, dies or writes garbag
 arrives or the message is refused, and the controller keeps its law. There are two processes:
 
     watchdog   started before the loop; forks the worker, again whenever it has died or hangs
-    worker     stores heartbeats while idle, and answers requests
+    worker     stores heartbeats while idle, and answers the requests of every desk
 
-A retuning begins only while the worker's heartbeat is recent.
+A request is made only while the worker's heartbeat is recent.
 """
 
 import multiprocessing
@@ -17,56 +17,42 @@ import time
 from contextlib import suppress
 from typing import Final
 
-import numpy as np
-
-from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
 from utank_hil.one_thread import one_thread_each
-from utank_hil.retuning.answer import LONGEST_BYTES, Answer, Refusal, read_answer
-from utank_hil.retuning.mailbox import Mailbox
-from utank_hil.retuning.retuner import RetuneFunction
+from utank_hil.retuning.desk import Desk
+from utank_hil.retuning.retuner import Work
 from utank_hil.retuning.worker import run_watchdog
 
 _START_S: Final = 30.0
-_ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
 _HANGS_S: Final = 600.0
 _END_S: Final = 2.0
 
 
 class RetunerProcess(Closing):
-    """A `Retuner` in processes of its own; start it before the loop.
+    """One desk for each kind of work, served in a process of its own; start it before the loop.
 
     It is ready when the constructor returns. If it does not start within half a minute, the
-    constructor returns as well; `alive` is then False and no retuning begins.
+    constructor returns as well; no desk is alive then and nothing is asked.
 
     Parameters
     ----------
-    retune : RetuneFunction
-        Importable in another process (a function, or a `functools.partial` of one).
-    longest_record : tuple of int
-        Rows and columns of the longest record.
+    *works : Work
+        Importable in another process (functions, or `functools.partial` of them).
     hangs_after_s : float
         A worker that is busy for longer is killed and replaced.
 
     Attributes
     ----------
+    desks : tuple of Desk
+        In the order of `works`.
     pid : int
         Process id of the watchdog, and id of the process group of both.
     """
 
-    def __init__(
-        self,
-        retune: RetuneFunction,
-        longest_record: tuple[int, int],
-        hangs_after_s: float = _HANGS_S,
-    ) -> None:
-        rows, columns = longest_record
-        self._requests = Mailbox(8 * (rows * columns + 1))
-        self._answers = Mailbox(LONGEST_BYTES)
+    def __init__(self, *works: Work, hangs_after_s: float = _HANGS_S) -> None:
+        self.desks = tuple(Desk(work) for work in works)
         self._process = multiprocessing.get_context("spawn").Process(
-            target=run_watchdog,
-            args=(retune, self._requests, self._answers, os.getpid(), hangs_after_s),
-            daemon=True,
+            target=run_watchdog, args=(self.desks, os.getpid(), hangs_after_s), daemon=True
         )
         with one_thread_each():
             self._process.start()
@@ -80,21 +66,7 @@ class RetunerProcess(Closing):
     @property
     def alive(self) -> bool:
         """Whether the worker's heartbeat is recent."""
-        return abs(time.monotonic_ns() - self._answers.beat_ns) < _ALIVE_NS
-
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:  # noqa: ARG002
-        """Post a record."""
-        self._requests.post(number, np.float64(record.shape[1]).tobytes() + record.tobytes())
-
-    def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
-        """The answer, if it has arrived; a message that cannot be decoded is a refusal."""
-        data = self._answers.read(number)
-        if data is None:
-            return None
-        try:
-            return read_answer(data)
-        except ValueError as error:
-            return Refusal((f"the retuner answered nonsense: {error}",))
+        return self.desks[0].alive
 
     def close(self) -> None:
         """End both processes; idempotent."""

@@ -79,8 +79,8 @@ class RetuningSettings:
     every_s : float or None
         Time between two scheduled retunings; None: no schedule.
     change_factor : float or None
-        Retune when the ratio of the model's prediction error to the roll has changed by this
-        factor since the law was accepted (`ChangeMonitor`); None: not monitored.
+        Retune when the ship that the motion tells differs from the law's by this factor in roll
+        period, or in the root of the stiffness (`ChangeMonitor`); None: not monitored.
     trial_s : float
         Length of a trial and of the old law's window that it is compared with: from
         `EARLIEST_VERDICT_S` to one hour, in which a sea may be taken as stationary.

@@ -154,6 +154,6 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
         found = judging.all_harming(seen, limits)
     else:
         found = judging.all_stopping(seen, limits)
-    found |= {supervisor.fault, law_fault}
+    found |= judging.all_warning(seen, limits) | {supervisor.fault, law_fault}
     found.discard(Fault.NONE)
     return found

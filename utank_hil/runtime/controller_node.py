@@ -20,11 +20,14 @@ from utank_hil.canbus import (
     PassiveTwin,
     PumpCommand,
     RetuningState,
+    SeaEstimate,
+    ShipEstimate,
 )
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
 from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
+from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
@@ -96,6 +99,8 @@ class ControllerNode:
     supervisor : Supervisor
     settings : ControllerSettings
     catalogue : Catalogue
+    estimator : Estimator, optional
+        Tells waves and ship from the motion.
     statistics : LoopStatistics, optional
         Of the loop that drives this node, to be shown in the telemetry.
     commands : tuple of str
@@ -128,6 +133,8 @@ class ControllerNode:
     monitors : Monitors or None
         As given.
     alarms : AlarmList
+    estimated : EstimateFigures
+        What is known of waves and ship.
     command_pa : float
         Pressure commanded.
     statistics : LoopStatistics
@@ -160,6 +167,7 @@ class ControllerNode:
         valve: ValveCommander | None = None,
         monitors: Monitors | None = None,
         retuning: AdaptiveController | None = None,
+        estimator: Estimator | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
         sink_every: int = 1,
@@ -173,6 +181,8 @@ class ControllerNode:
         self._controller = controller
         self._starts_anew = controller if isinstance(controller, StartsAnew) else None
         self._retuning = retuning
+        self._estimator = estimator
+        self.estimated = EstimateFigures() if estimator is None else estimator.figures
         self._measure = measure
         self._limiter = limiter
         self.supervisor = supervisor
@@ -204,6 +214,8 @@ class ControllerNode:
         self._commands = catalogue.transmitter(PumpCommand)
         self._status = catalogue.transmitter(ControllerStatus)
         self._twin = catalogue.transmitter(PassiveTwin)
+        self._sea = catalogue.transmitter(SeaEstimate)
+        self._ship = catalogue.transmitter(ShipEstimate)
         self._alarm_frames = catalogue.transmitter(Alarm)
         self.alarms = AlarmList()
         self._alarming = False
@@ -215,6 +227,8 @@ class ControllerNode:
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
+        self._estimate_schedule = Schedule(round(SAMPLE_TIME_S / TICK_S) * TICK_NS)
+        self._figures_schedule = Schedule(self._sea.cycle_ns)
         self._started = self._answered = False
         self.start_ns = self.last_ns = 0
         self._observed_cycles = 0
@@ -342,10 +356,30 @@ class ControllerNode:
             )
         if seen.reset_edge:
             self._drive_sequence.request_reset()
+        if self._estimator is not None and self._estimate_schedule.due(now_ns):
+            self._look_at_motion(self._estimator, now_ns)
         if self._valve is not None:
             self._valve.observe(self.inbox, seen, now_ns)
             if seen.reset_edge:
                 self._valve.request_reset()
+
+    def _look_at_motion(self, estimator: Estimator, now_ns: int) -> None:
+        """Keep a sample of the motion, and note what it tells of waves and ship."""
+        inbox, seen = self.inbox, self.seen
+        estimate = estimator.sample(
+            now_ns,
+            inbox.pressure_pa,
+            (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m),
+            fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
+        )
+        if estimate is None:
+            return
+        seen.gm_low = self.estimated.gm_low
+        if self._retuning is not None:
+            self._retuning.note(estimate)
+        if self._event_sink is not None:
+            words = self.estimated.words()
+            self._event_sink(RetuningEvent(now_ns, self.retuning_state, words), self.start_ns)
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
@@ -460,6 +494,9 @@ class ControllerNode:
             )
             if self.monitors is not None:
                 frames.append(self._twin.frame(self.monitors.twin_message()))
+        if self._estimator is not None and self._figures_schedule.due(now_ns):
+            frames.append(self._sea.frame(self.estimated.sea_message()))
+            frames.append(self._ship.frame(self.estimated.ship_message()))
         return frames
 
     def _update_alarms(self, now_ns: int) -> None:

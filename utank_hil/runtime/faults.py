@@ -33,6 +33,8 @@ class Reaction(Enum):
     """Judged when arming begins."""
     GIVE_UP = "arming given up"
     """Judged while the drive is being enabled."""
+    WARN = "none"
+    """An alarm in every mode, and no more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -431,6 +433,17 @@ FAULTS: Final = (
             ),
         ),
         law_limit="roll_rad",
+    ),
+    _row(
+        Fault.STABILITY_LOW,
+        "The ship's metacentric height may be below the limit of her stability booklet.",
+        "Compare with the loading computer; take on ballast or remove weight from above.",
+        Condition(
+            Reaction.WARN,
+            "interval of the estimated GM, two standard deviations, reaches below the vessel's "
+            "least_gm_m",
+            lambda seen, _: seen.gm_low,
+        ),
     ),
     _row(
         Fault.OVERRUN,

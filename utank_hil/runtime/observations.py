@@ -80,6 +80,8 @@ class Observations:
         The law raised an error, or its last answer is not finite.
     found : int
         What the monitors found, bits of `Finding`.
+    gm_low : bool
+        The metacentric height may be below the limit of the stability booklet.
     command_pa : float
         Pressure last commanded.
     requested_mode : Mode
@@ -118,6 +120,7 @@ class Observations:
     overruns_in_ten: int = 0
     law_failed: bool = False
     found: int = 0
+    gm_low: bool = False
     command_pa: float = 0.0
     requested_mode: Mode = Mode.STANDBY
     arm_edge: bool = False
@@ -140,7 +143,7 @@ class Observer:
     Attributes
     ----------
     seen : Observations
-        `law_failed`, `found` and `command_pa` are the node's own to set.
+        `law_failed`, `found`, `gm_low` and `command_pa` are the node's own to set.
     """
 
     def __init__(self, inbox: Inbox, bit_rate: int, command_cycle_ns: int) -> None:

@@ -23,6 +23,18 @@ _SOURCES: Final = {
     "twin_roll_rad": "twin_roll_rad",
     "roll_rms_rad": "roll_rms_rad",
     "twin_roll_rms_rad": "twin_roll_rms_rad",
+    "sea_verdict": "estimated.of_sea",
+    "significant_height_m": "estimated.hs_m",
+    "peak_period_s": "estimated.tp_s",
+    "wave_moment_rms_rad": "estimated.moment_rms_rad",
+    "wave_moment_deviation": "estimated.moment_deviation",
+    "sea_age_s": "estimated.sea_age_s",
+    "ship_verdict": "estimated.of_ship",
+    "roll_period_s": "estimated.roll_period_s",
+    "roll_period_deviation_s": "estimated.roll_period_deviation_s",
+    "gm_m": "estimated.gm_m",
+    "gm_deviation_m": "estimated.gm_deviation_m",
+    "ship_age_s": "estimated.ship_age_s",
 }
 """Each signal in SI units, its unit in its name, and the attribute of `ControllerNode` it shows.
 

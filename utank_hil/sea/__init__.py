@@ -6,6 +6,7 @@ from utank_hil.sea.measured import MeasuredSpectra
 from utank_hil.sea.models import ittc, jonswap, pierson_moskowitz
 from utank_hil.sea.ndbc import load_ndbc
 from utank_hil.sea.sea import EffectiveSlope, Sea
+from utank_hil.sea.slope_spectrum import SlopeSpectrum
 from utank_hil.sea.spectrum import Spectrum
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "Harmonics",
     "MeasuredSpectra",
     "Sea",
+    "SlopeSpectrum",
     "Spectrum",
     "encounter_frequency",
     "ittc",

@@ -2,7 +2,7 @@
 
 A node without I/O is a function of what it is handed, so these records, in order, are all that its
 behaviour follows from beside its configuration: frames received and sent, ticks, bus errors, frames
-of other kinds, and the retuner's answers.
+of other kinds, and the answers of retuner and estimator.
 """
 
 import struct
@@ -64,6 +64,9 @@ class Kind(IntEnum):
     """A piece of the retuner's answer of `number` bytes, when the controller took it."""
     LOST = 10
     """`number` rows were lost before they could be written."""
+    ESTIMATOR_ALIVE = 11
+    ESTIMATE = 12
+    """As ALIVE and ANSWER, of the estimator of sea and ship."""
 
 
 def ring_rows(records: bytes) -> Iterator[FloatArray]:

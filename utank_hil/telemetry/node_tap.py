@@ -4,7 +4,7 @@ They stand between the runner and the node, and between the controller and its r
 is changed on the way, so the node does the same with them as without.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 from utank_hil.arrays import FloatArray
@@ -29,18 +29,16 @@ class NodeTap:
     ----------
     node : ControllerNode
     sink : Sink
-    retuner : RetunerTap, optional
+    taps : sequence of RetunerTap
         Whose records belong among the node's.
     """
 
-    def __init__(
-        self, node: ControllerNode, sink: Sink, retuner: "RetunerTap | None" = None
-    ) -> None:
+    def __init__(self, node: ControllerNode, sink: Sink, taps: "Sequence[RetunerTap]" = ()) -> None:
         self.name = node.name
         self.period_ns = node.period_ns
         self._node = node
         self._sink = sink
-        self._retuner = retuner
+        self._taps = taps
         self._records: list[bytes] = []
         self._started = False
 
@@ -66,8 +64,8 @@ class NodeTap:
             self._started = True
             self._note(Kind.STARTED, now_ns, bytes([self._node.statistics.real_time]))
         frames = list(self._node.tick(now_ns))
-        if self._retuner is not None:
-            self._records += self._retuner.take(now_ns)
+        for tap in self._taps:
+            self._records += tap.take(now_ns)
         self._records.append(_PACK(_TICK, 0, 0, 0, now_ns, b""))
         self._hand_on(frames, now_ns)
         return frames
@@ -90,16 +88,26 @@ class NodeTap:
         self._records.clear()
 
 
+def estimator_tap(estimating: Retuner) -> "RetunerTap":
+    """A tap of the estimator of sea and ship."""
+    return RetunerTap(estimating, Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE)
+
+
 class RetunerTap:
-    """A retuner whose answers are written down.
+    """A retuner, or an estimator, whose answers are written down.
 
     Parameters
     ----------
     retuner : Retuner
+    alive, answer : Kind
+        Of its records.
     """
 
-    def __init__(self, retuner: Retuner) -> None:
+    def __init__(
+        self, retuner: Retuner, alive: Kind = Kind.ALIVE, answer: Kind = Kind.ANSWER
+    ) -> None:
         self._retuner = retuner
+        self._kinds = int(alive), int(answer)
         self._alive: list[bool] = []
         self._answers: list[bytes] = []
 
@@ -122,10 +130,11 @@ class RetunerTap:
 
     def take(self, now_ns: int) -> list[bytes]:
         """Records of what was asked and answered since the last call."""
-        records = [_PACK(Kind.ALIVE, 1, 0, 0, now_ns, bytes([alive])) for alive in self._alive]
+        alive_kind, answer_kind = self._kinds
+        records = [_PACK(alive_kind, 1, 0, 0, now_ns, bytes([alive])) for alive in self._alive]
         for data in self._answers:
             pieces = [data[at : at + PAYLOAD_BYTES] for at in range(0, len(data), PAYLOAD_BYTES)]
-            records += [_PACK(Kind.ANSWER, len(p), 0, len(data), now_ns, p) for p in pieces]
+            records += [_PACK(answer_kind, len(p), 0, len(data), now_ns, p) for p in pieces]
         self._alive.clear()
         self._answers.clear()
         return records

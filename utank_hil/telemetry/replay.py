@@ -36,7 +36,7 @@ class Difference:
     time_s : float
         Since its first tick.
     message, signal : str
-        Where; the message is "retuner" if the controller and its retuner said something else.
+        Where; the message is "retuner" or "estimator" if the controller asked it something else.
     recorded, replayed : str
     """
 
@@ -115,9 +115,9 @@ class RecordedRetuner:
         self._answer.clear()
         return answer
 
-    def take(self, kind: int, data: bytes) -> None:
-        """Take a record for the next tick."""
-        if kind == Kind.ALIVE:
+    def take(self, data: bytes, *, alive: bool) -> None:
+        """Take a record for the next tick: of the life of the retuner, or of its answer."""
+        if alive:
             self._alive.append(bool(data[0]))
         else:
             self._answer += data
@@ -139,7 +139,12 @@ def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
 
 
 def replay(
-    entries: Iterable[Entry], config: ControllerConfig, law: BuiltLaw, *, retuner: bool = False
+    entries: Iterable[Entry],
+    config: ControllerConfig,
+    law: BuiltLaw,
+    *,
+    retuner: bool = False,
+    estimating: bool = False,
 ) -> ReplayResult:
     """Hand recorded entries to a new controller and compare what it sends.
 
@@ -150,13 +155,17 @@ def replay(
     config : ControllerConfig
     law : BuiltLaw
         Of the configuration.
-    retuner : bool
-        Whether the controller had a retuner.
+    retuner, estimating : bool
+        Whether the controller had a retuner, and an estimator of sea and ship.
     """
-    answers = RecordedRetuner()
+    answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()
     node = build_controller_node(
-        config, law, retuner=answers if retuner else None, statistics=statistics
+        config,
+        law,
+        retuner=answers if retuner else None,
+        estimating=estimates if estimating else None,
+        statistics=statistics,
     )
     result = ReplayResult()
     comparison = _Comparison(result)
@@ -177,7 +186,8 @@ def replay(
             sent, waiting = list(node.tick(time_ns)), True
             comparison.at(result.ticks, (time_ns - node.start_ns) * 1e-9)
             result.ticks += 1
-            comparison.retuner(answers)
+            comparison.retuner("retuner", answers)
+            comparison.retuner("estimator", estimates)
         elif kind == Kind.STOP:
             sent, waiting = list(node.stop(time_ns)), True
         elif kind == Kind.OTHERS:
@@ -187,7 +197,9 @@ def replay(
         elif kind == Kind.STARTED:
             statistics.real_time = bool(data[0])
         elif kind in (Kind.ALIVE, Kind.ANSWER):
-            answers.take(kind, data)
+            answers.take(data, alive=kind == Kind.ALIVE)
+        elif kind in (Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE):
+            estimates.take(data, alive=kind == Kind.ESTIMATOR_ALIVE)
         elif kind == Kind.LOST:
             result.lost_rows += number
     if waiting:
@@ -207,11 +219,11 @@ class _Comparison:
         """Go on to a tick."""
         self._tick, self._time_s = tick, time_s
 
-    def retuner(self, answers: RecordedRetuner) -> None:
-        """Compare what the controller asked of its retuner."""
+    def retuner(self, who: str, answers: RecordedRetuner) -> None:
+        """Compare what the controller asked of its retuner, or of its estimator."""
         left = answers.left_over()
         if answers.astray or left:
-            self._note("retuner", "asked", left or _NOTHING, answers.astray or _NOTHING)
+            self._note(who, "asked", left or _NOTHING, answers.astray or _NOTHING)
             answers.astray = ""
 
     def compare(self, recorded: list[Frame], sent: list[Frame]) -> None:

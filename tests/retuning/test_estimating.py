@@ -1,0 +1,88 @@
+"""The estimator's work: what it tells of a record, and when it says that it can't."""
+
+import numpy as np
+import pytest
+from rolling_ship import PLANT, SAMPLE_TIME_S, SHIP, loaded, motion_in, wave_moment_nm
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Verdict
+from utank_hil.dynamics import RollShip
+from utank_hil.retuning.estimating import EstimateTask, estimate
+from utank_hil.sea import jonswap
+
+TASK = EstimateTask(PLANT, SAMPLE_TIME_S, 0.5)
+MOMENT_NM = wave_moment_nm(jonswap(4.0, 10.0), 1300.0, seed=3)
+
+
+def request(motion: FloatArray, known: RollShip = SHIP) -> FloatArray:
+    figures = [known.stiffness_nm_rad, known.inertia_kg_m2, known.damping_nms_rad, 0.0]
+    record = np.column_stack([np.zeros(len(motion)), motion])
+    return np.vstack([figures, record])
+
+
+def test_ship_and_sea_are_told_while_the_pump_works():
+    ship = loaded(14.4)
+    found = estimate(request(motion_in(MOMENT_NM, ship)[500:]), TASK)
+    assert (found.of_sea, found.of_ship) == (Verdict.GOOD, Verdict.GOOD)
+    assert found.ship is not None
+    assert found.ship.roll_period_s == pytest.approx(14.4, rel=0.03)
+    assert found.ship.stiffness_nm_rad == pytest.approx(ship.stiffness_nm_rad, rel=0.05)
+    # the moment is that on the configured ship, and the height is given per this one's stiffness
+    factor = SHIP.stiffness_nm_rad / ship.stiffness_nm_rad
+    assert found.hs_m == pytest.approx(4.0 * factor, rel=0.15)
+    assert found.tp_s == pytest.approx(10.0, rel=0.15)
+    assert found.duration_s == pytest.approx(1200.0)
+
+
+def test_a_ship_loaded_within_the_record_is_the_present_one():
+    motion = motion_in(MOMENT_NM)
+    loaded_m = motion_in(MOMENT_NM, loaded(14.4))
+    half = len(motion) - 3150
+    found = estimate(request(np.vstack([motion[500:half], loaded_m[half:]])), TASK)
+    assert found.of_ship is Verdict.GOOD
+    assert found.ship is not None
+    assert found.ship.roll_period_s == pytest.approx(14.4, rel=0.05)
+    assert found.duration_s == pytest.approx(600.0, rel=0.1)
+
+
+def test_with_a_passive_tank_the_waves_are_those_of_the_known_ship():
+    ship = loaded(10.0)
+    found = estimate(request(motion_in(MOMENT_NM, ship, 0.0)[500:], ship), TASK)
+    assert (found.of_sea, found.of_ship) == (Verdict.GOOD, Verdict.UNCERTAIN)
+    assert found.ship is not None
+    assert found.ship.roll_period_s == pytest.approx(10.0, rel=0.05)
+    factor = SHIP.stiffness_nm_rad / ship.stiffness_nm_rad
+    assert found.hs_m == pytest.approx(4.0 * factor, rel=0.15)
+
+
+def test_with_a_passive_tank_and_another_ship_than_the_known_one_the_sea_is_uncertain():
+    found = estimate(request(motion_in(MOMENT_NM, loaded(8.8), 0.0)[500:]), TASK)
+    assert (found.of_sea, found.of_ship) == (Verdict.UNCERTAIN, Verdict.UNCERTAIN)
+
+
+def test_lost_samples_are_no_harm_and_many_are_a_short_record():
+    motion = motion_in(MOMENT_NM)[500:]
+    whole = estimate(request(motion), TASK)
+    lost = np.random.default_rng(1).random(len(motion)) < 0.03
+    few = estimate(request(np.where(lost[:, None], np.nan, motion)), TASK)
+    assert few.hs_m == pytest.approx(whole.hs_m, rel=0.02)
+    lost = np.random.default_rng(1).random(len(motion)) < 0.1
+    many = estimate(request(np.where(lost[:, None], np.nan, motion)), TASK)
+    assert (many.of_sea, many.of_ship) == (Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
+
+
+@pytest.mark.parametrize(
+    ("motion", "verdict"),
+    [
+        (np.full((6000, 3), np.nan), Verdict.RECORD_SHORT),
+        (motion_in(MOMENT_NM)[:2000], Verdict.RECORD_SHORT),
+        (np.zeros((6000, 3)), Verdict.MOTION_SMALL),
+        (
+            np.random.default_rng(1).standard_normal((3200, 3)) * [2e-4, 5e-4, 3.5e-3],
+            Verdict.MOTION_SMALL,
+        ),
+    ],
+)
+def test_what_tells_nothing_is_named(motion: FloatArray, verdict: Verdict):
+    found = estimate(request(motion), TASK)
+    assert (found.of_sea, found.of_ship, found.waves) == (verdict, verdict, None)

@@ -1,0 +1,105 @@
+"""A spectrum as a Gaussian process of its logarithm, from estimates that scatter.
+
+The spectrum S is sought. An estimate I scatters like chi-square with 2 K degrees of freedom about S
+plus a known noise n, so its likelihood is (S + n)^-K exp(-K I / (S + n)), after Whittle. The prior
+says that log S is smooth over the logarithm of frequency, and nothing of its level. Its mode is
+found by Fisher scoring, the likelihood of the whole by Laplace's approximation there (Rasmussen and
+Williams, Gaussian Processes for Machine Learning, 3.4).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
+
+from utank_hil.arrays import FloatArray
+
+_SPREAD = 2.0  # standard deviation of the logarithm about its level: a factor of 7
+_LENGTH = 0.3  # Matern's length over the logarithm of frequency: a third of an octave
+_LEVEL_SPREAD = 5.0
+_START = 0.1  # of the mean density: the level about which the logarithm is spread
+_STEPS = 60
+_CONVERGED = 1e-4
+_TINY = 1e-9
+
+
+class LogSpectrum(NamedTuple):
+    """The logarithm of a spectrum.
+
+    Attributes
+    ----------
+    log_likelihood : float
+        Of the estimates, whatever the spectrum; without its constants.
+    mean : ndarray, shape (F,)
+        Logarithm of the density at the mode.
+    covariance : ndarray, shape (F, F)
+    """
+
+    log_likelihood: float
+    mean: FloatArray
+    covariance: FloatArray
+
+
+class SmoothSpectrum:
+    """Finds the spectrum behind estimates at given frequencies.
+
+    Parameters
+    ----------
+    omega_rad_s : ndarray, shape (F,)
+        Frequencies, positive; the estimates there are taken as independent.
+    tapers : int
+        Averages K in each estimate.
+    """
+
+    def __init__(self, omega_rad_s: FloatArray, tapers: int) -> None:
+        place = np.log(omega_rad_s)
+        distance = np.sqrt(3) * np.abs(place[:, None] - place) / _LENGTH
+        self._prior = _SPREAD**2 * (1 + distance) * np.exp(-distance) + _LEVEL_SPREAD**2
+        self._prior += _TINY * np.eye(len(place))
+        self._tapers = tapers
+        self._warm: FloatArray | None = None
+
+    def restart(self) -> None:
+        """Begin the next search from the estimates, not from the last spectrum."""
+        self._warm = None
+
+    def find(self, estimate: FloatArray, noise: FloatArray) -> LogSpectrum:
+        """The spectrum behind the estimates, noise taken off.
+
+        Parameters
+        ----------
+        estimate, noise : ndarray, shape (F,)
+            Densities, positive.
+        """
+        prior, tapers = self._prior, self._tapers
+        level = np.log(_START * estimate.mean())
+        if self._warm is None:
+            log_density = np.log(np.maximum(estimate - noise, _START * estimate)) - level
+        else:
+            log_density = self._warm - level
+        for _ in range(_STEPS):
+            density = np.exp(log_density + level)
+            share = density / (density + noise)
+            slope = tapers * share * (estimate / (density + noise) - 1)
+            weight = np.maximum(tapers * share**2, _TINY)
+            root = np.sqrt(weight)
+            factor = np.linalg.cholesky(np.eye(len(root)) + root[:, None] * prior * root)
+            target = weight * log_density + slope
+            push = target - root * cho_solve((factor, True), root * (prior @ target))
+            step = prior @ push - log_density
+            longest = float(np.abs(step).max())
+            log_density = log_density + step / max(1.0, longest)
+            if longest < _CONVERGED:
+                break
+        self._warm = log_density + level
+        total = np.exp(self._warm) + noise
+        explained = solve_triangular(factor, root[:, None] * prior, lower=True)
+        return LogSpectrum(
+            float(
+                -tapers * np.sum(np.log(total) + estimate / total)
+                - 0.5 * push @ log_density
+                - np.log(factor.diagonal()).sum()
+            ),
+            self._warm,
+            prior - explained.T @ explained,
+        )

@@ -1,0 +1,86 @@
+"""One kind of request to the retuner's process, and the way of its answers back.
+
+The mailboxes hold the only state: a request is open while its number differs from the answer's.
+"""
+
+import sys
+import time
+import traceback
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.retuning.answer import LONGEST_BYTES, Answer, Refusal, answer_bytes, read_answer
+from utank_hil.retuning.mailbox import Mailbox
+from utank_hil.retuning.retuner import Work
+
+_ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
+
+
+class Desk:
+    """Both ends of the requests for one kind of work; may be an argument of a spawned process.
+
+    Parameters
+    ----------
+    work : Work
+        What is done with a record, and the shape of the longest one.
+    """
+
+    def __init__(self, work: Work) -> None:
+        self._compute, (rows, columns) = work
+        self._requests = Mailbox(8 * (rows * columns + 1))
+        self._answers = Mailbox(LONGEST_BYTES)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the worker's heartbeat is recent."""
+        return abs(time.monotonic_ns() - self._answers.beat_ns) < _ALIVE_NS
+
+    @property
+    def beat_ns(self) -> int:
+        """Time of the worker's latest heartbeat."""
+        return self._answers.beat_ns
+
+    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:  # noqa: ARG002
+        """Post a record."""
+        self._requests.post(number, np.float64(record.shape[1]).tobytes() + record.tobytes())
+
+    def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
+        """The answer, if it has arrived; a message that cannot be decoded is a refusal."""
+        data = self._answers.read(number)
+        if data is None:
+            return None
+        try:
+            return read_answer(data)
+        except ValueError as error:
+            return Refusal((f"the retuner answered nonsense: {error}",))
+
+    def beat(self, now_ns: int) -> None:
+        """Store the worker's heartbeat."""
+        self._answers.beat(now_ns)
+
+    def serve(self) -> bool:
+        """Answer the open request, in the worker; return whether there was one.
+
+        An exception becomes a refusal, with its traceback on standard error.
+        """
+        number = self._requests.number
+        data = self._requests.read(number) if number != self._answers.number else None
+        if data is None:
+            return False
+        try:
+            values = np.frombuffer(data)
+            record = values[1:].reshape(-1, int(values[0]))
+            self._answers.post(number, answer_bytes(self._compute(record)))
+        except Exception as error:
+            traceback.print_exc(file=sys.stderr)
+            refusal = Refusal((f"the retuner failed: {type(error).__name__}: {error}",))
+            self._answers.post(number, answer_bytes(refusal))
+        return True
+
+    def refuse_open(self, reason: str) -> None:
+        """Refuse the request that is open, if one is, in the worker's place."""
+        number = self._requests.number
+        if number != self._answers.number:
+            self._answers.post(number, answer_bytes(Refusal((reason,))))

@@ -1,0 +1,117 @@
+"""What the motion tells of waves and ship: the estimator's answer.
+
+Passes between processes as plain numbers.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Annotated, Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Verdict
+from utank_hil.parameters import Range, range_problems, refuse
+from utank_hil.sea import SlopeSpectrum
+
+MOST_BANDS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class ShipFigures:
+    """A ship in roll, without tank water, and how well it is known.
+
+    Attributes
+    ----------
+    stiffness_nm_rad, inertia_kg_m2, damping_nms_rad : float
+    stiffness_deviation, period_deviation : float
+        Relative standard deviations of stiffness and roll period.
+
+    Raises
+    ------
+    ValueError
+        If stiffness or inertia is not positive, or anything is too large.
+    """
+
+    stiffness_nm_rad: Annotated[float, Range(above=0, most=1e30)]
+    inertia_kg_m2: Annotated[float, Range(above=0, most=1e30)]
+    damping_nms_rad: Annotated[float, Range(least=0, most=1e30)]
+    stiffness_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
+    period_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
+
+    def __post_init__(self) -> None:
+        refuse("ship", range_problems(self))
+
+    @property
+    def roll_period_s(self) -> float:
+        """Natural roll period."""
+        return 2 * math.pi * math.sqrt(self.inertia_kg_m2 / self.stiffness_nm_rad)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionEstimate:
+    """Waves and ship, from the latest part of the motion's record.
+
+    Attributes
+    ----------
+    of_sea, of_ship : Verdict
+        Whether waves and ship can be told, and if not, why.
+    ship : ShipFigures or None
+        The ship found; where `of_ship` is not good, the known one that the waves rest on. None if
+        there is nothing to tell.
+    waves : SlopeSpectrum or None
+        Wave moment per stiffness of that ship.
+    rms_deviation : float
+        Relative standard deviation of the root mean square of `waves`.
+    hs_m, tp_s : float
+        Significant height and peak period of waves on the beam with the effective slope that the
+        configuration gives.
+    duration_s : float
+        Length of the record that it is from.
+    """
+
+    of_sea: Verdict
+    of_ship: Verdict
+    ship: ShipFigures | None = None
+    waves: SlopeSpectrum | None = None
+    rms_deviation: float = math.nan
+    hs_m: float = math.nan
+    tp_s: float = math.nan
+    duration_s: float = 0.0
+
+    def numbers(self) -> FloatArray:
+        """The estimate as numbers, for another process."""
+        head = [self.of_sea, self.of_ship, self.rms_deviation, self.hs_m, self.tp_s]
+        head.append(self.duration_s)
+        ship = [math.nan] * len(fields(ShipFigures))
+        if self.ship is not None:
+            ship = [getattr(self.ship, field.name) for field in fields(ShipFigures)]
+        parts = [np.array([*head, *ship])]
+        if self.waves is not None:
+            deviation = self.waves.deviation
+            assert deviation is not None
+            parts += [self.waves.omega_rad_s, self.waves.density, deviation]
+        return np.concatenate(parts)
+
+    @classmethod
+    def of_numbers(cls, numbers: FloatArray) -> "MotionEstimate":
+        """The estimate that `numbers` gave.
+
+        Raises
+        ------
+        ValueError
+            If they are of no estimate.
+        """
+        ship_end = 6 + len(fields(ShipFigures))
+        bands, left = divmod(len(numbers) - ship_end, 3)
+        if left or not 0 <= bands <= MOST_BANDS:
+            raise ValueError(f"{len(numbers)} numbers are no estimate")
+        head, ship = numbers[:6].tolist(), numbers[6:ship_end]
+        spectrum = numbers[ship_end:].reshape(3, bands).copy()
+        return cls(
+            Verdict(head[0]),
+            Verdict(head[1]),
+            ShipFigures(*ship.tolist()) if np.isfinite(ship).all() else None,
+            SlopeSpectrum(*spectrum) if bands else None,
+            *head[2:],
+        )

@@ -1,0 +1,144 @@
+"""From a record of the motion to an estimate of waves and ship: the estimator's whole work."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Verdict
+from utank_hil.control import DesignPlant
+from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimator import COLUMNS
+
+LEAST_PERIODS: Final = 45.0
+"""Natural roll periods below which a record is too short."""
+MOST_MISSING: Final = 0.05
+"""Largest share of missing samples; the rest is interpolated."""
+LEAST_CLEAR: Final = 0.8
+"""Least part of the wave moment's energy in bands that stand out from the sensors' noise."""
+STIFFNESS_DEVIATION: Final = 0.03
+PERIOD_DEVIATION: Final = 0.05
+"""Largest relative deviations for the ship to count as told. With less to go by, waves are taken
+for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
+"""
+SEA_DEVIATION: Final = 0.2
+"""Largest relative deviation of the moment's root mean square, for the sea to count as told."""
+CONTRADICTED: Final = 20.0
+"""Logarithm of likelihood by which another ship may explain the motion better than the known."""
+SAME: Final = 3.0
+"""Standard deviations by which the ship of the record's last half may differ from the whole's."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateTask:
+    """What the estimator needs besides the record.
+
+    Attributes
+    ----------
+    plant : DesignPlant
+        The configured ship and tank.
+    sample_time_s : float
+        Of the record.
+    effective_slope : float
+        Ratio of effective to true wave slope, for the height of the waves.
+    """
+
+    plant: DesignPlant
+    sample_time_s: float
+    effective_slope: float
+
+
+def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
+    """Tell waves and ship from a record.
+
+    The ship is fitted to the whole record and to its last half. Where they contradict each other
+    she was loaded meanwhile, and the half counts. Where the motion does not tell the ship, the
+    waves are those of the known one, and uncertain if another would explain the motion far better.
+
+    Parameters
+    ----------
+    request : ndarray, shape (1 + N, 4)
+        The known ship's stiffness, inertia and damping, and a number of no meaning; then
+        `estimator.COLUMNS`, gaps NaN.
+    task : EstimateTask
+    """
+    known, record = request[0, :3], request[1:]
+    period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
+    least = round(LEAST_PERIODS * period_s / task.sample_time_s)
+    motion = _without_gaps(record[:, [COLUMNS.index(name) for name in _MOTION]])
+    if motion is None or len(motion) < least:
+        return MotionEstimate(Verdict.RECORD_SHORT, Verdict.RECORD_SHORT)
+    if not np.ptp(motion, axis=0).all():
+        return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
+    fit = fit_motion(motion, task.plant, task.sample_time_s)
+    half = motion[len(motion) // 2 :]
+    if len(half) >= least:
+        late = fit_motion(half, task.plant, task.sample_time_s)
+        if _told(late) and (_apart(late, fit) or not _told(fit)):
+            fit, motion = late, half
+    of_ship = Verdict.GOOD if _told(fit) else Verdict.UNCERTAIN
+    contradicted = False
+    if of_ship is not Verdict.GOOD:
+        likeliest = fit.log_likelihood
+        ship = dataclasses.replace(
+            task.plant.ship,
+            stiffness_nm_rad=known[0],
+            inertia_kg_m2=known[1],
+            damping_nms_rad=known[2],
+        )
+        plant = dataclasses.replace(task.plant, ship=ship)
+        fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)
+        contradicted = likeliest - fit.log_likelihood > CONTRADICTED
+    if fit.clear < LEAST_CLEAR:
+        return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
+    ship, waves = fit.ship, fit.waves
+    sea_told = fit.rms_deviation <= SEA_DEVIATION and not contradicted
+    return MotionEstimate(
+        Verdict.GOOD if sea_told else Verdict.UNCERTAIN,
+        of_ship,
+        ShipFigures(
+            ship.stiffness_nm_rad,
+            ship.inertia_kg_m2,
+            ship.damping_nms_rad,
+            float(fit.deviation[0]),
+            fit.period_deviation,
+        ),
+        waves,
+        fit.rms_deviation,
+        waves.hs_m(task.effective_slope),
+        2 * np.pi / float(waves.omega_rad_s[np.argmax(waves.elevation_density(1.0))]),
+        len(motion) * task.sample_time_s,
+    )
+
+
+_MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+
+
+def _told(fit: MotionFit) -> bool:
+    return bool(fit.deviation[0] <= STIFFNESS_DEVIATION) and (
+        fit.period_deviation <= PERIOD_DEVIATION
+    )
+
+
+def _apart(late: MotionFit, whole: MotionFit) -> bool:
+    """Whether two fits are of different ships, by stiffness or by period."""
+    ratio = late.ship.stiffness_nm_rad / whole.ship.stiffness_nm_rad
+    by_stiffness = abs(np.log(ratio)) / np.hypot(late.deviation[0], whole.deviation[0])
+    ratio = late.ship.natural_frequency_rad_s / whole.ship.natural_frequency_rad_s
+    by_period = abs(np.log(ratio)) / np.hypot(late.period_deviation, whole.period_deviation)
+    return bool(max(by_stiffness, by_period) > SAME)
+
+
+def _without_gaps(motion: FloatArray) -> FloatArray | None:
+    """The record with its gaps interpolated, from its first sample on; None if too many."""
+    here = np.asarray(np.isfinite(motion).all(axis=1))
+    if not here.any():
+        return None
+    motion, here = motion[np.argmax(here) :], here[np.argmax(here) :]
+    if np.mean(~here) > MOST_MISSING:
+        return None
+    index = np.arange(len(motion))
+    return np.column_stack([np.interp(index, index[here], each[here]) for each in motion.T])

@@ -1,0 +1,285 @@
+"""The estimator's end in the loop: keeps the motion's record and asks what it tells.
+
+Every `every_s` the record goes to the retuner's process (`estimating`). Nothing is stimulated and
+nothing waits.
+"""
+
+import math
+from dataclasses import dataclass
+from math import nan
+from typing import Annotated, Final
+
+import numpy as np
+
+from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.dynamics.water import water_moments
+from utank_hil.parameters import Positive, Range, range_problems, refuse
+from utank_hil.retuning.estimate import MotionEstimate
+from utank_hil.retuning.history import SampleHistory
+from utank_hil.retuning.retuner import Retuner
+
+COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
+"""Of the motion's record."""
+SAMPLE_TIME_S: Final = 0.2
+LONGEST_RECORD_S: Final = 3600.0
+OUTDATED: Final = 3.0
+"""An estimate is outdated after so many intervals without another."""
+GM_DEVIATIONS: Final = 2.0
+"""Standard deviations below the metacentric height at which its interval ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateSettings:
+    """How waves and ship are estimated under way: section ``sea_estimate`` of a controller.
+
+    Attributes
+    ----------
+    every_s : float
+        Time between two estimates.
+    record_s : float
+        Length of the record: so much of the past is told.
+    effective_slope : float
+        Ratio of effective to true wave slope, for the height of the waves.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    every_s: Annotated[float, Range(least=30, most=3600)] = 180.0
+    record_s: Annotated[float, Range(least=300, most=LONGEST_RECORD_S)] = 1200.0
+    effective_slope: Positive = 0.5
+
+    def __post_init__(self) -> None:
+        refuse("sea estimate", range_problems(self))
+
+    @property
+    def longest_request(self) -> tuple[int, int]:
+        """Rows and columns of the longest request."""
+        return 1 + round(self.record_s / SAMPLE_TIME_S), len(COLUMNS)
+
+
+@dataclass(slots=True)
+class EstimateFigures:
+    """What panels and telemetry show of the estimates; NaN while there is nothing to tell.
+
+    Attributes
+    ----------
+    of_sea, of_ship : Verdict
+        Whether waves and ship can be told now.
+    hs_m, tp_s : float
+        Significant height and peak period of beam waves.
+    moment_rms_rad, moment_deviation : float
+        Root mean square of the wave moment per roll stiffness; its relative standard deviation.
+    sea_age_s : float
+        Time since the end of the record.
+    roll_period_s, roll_period_deviation_s : float
+        Of the last ship that could be told, without tank water.
+    gm_m, gm_deviation_m : float
+        Her metacentric height with the tank's water free to move; NaN where the displacement is
+        not known.
+    ship_age_s : float
+        Time since the end of the record that told her.
+    gm_low : bool
+        The interval of `gm_m` reaches below the limit of the stability booklet.
+    """
+
+    of_sea: Verdict = Verdict.RECORD_SHORT
+    of_ship: Verdict = Verdict.RECORD_SHORT
+    hs_m: float = nan
+    tp_s: float = nan
+    moment_rms_rad: float = nan
+    moment_deviation: float = nan
+    sea_age_s: float = nan
+    roll_period_s: float = nan
+    roll_period_deviation_s: float = nan
+    gm_m: float = nan
+    gm_deviation_m: float = nan
+    ship_age_s: float = nan
+    gm_low: bool = False
+
+    def words(self) -> tuple[str, ...]:
+        """What can be told, in words."""
+        sea = f"sea {self.of_sea.name}"
+        if not math.isnan(self.hs_m):
+            sea += (
+                f": {self.hs_m:.2f} m, {self.tp_s:.1f} s as beam waves, wave moment "
+                f"{math.degrees(self.moment_rms_rad):.2f} degrees +- {self.moment_deviation:.0%}"
+            )
+        ship = f"ship {self.of_ship.name}"
+        if self.of_ship is Verdict.GOOD:
+            ship += (
+                f": roll period {self.roll_period_s:.2f} +- {self.roll_period_deviation_s:.2f} s"
+            )
+            if not math.isnan(self.gm_m):
+                ship += f", GM {self.gm_m:.2f} +- {self.gm_deviation_m:.2f} m"
+        return sea, ship
+
+    def sea_message(self) -> SeaEstimate:
+        """For the bus."""
+        return SeaEstimate(
+            self.of_sea,
+            self.hs_m,
+            self.tp_s,
+            self.moment_rms_rad,
+            self.moment_deviation,
+            self.sea_age_s,
+        )
+
+    def ship_message(self) -> ShipEstimate:
+        """For the bus."""
+        return ShipEstimate(
+            self.of_ship,
+            self.roll_period_s,
+            self.roll_period_deviation_s,
+            self.gm_m,
+            self.gm_deviation_m,
+            self.ship_age_s,
+        )
+
+
+def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) -> float:
+    """Metacentric height of ship and tank, the water free to move; NaN without a displacement.
+
+    Parameters
+    ----------
+    ship : RollShip
+        Of the displacement.
+    tank : Tank
+    stiffness_nm_rad : float
+        Of the ship without tank water.
+    """
+    if not ship.displacement_n > 0:
+        return nan
+    stiffness = coupled_matrices(ship, tank)[2]
+    free = stiffness[0, 0] - stiffness[0, 1] ** 2 / stiffness[1, 1]
+    weight_n = ship.displacement_n + GRAVITY_M_S2 * float(water_moments(tank, 0.0).mass_kg)
+    return float(free + stiffness_nm_rad - ship.stiffness_nm_rad) / weight_n
+
+
+class Estimator:
+    """Keeps the record, asks for estimates, and holds the latest.
+
+    Parameters
+    ----------
+    settings : EstimateSettings
+    desk : Retuner
+        Answers with a `MotionEstimate`.
+    ship : RollShip
+        The configured ship.
+    tank : Tank
+    least_gm_m : float or None
+        Limit of the stability booklet on the metacentric height.
+
+    Attributes
+    ----------
+    latest : MotionEstimate or None
+    figures : EstimateFigures
+    """
+
+    def __init__(
+        self,
+        settings: EstimateSettings,
+        desk: Retuner,
+        ship: RollShip,
+        tank: Tank,
+        least_gm_m: float | None = None,
+    ) -> None:
+        self._settings = settings
+        self._every_ns = round(settings.every_s * 1e9)
+        self._desk = desk
+        self._ship, self._tank = ship, tank
+        self._least_gm_m = -np.inf if least_gm_m is None else least_gm_m
+        rows, columns = settings.longest_request
+        self._history = SampleHistory(rows - 1, columns - 1)
+        self._motion = np.zeros(columns - 1)
+        self._known = np.array(
+            [ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad, 0.0]
+        )
+        self._number = 0
+        self._due_ns: int | None = None
+        self._asked_ns: int | None = None
+        self._sea_ns = self._ship_ns = 0
+        self.latest: MotionEstimate | None = None
+        self.figures = EstimateFigures()
+
+    def sample(
+        self,
+        now_ns: int,
+        pressure_pa: float,
+        motion: tuple[float, float, float],
+        *,
+        fresh: bool,
+    ) -> MotionEstimate | None:
+        """Take a sample, every `SAMPLE_TIME_S`; return an estimate that has just come.
+
+        Parameters
+        ----------
+        now_ns : int
+        pressure_pa : float
+            Measured across the pump.
+        motion : tuple of float
+            Roll, roll rate and level.
+        fresh : bool
+            Whether all of it is newly measured.
+        """
+        self._motion[:] = motion
+        self._history.add(pressure_pa, self._motion, fresh=fresh)
+        if self._due_ns is None:
+            self._due_ns = now_ns + self._every_ns
+        came = None
+        if self._asked_ns is not None:
+            came = self._look(self._asked_ns, now_ns)
+        elif now_ns >= self._due_ns and self._desk.alive:
+            self._due_ns = now_ns + self._every_ns
+            self._number += 1
+            self._asked_ns = now_ns
+            record = self._history.record(self._history.capacity)
+            self._desk.submit(self._number, np.vstack([self._known, record]), now_ns)
+        self._grow_old(now_ns)
+        return came
+
+    def _look(self, asked_ns: int, now_ns: int) -> MotionEstimate | None:
+        """Look for the answer."""
+        answer = self._desk.answer(self._number, now_ns)
+        if answer is None:
+            return None
+        self._asked_ns = None
+        if not isinstance(answer, MotionEstimate):  # the worker failed, and said so on its own
+            return None
+        self.latest, self._sea_ns = answer, asked_ns
+        figures, waves, ship = self.figures, answer.waves, answer.ship
+        figures.of_sea, figures.of_ship = answer.of_sea, answer.of_ship
+        figures.hs_m, figures.tp_s = answer.hs_m, answer.tp_s
+        figures.moment_rms_rad = nan if waves is None else waves.rms_rad
+        figures.moment_deviation = answer.rms_deviation
+        if answer.of_ship is Verdict.GOOD and ship is not None:
+            self._ship_ns = asked_ns
+            self._known[:3] = ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad
+            figures.roll_period_s = ship.roll_period_s
+            figures.roll_period_deviation_s = ship.period_deviation * ship.roll_period_s
+            self._judge_stability(ship.stiffness_nm_rad, ship.stiffness_deviation)
+        return answer
+
+    def _judge_stability(self, stiffness_nm_rad: float, deviation: float) -> None:
+        figures = self.figures
+        gm_m, less_m = (
+            metacentric_height_m(self._ship, self._tank, stiffness_nm_rad * factor)
+            for factor in (1.0, 1.0 - deviation)
+        )
+        figures.gm_m, figures.gm_deviation_m = gm_m, gm_m - less_m
+        figures.gm_low = gm_m - GM_DEVIATIONS * figures.gm_deviation_m < self._least_gm_m
+
+    def _grow_old(self, now_ns: int) -> None:
+        if self.latest is None:
+            return
+        figures = self.figures
+        figures.sea_age_s = (now_ns - self._sea_ns) * 1e-9
+        if self._ship_ns:
+            figures.ship_age_s = (now_ns - self._ship_ns) * 1e-9
+        if figures.sea_age_s > OUTDATED * self._settings.every_s:
+            figures.of_sea = figures.of_ship = Verdict.OUTDATED
