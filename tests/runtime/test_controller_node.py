@@ -238,8 +238,11 @@ def test_status_tells_of_a_loop_without_real_time_scheduling(
     assert bench.status.not_realtime is told
 
 
-@pytest.mark.parametrize("index", range(len(SIGNALS)))
-def test_every_signal_is_finite_from_the_first_row(index: int) -> None:
+ESTIMATED = SIGNALS[SIGNALS.index("significant_height_m") :]
+
+
+@pytest.mark.parametrize("index", range(len(SIGNALS) - len(ESTIMATED)))
+def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index: int) -> None:
     plant = DesignPlant(VESSEL.ship, VESSEL.tank)
     bench = ControllerBench(monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
     bench.tick()
