@@ -187,6 +187,50 @@ def test_the_bucket_fills_at_five_wrong_and_empties_with_as_many_right():
     assert right[: BUCKET_LIMIT + 1] == [False] * (BUCKET_LIMIT - 1) + [True, True]
 
 
+def test_the_thresholds_are_those_of_the_safety_manual():
+    assert (MAX_LOST, RESYNC_FRAMES, BUCKET_LIMIT) == (3, 3, 5)
+
+
+def test_new_it_has_heard_nothing_and_one_wrong_frame_before_the_first_changes_nothing():
+    tx, rx = link()
+    assert (rx.heard, rx.lost, rx.counter, rx.valid) == (0, 0, None, False)
+    assert rx.accept(tx.frame(MESSAGE)) is not None
+    assert rx.valid  # with the first: the bucket is empty
+
+
+def test_every_frame_is_heard_and_only_whole_ones_are_intact_whatever_their_counter():
+    tx, rx = link()
+    frames = [tx.frame(MESSAGE) for _ in range(12)]
+    heard = [frames[0], frames[9], corrupted(frames[1]), Frame(rx.can_id, b""), frames[0]]
+    for number, frame in enumerate(heard, 1):
+        rx.accept(frame)
+        assert rx.heard == number
+    before = state(rx), rx.heard, dict(rx.rejected), rx.valid
+    for frame in frames:
+        assert rx.intact(frame) == pytest.approx(MESSAGE, abs=1e-4)
+        assert rx.intact(corrupted(frame)) is None
+        for length in (0, 7, 9, 64):
+            assert rx.intact(Frame(frame.can_id, (frame.data * 8)[:length])) is None
+    assert (state(rx), rx.heard, dict(rx.rejected), rx.valid) == before
+    assert rx.rejected == {
+        Rejection.LENGTH: 1, Rejection.CRC: 1, Rejection.REPEATED: 1, Rejection.SEQUENCE: 1,
+    }  # fmt: skip
+
+
+def test_a_run_out_of_step_begins_anew_after_an_accepted_frame():
+    tx, rx = link()
+    rx.accept(tx.frame(MESSAGE))
+    restarted = CATALOGUE.transmitter(SensorMotion)
+    for _ in range(8):
+        restarted.frame(MESSAGE)
+    for _ in range(RESYNC_FRAMES - 1):
+        assert rx.accept(restarted.frame(MESSAGE)) is None
+    assert rx.accept(tx.frame(MESSAGE)) is not None
+    for _ in range(RESYNC_FRAMES - 1):
+        assert rx.accept(restarted.frame(MESSAGE)) is None
+    assert rx.accept(restarted.frame(MESSAGE)) is not None
+
+
 def test_one_right_between_wrong_ones_keeps_the_stream_valid():
     tx, rx = link()
     for _ in range(100):

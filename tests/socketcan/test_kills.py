@@ -98,7 +98,7 @@ def ship(folder: Path) -> Program:
 
 def controller(folder: Path) -> Program:
     folder.mkdir(exist_ok=True)
-    config = patient_controller(folder)
+    config = patient_controller(folder, 100.0)
     return Program(
         folder, "utank-hil", "run", config, "--bus", CHANNEL, "--out", folder / "out", "--json"
     )

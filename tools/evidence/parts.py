@@ -83,10 +83,17 @@ PARTS = (
         3,
     ),
     Part(
+        "false_alarms",
+        "python -m tools.studies.false_alarms --hours 50 --json",
+        "how often the monitors would cry wolf: every law, calm to storm, voyages and retuning",
+        1200,
+    ),
+    Part(
         "monitor_margins",
-        "python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --hours 50 --json",
-        "how near the monitors come to a false alarm",
-        900,
+        "python -m tools.studies.monitor_margins configs/scenarios/storm_all.yaml --minutes 60"
+        " --json",
+        "how near the monitors come to a false alarm in the storm's hour, law by law",
+        10,
     ),
     Part(
         "identification_bound",
@@ -193,7 +200,7 @@ PARTS = (
     ),
     Part(
         "mutation",
-        "python -m tools.mutation --json",
+        "python -m tools.mutation.run --json",
         "every small change of the safety code against its tests: what lives, and why",
         90,
     ),

@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 from tools.evidence.parts import PEERS, Part
 from tools.evidence.sources import ROOT, digest_of, imported
+from tools.mutation.targets import TARGETS
 
 FOLDER = ROOT / "docs" / "evidence"
 State = Literal["not run yet", "other command", "other code", "current"]
@@ -62,6 +63,9 @@ def sources(part: Part) -> str:
         for file in (ROOT / "tests").rglob("*.py"):
             if b"mark.evidence" in file.read_bytes():
                 start.add(file)
+    if module[1].startswith("tools.mutation."):
+        for target in TARGETS:
+            start |= {ROOT / name for name in (target.file, *target.tests, *target.behind)}
     configs = {file for file in (ROOT / "configs").rglob("*") if file.is_file()}
     return digest_of(imported(start) | configs)
 

@@ -23,7 +23,11 @@ def measured() -> dict[str, dict[str, object]]:
     packages = sorted({str(Path(target.file).parent) for target in TARGETS})
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "coverage.json"
-        environment = {**os.environ, "COVERAGE_FILE": str(Path(folder) / "coverage")}
+        environment = {
+            **os.environ,
+            "UTANK_HIL_COMPILED": "0",
+            "COVERAGE_FILE": str(Path(folder) / "coverage"),
+        }
         done = subprocess.run(
             [sys.executable, "-m", "pytest", "-p", "no:cacheprovider",
              "--hypothesis-profile=few", "-m", "not socketcan and not evidence",

@@ -99,6 +99,8 @@ class Exchange:
     mutants : sequence of Mutant
     report : callable
         Takes a mutant and whether a test failed, as soon as that is known.
+    end_s : float
+        Of the monotonic clock: no mutant is tried after it.
     """
 
     def __init__(
@@ -107,8 +109,10 @@ class Exchange:
         unchanged: CodeType,
         mutants: Sequence[Mutant],
         report: Callable[[Mutant, bool], None],
+        end_s: float,
     ) -> None:
         self._file, self._unchanged, self._mutants = file, unchanged, mutants
+        self._end_s = end_s
         self._report = report
         self._started = 0
 
@@ -131,6 +135,8 @@ class Exchange:
         limit_s = 5 + 5 * (time.monotonic() - begin)
         functions = _functions_of(self._file)
         for mutant in self._mutants:
+            if time.monotonic() > self._end_s:
+                break
             exchanged = {
                 old: new
                 for old, new in _pairs(self._unchanged, mutant.code)
@@ -182,6 +188,7 @@ def try_exchanged(
     mutants: Sequence[Mutant],
     tests: Sequence[str],
     report: Callable[[Mutant, bool], None],
+    end_s: float,
 ) -> bool:
     """Try mutants the quick way, in this process; reports those that are killed.
 
@@ -190,7 +197,7 @@ def try_exchanged(
     bool
         Whether the tests pass on the code as it is.
     """
-    plugins = [Spread(FEW), Exchange(file, unchanged, mutants, report)]
+    plugins = [Spread(FEW), Exchange(file, unchanged, mutants, report, end_s)]
     return not pytest.main([*_OPTIONS, "--hypothesis-profile=few", *tests], plugins=plugins)
 
 

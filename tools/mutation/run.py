@@ -1,9 +1,11 @@
 """Change the safety code in every small way and see whether a test fails.
 
-    python -m tools.mutation                              # all files; hours
-    python -m tools.mutation --file utank_hil/runtime/supervisor.py
-    python -m tools.mutation --changed main               # only lines that differ from it
-    python -m tools.mutation --json                       # as evidence
+    python -m tools.mutation.run                          # all files; hours
+    python -m tools.mutation.run --file utank_hil/runtime/supervisor.py
+    python -m tools.mutation.run --changed main               # only lines that differ from it
+    python -m tools.mutation.run --json                       # as evidence
+
+With `--within` the time is limited, and what was not tried is counted.
 
 What was killed is kept in .cache/mutation: after Ctrl-C, or with more tests, the same command goes
 on with what lives. Exit code 1: a mutant lives that `targets.py` does not explain.
@@ -13,6 +15,7 @@ import argparse
 import hashlib
 import importlib
 import json
+import math
 import os
 import re
 import subprocess
@@ -43,6 +46,11 @@ def changed_lines(base: str, file: str) -> set[int]:
     return {int(first) + i for first, count in hunks for i in range(int(count or 1))}
 
 
+def _is_known(base: str) -> bool:
+    words = ["git", "rev-parse", "--quiet", "--verify", f"{base}^{{commit}}"]
+    return subprocess.run(words, cwd=ROOT, stdout=subprocess.DEVNULL, check=False).returncode == 0
+
+
 def _git(*words: str) -> str:
     return subprocess.run(
         ["git", *words], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
@@ -69,8 +77,10 @@ class Kept:
                 kept.write(f"{mutant.key}\n")
 
 
-def survivors(target: Target, mutants: list[Mutant], unchanged: CodeType) -> Iterator[Mutant]:
-    """Those of the mutants that no test kills."""
+def survivors(
+    target: Target, mutants: list[Mutant], unchanged: CodeType, end_s: float
+) -> Iterator[Mutant | None]:
+    """Those of the mutants that no test kills; None for one that there was no time for."""
     from tools.mutation import session
 
     file, kept = ROOT / target.file, Kept(target)
@@ -84,7 +94,7 @@ def survivors(target: Target, mutants: list[Mutant], unchanged: CodeType) -> Ite
         try:
             sys.stdout = sys.stderr
             os.dup2(2, 1)
-            passed = session.try_exchanged(file, unchanged, waiting, target.tests, kept.add)
+            passed = session.try_exchanged(file, unchanged, waiting, target.tests, kept.add, end_s)
         except BaseException:
             traceback.print_exc()
         finally:
@@ -98,33 +108,39 @@ def survivors(target: Target, mutants: list[Mutant], unchanged: CodeType) -> Ite
     if waiting and session.fail_anew(file, unchanged, tests, LIMIT_S):
         raise SystemExit(f"the tests of {target.file} fail on the code as it is: {tests}")
     for mutant in waiting:
-        if session.fail_anew(file, mutant.code, tests, LIMIT_S):
+        if time.monotonic() > end_s:
+            yield None
+        elif session.fail_anew(file, mutant.code, tests, LIMIT_S):
             kept.add(mutant)
         else:
             yield mutant
 
 
-def judged(target: Target, base: str | None) -> dict[str, object]:
+def judged(target: Target, base: str | None, end_s: float) -> dict[str, object]:
     """Try all mutants of a file, or of its changed lines."""
     unchanged, mutants = mutants_of(ROOT / target.file)
     if base is not None:
         lines = changed_lines(base, target.file)
         mutants = [mutant for mutant in mutants if mutant.line in lines]
     reasons = NO_DIFFERENCE.get(target.file, {})
-    living = []
+    living, untried = [], 0
     explained = [
         {"change": mutant.key, "why": reasons[mutant.key]}
         for mutant in mutants
         if mutant.key in reasons
     ]
     tried = [mutant for mutant in mutants if mutant.key not in reasons]
-    for mutant in survivors(target, tried, unchanged):
+    for mutant in survivors(target, tried, unchanged, end_s):
+        if mutant is None:
+            untried += 1
+            continue
         living.append({"line": mutant.line, "change": mutant.key})
         sys.stderr.write(f"{target.file}:{mutant.line}: {mutant.key}\n")
     return {
         "file": target.file,
         "mutants": len(mutants),
-        "killed": len(tried) - len(living),
+        "killed": len(tried) - len(living) - untried,
+        "not_tried": untried,
         "no_difference": explained,
         "survived": living,
     }
@@ -133,29 +149,40 @@ def judged(target: Target, base: str | None) -> dict[str, object]:
 def main() -> int:
     """Try what was asked for."""
     parser = argparse.ArgumentParser(
-        prog="python -m tools.mutation",
+        prog="python -m tools.mutation.run",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--file", action="append", choices=[target.file for target in TARGETS])
     parser.add_argument("--changed", metavar="BASE", help="only lines that differ from this commit")
+    parser.add_argument("--within", type=float, default=math.inf, help="seconds to try")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     os.chdir(ROOT)
+    os.environ["UTANK_HIL_COMPILED"] = "0"  # compiled modules have no code to exchange
+    end_s = time.monotonic() + arguments.within
+    base = arguments.changed
+    if base is not None and not _is_known(base):
+        sys.stderr.write(f"there is no {base} to compare with: nothing counts as changed\n")
+        return 0
     for name in PRELOADED:
         importlib.import_module(name)
     results = []
     for target in TARGETS:
         if arguments.file and target.file not in arguments.file:
             continue
+        if base is not None and not changed_lines(base, target.file):
+            continue
         begin = time.monotonic()
-        result = judged(target, arguments.changed)
+        result = judged(target, base, end_s)
         results.append(result)
-        sys.stderr.write(
-            f"{target.file}: {result['killed']} of {result['mutants']} killed,"
-            f" {len(result['no_difference'])} make no difference,"  # type: ignore[arg-type]
-            f" {len(result['survived'])} survived, {time.monotonic() - begin:.0f} s\n"  # type: ignore[arg-type]
-        )
+        counts = {
+            name: len(value) if isinstance(value, list) else value
+            for name, value in result.items()
+            if name != "file"
+        }
+        said = ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counts.items())
+        sys.stderr.write(f"{target.file}: {said}; {time.monotonic() - begin:.0f} s\n")
     if arguments.json:
         sys.stdout.write(json.dumps({"files": results}) + "\n")
         return 0

@@ -1,0 +1,142 @@
+"""How often the monitors would cry wolf: every shipped law in calm, ordinary and storm seas.
+
+    python -m tools.studies.false_alarms [--hours 50] [--json]
+
+Each law of configs/controllers sails for so many hours in each sea and, where its ship has one, on
+the voyage; a law that can be retuned is retuned every second hour, pulses included. The unit is an
+hour of its own seed. Of each hour the largest statistic of each monitor over its threshold is kept
+(`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the same command goes
+on. A Gumbel distribution is fitted to the hourly maxima; its tail beyond 1 is the rate of false
+alarms. The aim is one in 1000 hours.
+"""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import gumbel_r
+
+from firmware_sim.scenario import Scenario
+from tools.evidence.sources import ROOT, digest_of, imported
+from tools.studies.monitor_margins import margins
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.runtime.panel import Action, TimedAction
+
+CACHE = ROOT / ".cache" / "false_alarms"
+HOUR_S = 3600.0
+ORDER_RETUNING_S = 400.0
+AIM_PER_HOUR = 1e-3
+SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
+"""Share of the scenario's wave slope: the storm's is what the laws were made for."""
+SCENARIOS = ("storm", "patti_b", "naval_vessel", "semi_active")
+VOYAGE = "voyage"
+
+
+def scenario_of(config: ControllerConfig) -> Scenario:
+    """The shipped scenario of a law's ship."""
+    for name in SCENARIOS:
+        loaded = load_config(ROOT / f"configs/scenarios/{name}.yaml", Scenario)
+        if loaded.vessel == config.vessel:
+            return loaded
+    raise SystemExit(f"no scenario sails the ship of {config.name}")
+
+
+def hours(name: str) -> Iterator[tuple[str, Scenario]]:
+    """Every sea of a law, as a scenario with this law alone."""
+    config = load_config(ROOT / f"configs/controllers/{name}.yaml", ControllerConfig)
+    at_sea = scenario_of(config)
+    for sea, share in SEAS.items():
+        slope = at_sea.sea.effective_slope
+        milder = at_sea.sea.model_copy(
+            update={"effective_slope": replace(slope, coefficient=share * slope.coefficient)}
+        )
+        yield sea, at_sea.model_copy(update={"sea": milder, "controllers": {name: config}})
+    voyage = load_config(ROOT / f"configs/scenarios/{VOYAGE}.yaml", Scenario)
+    if voyage.vessel == config.vessel:
+        yield VOYAGE, voyage.model_copy(update={"controllers": {name: config}})
+
+
+def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, Any]]:
+    """The hours of one law in one sea, those that are kept and those that are missing."""
+    digest = digest_of(imported({Path(__file__)}) | set((ROOT / "configs").rglob("*.yaml")))
+    file = CACHE / digest / f"{name}-{sea}.jsonl"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    kept = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    retunes = scenario.controllers[name].retuning is not None
+    order = (TimedAction(ORDER_RETUNING_S, Action.RETUNE),)
+    for seed in range(len(kept) + 1, count + 1):
+        ordered = scenario.operator + (order if retunes and seed % 2 == 0 else ())
+        run = margins(scenario.model_copy(update={"operator": ordered}), name, seed, HOUR_S)
+        with file.open("a", encoding="utf-8") as growing:
+            growing.write(json.dumps(run) + "\n")
+        kept.append(run)
+        sys.stderr.write(f"{name}, {sea}: hour {seed} of {count}\n")
+    return kept[:count]
+
+
+def rate_per_hour(maxima: list[float]) -> float:
+    """Expected hours with a statistic beyond 1 per hour, by the tail of their distribution."""
+    values = np.array([value for value in maxima if math.isfinite(value)])
+    if len(values) < 5 or np.ptp(values) == 0:
+        return float(np.mean(values > 1)) if len(values) else 0.0
+    place, scale = gumbel_r.fit(values)
+    return float(gumbel_r.sf(1.0, place, scale))
+
+
+def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Rates of one law in one sea, by monitor."""
+    monitors = sorted({monitor for run in runs for monitor in run["largest"]})
+    rates = {
+        monitor: rate_per_hour([run["largest"].get(monitor, 0.0) for run in runs])
+        for monitor in monitors
+    }
+    found: dict[str, int] = {}
+    for run in runs:
+        for finding in run["found_s"]:
+            found[finding] = found.get(finding, 0) + 1
+    return {
+        "law": name,
+        "sea": sea,
+        "hours": len(runs),
+        "found_in_hours": found,
+        "rate_per_hour": rates,
+        "worst": max(rates, key=rates.__getitem__) if rates else "",
+    }
+
+
+def main() -> int:
+    """Sail what is missing, and print the rates."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--hours", type=int, default=50, help="of each law in each sea")
+    parser.add_argument("--law", action="append", help="only this one; may be given again")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    options = parser.parse_args()
+    laws = sorted(file.stem for file in (ROOT / "configs/controllers").glob("*.yaml"))
+    rows = [
+        judged(name, sea, sail(name, sea, scenario, options.hours))
+        for name in options.law or laws
+        for sea, scenario in hours(name)
+    ]
+    if options.json:
+        json.dump({"aim_per_hour": AIM_PER_HOUR, "runs": rows}, sys.stdout)
+        return 0
+    table = Table("law", "sea", "hours", "found in hours", "worst", "1000 h")
+    for row in rows:
+        worst = 1e3 * row["rate_per_hour"].get(row["worst"], 0.0)
+        found = ", ".join(f"{name} {count}" for name, count in row["found_in_hours"].items())
+        cells = (row["law"], row["sea"], str(row["hours"]), found, row["worst"], f"{worst:.3g}")
+        table.add_row(*cells)
+    Console().print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
