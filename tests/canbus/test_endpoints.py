@@ -194,8 +194,9 @@ def test_the_thresholds_are_those_of_the_safety_manual():
 def test_new_it_has_heard_nothing_and_one_wrong_frame_before_the_first_changes_nothing():
     tx, rx = link()
     assert (rx.heard, rx.lost, rx.counter, rx.valid) == (0, 0, None, False)
+    assert rx.accept(corrupted(tx.frame(MESSAGE))) is None
     assert rx.accept(tx.frame(MESSAGE)) is not None
-    assert rx.valid  # with the first: the bucket is empty
+    assert rx.valid  # with the first: the bucket is empty again
 
 
 def test_every_frame_is_heard_and_only_whole_ones_are_intact_whatever_their_counter():

@@ -25,6 +25,13 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m < 0.001:": _TOUCHING,
         "CommandLimiter._barrier_pa: if room_m <= 0.001: -> if room_m <= 0.00125:": _TOUCHING,
     },
+    "utank_hil/canbus/endpoints.py": {
+        ": _NO_COUNTER: Final = -1 -> _NO_COUNTER: Final = -2": "no counter has either value",
+        "Receiver.__init__: self._run = 0 -> ": _SET_FIRST,
+        "Receiver.__init__: self._run = 0 -> self._run = 1": _SET_FIRST,
+        "Receiver.accept: if counter == self._expected: -> if False:": "the short way for most",
+        "Receiver.accept: if self._bucket: -> if True:": "draining an empty bucket does nothing",
+    },
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
     },

@@ -239,11 +239,6 @@ class ControllerNode:
         self.command_pa = 0.0
 
     @property
-    def level_rate_m_s(self) -> float:
-        """Rate of the tank level, as it is estimated."""
-        return self._level.rate_m_s
-
-    @property
     def time_s(self) -> float:
         """Time from the first tick to the last."""
         return (self.last_ns - self.start_ns) * NANOSECONDS
