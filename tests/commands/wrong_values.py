@@ -120,4 +120,9 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
       "retuning.seed": "zero or more"}),
     ("adaptive_gpc", {"retuning__roll_period_range_s": [20.0, 6.0]},
      {"retuning.roll_period_range_s": "must rise, got 20.0 and 6.0"}),
+    ("adaptive_gpc", {"retuning__change_factor": 1.05},
+     {"retuning.change_factor": "add `sea_estimate: {}`"}),
+    ("gpc", {"sea_estimate": {"every_s": 1, "record_s": 60, "effective_slope": 0}},
+     {"sea_estimate.every_s": "30 to 3600", "sea_estimate.record_s": "300 to 3600",
+      "sea_estimate.effective_slope": "positive"}),
 ]  # fmt: skip

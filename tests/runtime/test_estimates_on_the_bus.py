@@ -1,0 +1,115 @@
+"""Estimates of waves and ship: on the bus, in telemetry, in the log, and as an alarm."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import (
+    Fault,
+    Frame,
+    SeaEstimate,
+    ShipEstimate,
+    Verdict,
+    load_catalogue,
+)
+from utank_hil.configuration import load_config
+from utank_hil.retuning import (
+    Answer,
+    EstimateSettings,
+    MotionEstimate,
+    RetuningEvent,
+    ShipFigures,
+)
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.sea import SlopeSpectrum
+
+STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
+OMEGA = np.linspace(0.2, 2.0, 50)
+WAVES = SlopeSpectrum(OMEGA, 1e-3 * np.exp(-OMEGA), 1e-4 * np.exp(-OMEGA))
+SHIP = ShipFigures(1e9, 2e9, 5e7, 0.02, 0.01)
+FOUND = MotionEstimate(Verdict.GOOD, Verdict.GOOD, SHIP, WAVES, 0.05, 3.2, 9.1, 1200.0)
+
+
+@dataclass
+class Desk:
+    """Answers at once."""
+
+    alive: bool = True
+    records: list[FloatArray] = field(default_factory=list)
+
+    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+        self.records.append(record)
+
+    def answer(self, number: int, now_ns: int) -> Answer | None:
+        return FOUND
+
+
+class Listener:
+    """Hears the two messages."""
+
+    name, period_ns = "listener", 1_000_000_000
+
+    def __init__(self) -> None:
+        catalogue = load_catalogue()
+        self._receivers = [catalogue.receiver(SeaEstimate), catalogue.receiver(ShipEstimate)]
+        self.heard: list[SeaEstimate | ShipEstimate] = []
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        for receiver in self._receivers:
+            if frame.can_id == receiver.can_id:
+                message = receiver.accept(frame)
+                assert message is not None
+                self.heard.append(message)
+
+    def tick(self, now_ns: int) -> tuple[Frame, ...]:
+        return ()
+
+
+@pytest.mark.parametrize("limit_m", [None, 9.0, 9.3])
+def test_an_estimate_is_shown_wherever_people_look(limit_m: float | None) -> None:
+    chosen = load_config(STORM, Scenario)
+    config = chosen.controllers["gpc"]
+    ship = replace(config.vessel.ship, displacement_n=1e8)
+    vessel = config.vessel.model_copy(update={"ship": ship, "least_gm_m": limit_m})
+    config = config.model_copy(
+        update={"vessel": vessel, "sea_estimate": EstimateSettings(every_s=30.0)}
+    )
+    desk, listener = Desk(), Listener()
+    rows: list[FloatArray] = []
+    events: list[RetuningEvent | AlarmEvent] = []
+    node = build_controller_node(
+        config,
+        estimating=desk,
+        sink=lambda row: rows.append(row.copy()),
+        event_sink=lambda event, _start_ns: events.append(event),
+    )
+    ship_side = build_ship_side(chosen, 1, chosen.operator)
+    Lockstep([*ship_side.nodes, node, listener]).run_until(34_000_000_000)
+
+    (record,) = desk.records
+    assert np.ptp(record[2:, 1:], axis=0).min() > 0  # a ship that rolls, as she was measured
+    sea = [each for each in listener.heard if isinstance(each, SeaEstimate)]
+    told = [each for each in listener.heard if isinstance(each, ShipEstimate)]
+    assert sea[0].verdict is Verdict.RECORD_SHORT
+    assert np.isnan(sea[0].significant_height_m)
+    assert sea[-1].verdict is Verdict.GOOD
+    assert sea[-1][1:5] == pytest.approx((3.2, 9.1, WAVES.rms_rad, 0.05), abs=0.02)
+    assert told[-1].roll_period_s == pytest.approx(SHIP.roll_period_s, abs=0.01)
+    assert told[-1].gm_m == pytest.approx(9.5, abs=0.1)
+    shown = dict(zip(SIGNALS, rows[-1], strict=True))
+    assert shown["significant_height_m"] == 3.2
+    assert shown["gm_m"] == pytest.approx(told[-1].gm_m, abs=0.005)
+    assert shown["sea_verdict"] == Verdict.GOOD
+    said = [event for event in events if isinstance(event, RetuningEvent)]
+    assert len(said) == 1
+    assert "3.20 m, 9.1 s" in said[0].reasons[0]
+    alarms = [event.code for event in events if isinstance(event, AlarmEvent)]
+    assert (Fault.STABILITY_LOW in alarms) == (limit_m == 9.3)
