@@ -117,7 +117,7 @@ def parts_of(sea: str, period_s: float, hours: int, minutes: list[float]) -> Ite
     actual = scenario.sailing_ship
     every = round(SAMPLE_TIME_S / RECORD_S)
     for seed in range(1, hours + 1):
-        for job in jobs_of(scenario, seed, 3600.0 + SETTLED_S):
+        for job in jobs_of(scenario, seed, 3600.0):
             rows = run_lockstep(job, Unwatched()).rows[round(SETTLED_S / RECORD_S) :: every]
             signals = {name: rows[:, COLUMNS.index(name)] for name in COLUMNS}
             level = (signals["starboard_level_m"] - signals["port_level_m"]) / 2
