@@ -13,7 +13,7 @@ import pytest
 from retuning_toys import candidate_of
 
 from utank_hil.arrays import FloatArray
-from utank_hil.retuning import Answer, Candidate, Refusal, RetuneFunction, RetunerProcess
+from utank_hil.retuning import Answer, Candidate, Desk, Refusal, RetuneFunction, RetunerProcess
 
 pytestmark = pytest.mark.slow
 
@@ -87,9 +87,13 @@ def _wait(condition: Callable[[], bool]) -> None:
 
 
 def _answer(retuner: RetunerProcess, number: int) -> Answer | None:
+    return _answer_at(retuner.desks[0], number)
+
+
+def _answer_at(desk: Desk, number: int) -> Answer | None:
     end_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < end_s:
-        answer = retuner.desks[0].answer(number, 0)
+        answer = desk.answer(number, 0)
         if answer is not None:
             return answer
         time.sleep(0.02)
@@ -249,7 +253,20 @@ def test_retuner_ends_when_its_controller_is_killed_even_if_it_hangs() -> None:
 
 def test_nonsense_in_the_mailbox_is_a_refusal() -> None:
     with running(answers_with_the_sum) as retuner:
-        retuner._answers.post(1, b"CANDIDATxyz")
+        retuner.desks[0]._answers.post(1, b"CANDIDATxyz")
         answer = retuner.desks[0].answer(1, 0)
     assert isinstance(answer, Refusal)
     assert "nonsense" in answer.reasons[0]
+
+
+def test_each_desk_has_its_own_answers_and_a_death_refuses_the_open_ones() -> None:
+    with RetunerProcess((answers_with_the_sum, SHAPE), (dies_on_seven, SHAPE)) as retuner:
+        first, second = retuner.desks
+        first.submit(1, RECORD, 0)
+        second.submit(1, np.full((3, 2), 7.0), 0)
+        died = _answer_at(second, 1)
+        assert isinstance(died, Refusal)
+        assert "ended with code 3" in died.reasons[0]
+        assert _answer_at(first, 1) == Refusal((f"(6, 2) {RECORD.sum():g}",))
+        second.submit(2, RECORD, 0)
+        assert _answer_at(second, 2) == Refusal(("no",))
