@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnContext
+from pathlib import Path
 from typing import Any, Final
 
 from firmware_sim.run import (
@@ -29,6 +30,7 @@ from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, PassiveDesign
 from utank_hil.runtime import stop_on_signals
+from utank_hil.telemetry.frame_log import SUFFIX
 
 POLL_S: Final = 0.1
 BEGIN_AFTER_NS: Final = 200_000_000
@@ -116,12 +118,15 @@ class BenchOptions:
         Instead of the scenario's.
     duration_s : float, optional
         Instead of the scenario's.
+    frames : Path, optional
+        Folder for a frame log of each run in simulated time.
     """
 
     real_time: bool = False
     channel: str | None = None
     seed: int | None = None
     duration_s: float | None = None
+    frames: Path | None = None
 
 
 class _Board:
@@ -234,6 +239,8 @@ def run_bench(
     seed = scenario.seed if options.seed is None else options.seed
     duration_s = scenario.duration_s if options.duration_s is None else options.duration_s
     jobs = jobs_of(scenario, seed, duration_s, laws)
+    if options.frames is not None:
+        jobs = [replace(job, frames=options.frames / frames_name(job.name)) for job in jobs]
     started = time.monotonic()
     context = multiprocessing.get_context("spawn")
     workers = 2 if options.channel is not None or not options.real_time else 1
@@ -263,6 +270,11 @@ def run_bench(
         time.monotonic() - started,
         bare_capsized_s,
     )
+
+
+def frames_name(run: str) -> str:
+    """Name of the frame log of a run."""
+    return f"{run}{SUFFIX}"
 
 
 def window_s(runs: tuple[Run, ...], settle_s: float) -> tuple[float, float]:

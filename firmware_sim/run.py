@@ -1,8 +1,10 @@
 """One run of a bench: a ship in a sea with one controller, in lockstep or in real time."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Protocol
 
 import numpy as np
@@ -35,13 +37,18 @@ from utank_hil.runtime import (
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
+from utank_hil.telemetry.node_tap import NodeTap, Tapped
+from utank_hil.telemetry.replay_head import replay_head
 from utank_hil.tick import TICK_NS, TICK_S
 
 SECOND_NS: Final = 1_000_000_000
 RECORD_TICKS: Final = 5
 """Of the controller's ticks, every fifth is kept: 20 Hz, ample for a ship."""
 RECORD_NS: Final = RECORD_TICKS * TICK_NS
+FRAME_BLOCK_NS: Final = 10 * SECOND_NS
+"""Of a frame log in simulated time: each block waits for the disk."""
 RECORD_S: Final = RECORD_NS / SECOND_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 
@@ -75,6 +82,8 @@ class Job:
         What the operator does.
     seed : int
     duration_s : float
+    frames : Path or None
+        Where a run in simulated time leaves its frame log, if it is to leave one.
     """
 
     name: str
@@ -84,6 +93,7 @@ class Job:
     script: tuple[TimedAction, ...]
     seed: int
     duration_s: float
+    frames: Path | None = None
 
     @property
     def ticks(self) -> int:
@@ -195,13 +205,15 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
         work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
         for work in works_of(job.controller)
     )
-    controller, log = _controller(job, retuner, estimating)
-    lockstep = Lockstep(
-        [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
-    )
-    end_ns = job.ticks * TICK_NS
-    while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
-        lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+    desks = Tapped(retuner, estimating, wanted=job.frames is not None)
+    controller, log = _controller(job, desks.retuner, desks.estimating)
+    with _frame_log(job, controller, desks) as node:
+        lockstep = Lockstep(
+            [*ship.nodes, node, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
+        )
+        end_ns = job.ticks * TICK_NS
+        while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
+            lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
     return Run(
         job.name,
         _side_by_side(log.rows, truth_log.rows),
@@ -335,6 +347,22 @@ def _controller(
         sink_every=RECORD_TICKS,
     )
     return node, log
+
+
+@contextmanager
+def _frame_log(job: Job, controller: ControllerNode, desks: Tapped) -> Iterator[Node]:
+    """The controller as it is put on the bus: with a tap, if the run is to leave a frame log."""
+    if job.frames is None:
+        yield controller
+        return
+    head = replay_head(
+        "bench", job.controller, job.law, job.frames.parent, options={"run": job.name},
+        retuner=desks.retuner is not None, estimating=desks.estimating is not None, seed=job.seed,
+    )  # fmt: skip
+    with FrameLogWriter(job.frames, head) as writer:
+        sink = BlockSink(writer, FRAME_BLOCK_NS)
+        yield NodeTap(controller, sink.write, desks.taps)
+        sink.flush()
 
 
 def _run_loop(

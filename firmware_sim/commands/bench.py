@@ -60,6 +60,10 @@ def bench(
     ] = None,
     duration: Duration = None,
     out: Annotated[Path, typer.Option(help="Folder for picture, recording and figures.")] = OUT,
+    frames: Annotated[
+        bool,
+        typer.Option("--frames", help="Keep each run's frame log there, for replay and export."),
+    ] = False,
     json_: Json = False,
     view: View = False,
 ) -> None:
@@ -72,7 +76,7 @@ def bench(
     says so (docs/exit-codes.md).
     """
     # loaded when it runs: `--help` needs none of it
-    from firmware_sim.bench import BenchOptions, run_bench
+    from firmware_sim.bench import BenchOptions, frames_name, run_bench
     from firmware_sim.model_limits import passed_limits
     from firmware_sim.on_board import on_board_table
     from firmware_sim.report import REPORT_FILES, as_json, endings, exit_code, write_report
@@ -81,15 +85,18 @@ def bench(
 
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
+    if frames and real_time:
+        fail("--frames is for lockstep: in real time `utank-hil run --out` keeps the frame log")
     loaded = load(scenario, Scenario)
     laws = {
         name: admit(controller, scenario, f"controllers.{name}")
         for name, controller in loaded.controllers.items()
     }
-    prepare_out(out, REPORT_FILES)
+    logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
+    prepare_out(out, (*REPORT_FILES, *logs))
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
-    options = BenchOptions(real_time, bus, seed, duration)
+    options = BenchOptions(real_time, bus, seed, duration, out if frames else None)
     length_s = loaded.duration_s if duration is None else duration
     about = _about(loaded, options, out, context.params)
     bar = Progress(
@@ -114,6 +121,7 @@ def bench(
         except OSError as error:
             fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
     files, failures = write_report(result, out, about)
+    files |= {f"frames of {Path(name).stem}": out / name for name in logs}
     if json_:
         sys.stdout.write(json.dumps(as_json(result, files, about)) + "\n")
     else:

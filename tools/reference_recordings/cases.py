@@ -28,7 +28,7 @@ from utank_hil.runtime import Lockstep, Node
 from utank_hil.runtime.node import Selective
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
-from utank_hil.telemetry.node_tap import NodeTap, RetunerTap, estimator_tap
+from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
 SCENARIOS: Final = Path("configs/scenarios")
@@ -280,15 +280,15 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
     file = folder / f"{case.name}.frames"
     with FrameLogWriter(file, head, small=True) as writer:
         sink = BlockSink(writer, block_ns=_WHOLE_NS)
-        latency_s = scenario.retuner_latency_s
-        retuner = sea = None
-        if retuning is not None:
-            retuner = RetunerTap(SimulatedRetuner(retuning[0], latency_s))
-        if estimating is not None:
-            sea = estimator_tap(SimulatedRetuner(estimating[0], latency_s))
-        taps = [tap for tap in (retuner, sea) if tap is not None]
-        controller = build_controller_node(config, law, retuner=retuner, estimating=sea)
-        node = NodeTap(controller, sink.write, taps)
+        desks = Tapped(
+            *(work and SimulatedRetuner(work[0], scenario.retuner_latency_s)
+              for work in (retuning, estimating)),
+            wanted=True,
+        )  # fmt: skip
+        controller = build_controller_node(
+            config, law, retuner=desks.retuner, estimating=desks.estimating
+        )
+        node = NodeTap(controller, sink.write, desks.taps)
         script = tuple(TimedAction(*timed) for timed in case.script)
         nodes: list[Node] = [*build_ship_side(scenario, seed, script).nodes, node]
         if case.intruder_s is not None:

@@ -48,7 +48,7 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry import event_text, open_viewer
 from utank_hil.telemetry.event_ring import Event
-from utank_hil.telemetry.node_tap import NodeTap, RetunerTap, estimator_tap
+from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
 
@@ -154,14 +154,12 @@ def run(
                 announcer.write(event, start_ns)
 
         records = recording is not None and recording.keeps_records
-        retuner_tap = RetunerTap(retuner) if records and retuner is not None else None
-        sea_tap = estimator_tap(estimating) if records and estimating is not None else None
-        taps = [tap for tap in (retuner_tap, sea_tap) if tap is not None]
+        desks = Tapped(retuner, estimating, wanted=records)
         node = build_controller_node(
             loaded,
             law,
-            retuner=retuner_tap or retuner,
-            estimating=sea_tap or estimating,
+            retuner=desks.retuner,
+            estimating=desks.estimating,
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=told,
@@ -169,7 +167,7 @@ def run(
 
         on_bus: Node = node
         if recording is not None and records:
-            on_bus = NodeTap(node, recording.write_records, taps)
+            on_bus = NodeTap(node, recording.write_records, desks.taps)
 
         def ended() -> bool:
             manager.progress(statistics.ticks)

@@ -14,6 +14,7 @@ from utank_hil.canbus import (
     Address,
     AddressClaim,
     ControllerStatus,
+    ControlWord,
     Frame,
     PumpCommand,
     ValveCommand,
@@ -118,9 +119,7 @@ def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[
     by_tick: dict[int, list[Frame]] = {}
     for time_ns, frame in sent:
         by_tick.setdefault((time_ns - begin_ns + _EARLY_NS) // TICK_NS, []).append(frame)
-    catalogue = load_catalogue()
-    status = catalogue.codec(ControllerStatus)
-    commands = {catalogue.codec(kind).can_id for kind in (PumpCommand, ValveCommand)}
+    status = load_catalogue().codec(ControllerStatus)
     said = next((status.decode(f.data) for _, f in sent if f.can_id == status.can_id), None)
     yield Kind.STARTED, 1, 0, 0, begin_ns, bytes([said is None or not said.not_realtime])
     last_ns = max([received[-1][4] if received else 0, sent[-1][0] if sent else 0])
@@ -133,10 +132,19 @@ def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[
             yield entry
             entry = next(waiting, None)
         # the last frames of all may be what a controller leaves behind, after its last tick
-        leaves = tick == last_own and commands.issuperset(frame.can_id for frame in by_tick[tick])
+        leaves = tick == last_own and _only_stops(by_tick[tick])
         yield Kind.STOP if leaves else Kind.TICK, 0, 0, 0, now_ns, b""
         for can_id, data in by_tick.get(tick, ()):
             yield Kind.SENT, len(data), 0, can_id, now_ns, data
+
+
+def _only_stops(frames: list[Frame]) -> bool:
+    """Whether frames are the last commands of a controller that ends: quick stop, and no more."""
+    pump, valve = load_catalogue().codec(PumpCommand), load_catalogue().codec(ValveCommand)
+    words = [pump.decode(frame.data) for frame in frames if frame.can_id == pump.can_id]
+    return {frame.can_id for frame in frames} <= {pump.can_id, valve.can_id} and any(
+        word is not None and word.control_word is ControlWord.QUICK_STOP for word in words
+    )
 
 
 def _messages(path: Path) -> Iterator["can.Message"]:

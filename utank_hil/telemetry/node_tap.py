@@ -88,11 +88,6 @@ class NodeTap:
         self._records.clear()
 
 
-def estimator_tap(estimating: Retuner) -> "RetunerTap":
-    """A tap of the estimator of sea and ship."""
-    return RetunerTap(estimating, Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE)
-
-
 class RetunerTap:
     """A retuner, or an estimator, whose answers are written down.
 
@@ -138,3 +133,33 @@ class RetunerTap:
         self._alive.clear()
         self._answers.clear()
         return records
+
+
+class Tapped:
+    """The desks of a controller, each with a tap if its answers are to be written down.
+
+    Parameters
+    ----------
+    retuner, estimating : Retuner or None
+        As `build_controller_node` takes them.
+    wanted : bool
+
+    Attributes
+    ----------
+    retuner, estimating : Retuner or None
+        To be handed to the controller.
+    taps : list of RetunerTap
+        For `NodeTap`.
+    """
+
+    def __init__(
+        self, retuner: Retuner | None, estimating: Retuner | None, *, wanted: bool
+    ) -> None:
+        self.retuner, self.estimating = retuner, estimating
+        self.taps: list[RetunerTap] = []
+        if wanted and retuner is not None:
+            self.retuner = tap = RetunerTap(retuner)
+            self.taps.append(tap)
+        if wanted and estimating is not None:
+            self.estimating = tap = RetunerTap(estimating, Kind.ESTIMATOR_ALIVE, Kind.ESTIMATE)
+            self.taps.append(tap)
