@@ -12,6 +12,7 @@ import pytest
 
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.extras import EXTRA_OF
+from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow
 
@@ -173,7 +174,9 @@ def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_r
     done = without_extras("utank_hil", *words, "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert "no recording: " in done.stderr
-    assert "pip install 'utank-hil[viewer]'" in done.stderr
+    assert "pip install 'utank-hil[viewer]'; there is the frame log alone" in done.stderr
+    (log,) = tmp_path.glob("run-*.frames")
+    assert FrameLog(log).head["about"]["command"] == "run"
 
 
 @pytest.mark.parametrize(

@@ -112,8 +112,7 @@ def test_another_gain_is_named_by_tick_message_and_signal(folder: Path, tmp_path
     first = found["first_difference"]
     assert (first["message"], first["signal"]) == ("PUMP_CMD", "pressure_pa")
     assert float(first["recorded"]) != float(first["replayed"])
-    # nothing but the pressure's own frames can differ, since the inputs are the recorded ones
-    assert set(found["different_frames"]) <= {"PUMP_CMD", "CTRL_STATUS"}
+    assert found["different_frames"]["PUMP_CMD"] > 10
     assert first["tick"] > 80  # armed after 0.8 s
     text = invoke(replay, log_of(folder), "--config", controller(tmp_path, -2e5)).stdout
     assert f"first at tick {first['tick']}" in text

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter, Rotation
 from utank_hil.telemetry.bus_records import ROW, ring_rows
 from utank_hil.telemetry.frame_log import SUFFIX
+from utank_hil.telemetry.recorder import NEEDS_RERUN
 
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
@@ -115,6 +117,8 @@ class RunRecording:
         for file in files:
             if file.exists() and file.stat().st_size == 0:
                 file.unlink()  # nothing in it
+        if head is not None and find_spec("rerun") is None:
+            self.summary.error = f"{NEEDS_RERUN}; there is the frame log alone"
         names = [str(file) if file.exists() else None for file in files]
         self.summary.file, self.summary.frames = (*names, None)[:2]
 

@@ -10,7 +10,7 @@ import lzma
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +27,10 @@ _BLOCK: Final = struct.Struct("<4sII")
 _HEAD: Final = b"HEAD"
 _QUICK: Final = b"BUSZ"  # zlib
 _SMALL: Final = b"BUSX"  # xz
+_DECOMPRESS: Final[dict[bytes, Callable[[bytes], bytes]]] = {
+    _QUICK: zlib.decompress,
+    _SMALL: lzma.decompress,
+}
 
 
 class FrameLogError(ValueError):
@@ -183,10 +187,8 @@ class FrameLog:
         self.cut = ""
         for path in self._paths:
             for kind, payload in self._read(path):
-                if kind == _QUICK:
-                    yield unpack(zlib.decompress(payload))
-                elif kind == _SMALL:
-                    yield unpack(lzma.decompress(payload))
+                if kind in _DECOMPRESS:
+                    yield unpack(_DECOMPRESS[kind](payload))
 
     def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
         with path.open("rb") as content:

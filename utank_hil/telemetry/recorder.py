@@ -35,6 +35,7 @@ from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.viewer import free_tcp_port, live_url, rerun_environment
 
 BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
+NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 _NICENESS: Final = 5
@@ -249,7 +250,7 @@ class RecorderProcess(Closing):
         head: Mapping[str, Any] | None = None,
     ) -> None:
         if find_spec("rerun") is None and frames is None:
-            raise RecorderError("it needs rerun-sdk: pip install 'utank-hil[viewer]'")
+            raise RecorderError(NEEDS_RERUN)
         given = {"about": about, "head": head} if about is not None or head is not None else None
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
         if events is not None:

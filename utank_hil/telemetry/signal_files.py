@@ -63,13 +63,8 @@ def read_signals(path: Path) -> dict[str, Columns]:
     """
     suffix = path.suffix.lower()
     if suffix == ".rrd":
-        try:
-            from utank_hil.telemetry.recording import read_recording
-        except ModuleNotFoundError as error:
-            raise SignalFileError(
-                f"{path}: reading it needs {error.name}: pip install 'utank-hil[viewer]', or give "
-                f"the {SUFFIX} file beside it"
-            ) from error
+        from utank_hil.telemetry.recording import read_recording  # here: Rerun
+
         return read_recording(path)
     if suffix == SUFFIX:
         return {path.stem: signal_table(entries_of(FrameLog(path).blocks()))}
@@ -92,7 +87,9 @@ def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
     columns : mapping of str to array (n,)
     """
     if path.suffix.lower() == ".parquet":
-        pyarrow, parquet = _pyarrow(path)
+        import pyarrow
+        from pyarrow import parquet
+
         arrays = {name: pyarrow.array(values, from_pandas=True) for name, values in columns.items()}
         parquet.write_table(pyarrow.table(arrays), path)
         return
@@ -286,7 +283,9 @@ def _is_number(field: str) -> bool:
 
 
 def _read_parquet(path: Path) -> Columns:
-    pyarrow, parquet = _pyarrow(path)
+    import pyarrow
+    from pyarrow import parquet
+
     try:
         table = parquet.read_table(path)
     except pyarrow.ArrowException as error:
@@ -310,17 +309,6 @@ def _in_si(name: str, values: FloatArray) -> list[tuple[str, FloatArray]]:
             return [(name.removesuffix(suffix) + si, values * factor)]
     column, unit = column_of(name)
     return [(column, values if unit.scale == 1 or column == name else values / unit.scale)]
-
-
-def _pyarrow(path: Path) -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ModuleNotFoundError as error:
-        raise SignalFileError(
-            f"{path}: Parquet needs pyarrow: pip install 'utank-hil[viewer]', or take .csv"
-        ) from error
-    return pyarrow, pyarrow.parquet
 
 
 def _listed(names: tuple[str, ...]) -> str:
