@@ -54,6 +54,8 @@ def replay(
         if log.suffix.lower() in BUS_SUFFIXES:
             result, why = _replay_bus_log(log, config)
         else:
+            if log.suffix == ".rrd":
+                fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
             recording = FrameLog(log)
             if not recording.first_part:
                 fail(

@@ -15,6 +15,7 @@ from utank_hil.telemetry.viewer import Viewer, open_viewer
 if TYPE_CHECKING:
     from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
     from utank_hil.telemetry.recording import read_about, read_recording, write_recording
+    from utank_hil.telemetry.signal_files import read_signals
 
 __all__ = [
     "EventReader",
@@ -31,6 +32,7 @@ __all__ = [
     "open_viewer",
     "read_about",
     "read_recording",
+    "read_signals",
     "write_recording",
 ]
 
@@ -40,6 +42,7 @@ _LAZY = {
     "RecorderReport": "recorder",
     "read_about": "recording",
     "read_recording": "recording",
+    "read_signals": "signal_files",
     "write_recording": "recording",
 }
 
