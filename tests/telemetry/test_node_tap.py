@@ -9,7 +9,7 @@ import pytest
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Frame
-from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.answer import answer_bytes
 from utank_hil.runtime import LoopStatistics
@@ -20,7 +20,7 @@ from utank_hil.telemetry.replay import RecordedRetuner
 TICK = 10_000_000
 SUMMARY = ModelSummary(8.0, 0.01, 2e9, 1e9, 5e7, 0.1, 0.99, 1.2, 0.3)
 LAW = PredictiveLaw(np.full((3, 1, 1), 0.1), np.full((3, 1, 1), 1 / 3), np.zeros((5, 1, 1)), 0.2)
-CANDIDATE = Candidate(LAW, 0.02, ARX(np.eye(1)[None], np.zeros((2, 1, 1)), 0.2), SUMMARY)
+CANDIDATE = Candidate(LAW, 0.02, SUMMARY)
 
 
 @dataclass
@@ -118,14 +118,14 @@ def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply: Answe
     tap.submit(4, np.zeros((2, 2)), 0)
     assert asked.submitted == 4
     chunks: list[bytes] = []
-    node = NodeTap(Node(tap), lambda data, _: chunks.append(data), tap)  # type: ignore[arg-type]
+    node = NodeTap(Node(tap), lambda data, _: chunks.append(data), [tap])  # type: ignore[arg-type]
     node.tick(TICK)
     node.tick(2 * TICK)
     again = RecordedRetuner()
     seen = []
     for kind, length, _, _, _, data in LAYOUT.iter_unpack(b"".join(chunks)):
         if kind in (Kind.ALIVE, Kind.ANSWER):
-            again.take(kind, data[:length])
+            again.take(data[:length], alive=kind == Kind.ALIVE)
         elif kind == Kind.TICK:
             seen.append((again.alive, again.answer(1, 0)))
             assert again.left_over() == again.astray == ""
@@ -143,7 +143,7 @@ def test_a_question_that_was_not_asked_then_is_found() -> None:
     retuner = RecordedRetuner()
     assert not retuner.alive
     assert retuner.astray == "asked whether the retuner lives"
-    retuner.take(Kind.ANSWER, answer_bytes(Refusal(("no",))))
+    retuner.take(answer_bytes(Refusal(("no",))), alive=False)
     assert retuner.left_over() == "took the retuner's answer"
     assert retuner.answer(1, 0) is None  # gone with its tick
 
