@@ -13,7 +13,6 @@ from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, refuse
@@ -42,9 +41,9 @@ class Vessel(Section):
     def version(self) -> int:
         """Hash of everything but the name, for the nodes to compare before arming."""
         parts = (self.ship, self.tank, self.pump)
-        content = [None if part is None else _not_by_default(part) for part in parts]
+        content = [None if part is None else not_by_default(part) for part in parts]
         if self.valve is not None:
-            content.append(_not_by_default(self.valve))
+            content.append(not_by_default(self.valve))
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -108,7 +107,7 @@ class Vessel(Section):
         return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
 
 
-def _not_by_default(part: RollShip | Tank | Pump | Valve) -> dict[str, Any]:
+def not_by_default(part: Any) -> dict[str, Any]:
     """The parameters that differ from their default, so that a new one changes no version."""
     defaults = {field.name: field.default for field in fields(part)}
     return {name: value for name, value in asdict(part).items() if value != defaults[name]}

@@ -74,12 +74,15 @@ class ControllerSettings:
         Of the bus, to judge its load.
     level_limit_m : float
         Level at which a reservoir is full or empty, to tell what is no measurement.
+    commissioned : bool
+        Whether a commissioning was passed with this configuration; else arming is refused.
     """
 
     configuration_version: int
     command_timeout_s: float = 0.05
     bit_rate: int = 250_000
     level_limit_m: float = math.inf
+    commissioned: bool = True
 
 
 class ControllerNode:
@@ -212,6 +215,7 @@ class ControllerNode:
         self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
+        self.seen.commissioned = settings.commissioned
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)

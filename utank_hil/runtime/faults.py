@@ -451,6 +451,16 @@ FAULTS: Final = (
         ),
     ),
     _row(
+        Fault.NOT_COMMISSIONED,
+        "No commissioning was passed with this configuration: signs and scales are not known.",
+        "Run utank-hil commission with this controller's file at the quay.",
+        Condition(
+            Reaction.REFUSE,
+            "no record of a passed commissioning with this vessel and these sensors",
+            lambda seen, _: not seen.commissioned,
+        ),
+    ),
+    _row(
         Fault.OPERATOR_SILENT,
         "The operator's panel is not heard.",
         "Check that the panel runs and is connected to the bus.",

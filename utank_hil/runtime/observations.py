@@ -64,6 +64,8 @@ class Observations:
         Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
         So does the operator's panel.
+    commissioned : bool
+        A commissioning was passed with this configuration; never overwritten.
     bus_load : float
         Share of the bus in use over the last second.
     protection_valid : bool
@@ -109,6 +111,7 @@ class Observations:
     address_conflict: bool = False
     versions_match: bool = True
     panel_matches: bool = True
+    commissioned: bool = True
     bus_load: float = 0.0
     protection_valid: bool = True
     high_level: bool = False
