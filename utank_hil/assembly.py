@@ -170,6 +170,7 @@ def build_controller_node(
             command_timeout_s=timeout_s,
             bit_rate=config.bit_rate,
             level_limit_m=tank.level_limit_m,
+            redundancy=config.vessel.redundancy,
             commissioned=commissioned,
         ),
         catalogue,
@@ -182,6 +183,7 @@ def build_controller_node(
             config.sensors,
             config.bit_rate,
             compares=law.closes_loop,
+            second_motion=config.vessel.redundancy.second_motion_sensor,
         )
         if monitored
         else None,

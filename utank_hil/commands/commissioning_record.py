@@ -32,6 +32,7 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
     return {
         "catalogue_version": load_catalogue().version,
         **{name: not_by_default(part) for name, part in parts.items() if part is not None},
+        "redundancy": not_by_default(vessel.redundancy),
         "sensors": not_by_default(config.sensors),
     }
 

@@ -16,6 +16,7 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, refuse
+from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
@@ -35,6 +36,8 @@ class Vessel(Section):
     pump: Pump | None = None
     valve: Valve | None = None
     """Without pump and valve the tank is passive."""
+    redundancy: Redundancy = NO_REDUNDANCY
+    """What the ship has twice, or by wires of its own."""
     _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property
@@ -44,6 +47,8 @@ class Vessel(Section):
         content = [None if part is None else not_by_default(part) for part in parts]
         if self.valve is not None:
             content.append(not_by_default(self.valve))
+        if self.redundancy != NO_REDUNDANCY:
+            content.append({"redundancy": asdict(self.redundancy)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 

@@ -40,6 +40,13 @@ _ALWAYS: Final = {
     "high_level": "seen.high_level",
 }
 _OF_PUMP: Final = {"pressure_pa": "inbox.pressure_pa", "command_pa": "command_pa"}
+# each sensor by itself, whichever is in use
+_OF_PAIR: Final = {
+    "roll_rad": "inbox.motions.first.roll_rad",
+    "roll_rate_rad_s": "inbox.motions.first.roll_rate_rad_s",
+    "roll_2_rad": "inbox.motions.second.roll_rad",
+    "roll_rate_2_rad_s": "inbox.motions.second.roll_rate_rad_s",
+}
 _OF_VALVE: Final = {"valve_opening": "inbox.valve_opening"}
 
 
@@ -104,6 +111,8 @@ class CommissioningNode:
         sources = dict(_ALWAYS)
         if plan is not None:
             sources |= _OF_PUMP
+        if node.inbox.motions is not None:
+            sources |= _OF_PAIR
         if stroke is not None:
             sources |= _OF_VALVE
         self._names = tuple(sources)
