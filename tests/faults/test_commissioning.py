@@ -8,6 +8,7 @@ import pytest
 from fault_bench import SECOND, altered
 from quay import ARM_S, another_ship, commissioned, controller, still_water
 
+from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
@@ -46,7 +47,7 @@ def test_every_shipped_ship_passes_with_room_to_spare(name: str) -> None:
     assert node.stage is Stage.DONE
     assert not node.ended
     checks = node.checks()
-    assert len(checks) == (15 if name == "pump_with_valve" else 13)
+    assert len(checks) == (17 if name == "pump_with_valve" else 15)
     for check in checks:
         assert abs(check.measured - check.expected) <= 0.5 * check.tolerance, check
 
@@ -139,9 +140,20 @@ def test_a_list_that_gauges_and_motion_sensor_agree_on_is_named_by_the_roll_alon
     vessel = NAVAL.vessel
     heeled = replace(vessel.ship, offset_moment_nm=0.03 * vessel.ship.stiffness_nm_rad)
     node = commissioned(NAVAL, nodes=another_ship(NAVAL, heeled, vessel.tank))
-    assert set(failed(node)) == {"roll_zero"}
+    # she starts upright, and is not at rest yet
+    assert set(failed(node)) == {"roll_zero", "roll_still", "level_still"}
     assert not node.moved  # nothing was pushed
     assert node.node.mode is not Mode.ACTIVE
+
+
+def test_a_ship_that_moves_by_herself_is_not_pushed() -> None:
+    scenario = still_water(NAVAL).model_copy(
+        update={"sea": RegularSea(kind="regular", amplitude_m=0.02, period_s=5.6)}
+    )
+    nodes = build_ship_side(scenario, 1, scenario.operator).nodes
+    node = commissioned(NAVAL, nodes=nodes)
+    assert "roll_still" in failed(node)
+    assert not node.moved
 
 
 def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(

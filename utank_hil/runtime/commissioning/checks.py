@@ -7,13 +7,16 @@ from typing import Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.runtime.commissioning.pulses import ValveStroke
+from utank_hil.runtime.commissioning.pulses import PulsePlan, ValveStroke
 from utank_hil.runtime.observations import VALVE_OFF
 
 ROLL_ZERO_DEG: Final = 1.0
 RATE_ZERO_DEG_S: Final = 0.15
 PRESSURE_ZERO: Final = 0.02
 """Share of the pressure limit."""
+
+STILL: Final = 0.2
+"""Share of the plan's peaks: ship and water that move more by themselves hide what pulses do."""
 
 Record = Mapping[str, FloatArray]
 """Columns of equal length by name, one row every sample time."""
@@ -50,8 +53,10 @@ class Check:
         return abs(self.measured - self.expected) <= self.tolerance
 
 
-def judge_rest(rest: Record, plant: DesignPlant, volume_m: float) -> list[Check]:
-    """Zeros of the sensors.
+def judge_rest(
+    rest: Record, plant: DesignPlant, plan: PulsePlan | None, volume_m: float
+) -> list[Check]:
+    """Zeros of the sensors, and whether ship and water are still enough for pulses.
 
     Parameters
     ----------
@@ -59,6 +64,8 @@ def judge_rest(rest: Record, plant: DesignPlant, volume_m: float) -> list[Check]
         Of some seconds in which ship and water are at rest and the pump is off.
     plant : DesignPlant
         As the files describe it.
+    plan : PulsePlan, optional
+        If the tank has a pump.
     volume_m : float
         Sum of both levels at which the volume's monitor speaks.
     """
@@ -75,7 +82,15 @@ def judge_rest(rest: Record, plant: DesignPlant, volume_m: float) -> list[Check]
         Check("high_level_switches", "high-level switches open", 1 - mean["high_level"], 1.0, 0.0,
               "of the time", "Check the switches and their wiring: low water leaves both open."),
     ]  # fmt: skip
-    if "pressure_pa" in rest:
+    if plan is not None:
+        level_m = (rest["starboard_level_m"] - rest["port_level_m"]) / 2
+        wait = "Wait for calmer water, without traffic and people moving on board."
+        checks += [
+            Check("roll_still", "roll about its mean, RMS", math.degrees(rest["roll_rad"].std()),
+                  0.0, STILL * math.degrees(plan.roll_rad), "deg", wait),
+            Check("level_still", "level about its mean, RMS", float(level_m.std()), 0.0,
+                  STILL * plan.level_m, "m", wait),
+        ]  # fmt: skip
         limit_kpa = plant.limits.pressure_pa * 1e-3
         checks.append(
             Check("pressure_zero", "pump pressure at rest", mean["pressure_pa"] * 1e-3, 0.0,

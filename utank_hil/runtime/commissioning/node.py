@@ -130,7 +130,7 @@ class CommissioningNode:
         """Judge what was recorded; takes tens of milliseconds, so not while the loop runs."""
         if not self.rest:
             return []
-        checks = judge_rest(self.rest, self._plant, self._volume_m)
+        checks = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
         begin = round(SETTLE_S / ROW_S)
         end = begin + round(self._pulses_s / ROW_S)
         record, plan, stroke = self.moved, self._plan, self._stroke
@@ -206,7 +206,7 @@ class CommissioningNode:
             self._enter(Stage.REST, now_ns)
         elif self.stage is Stage.REST and passed_s >= REST_S:
             self.rest = self._record()
-            zeros = judge_rest(self.rest, self._plant, self._volume_m)
+            zeros = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
             passed = all(check.passed for check in zeros)
             self._enter(Stage.ARM if passed else Stage.DONE, now_ns)
         elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
