@@ -16,6 +16,7 @@ from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
+from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.common import (
     OUT,
     Duration,
@@ -27,7 +28,6 @@ from utank_hil.commands.common import (
     notes,
     shown,
 )
-from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
