@@ -15,7 +15,7 @@ from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.commissioning_record import make_record, record_path, write_record
-from utank_hil.commands.common import Json, fail, load, notes, shown, why_not_writable
+from utank_hil.commands.common import Json, fail, lead_on, load, notes, shown, why_not_writable
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration.controller import ControllerConfig
@@ -104,7 +104,7 @@ def commission(
     if json_:
         sys.stdout.write(json.dumps({**made, "record": str(path)}) + "\n")
     else:
-        _print(made, path)
+        _print(made, path, config)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
 
 
@@ -142,7 +142,7 @@ class Guide:
         return node.stage is Stage.DONE
 
 
-def _print(record: dict[str, Any], path: Path) -> None:
+def _print(record: dict[str, Any], path: Path, config: Path) -> None:
     """The checks as a table, then what to do about those that failed."""
     console = Console(highlight=False)
     table = Table(title=f"Commissioning of {record['vessel']}")
@@ -167,3 +167,5 @@ def _print(record: dict[str, Any], path: Path) -> None:
         console.print(f"[red]ended early:[/red] {escape(record['ended'])}", soft_wrap=True)
     verdict = "passed" if record["passed"] else "[red]not passed: arming is refused[/red]"
     console.print(f"{verdict}; record: {escape(shown(path))}", soft_wrap=True)
+    if record["passed"]:
+        lead_on(console, f"run {shown(config)} --bus {record['bus']} --out log")
