@@ -93,12 +93,13 @@ class Monitors:
         # a valve's loss stands neither in the tank's equation here nor in the twin
         self._water_free = plant.valve is None
         self._compares = compares and self._water_free
-        first, second = (
+        gates = self.gates.motions if second_motion else (None, None)
+        first, second = [
             SensorEvidence(
                 MotionWatch(thresholds, gate), TankEquation(ship, tank, thresholds, LONG_S)
             )
-            for gate in (self.gates.motions if second_motion else (None, None))
-        )
+            for gate in gates
+        ]
         self._of_first = self._used = first
         self._spare = second if second_motion else None
         self._pair = MotionPair(thresholds, SHORT_S)
