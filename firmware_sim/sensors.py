@@ -33,7 +33,7 @@ _CLOSED, _OPEN = Switch.ON, Switch.OFF
 _M = TypeVar("_M", bound=tuple[Any, ...])
 
 
-def _standard_normal(seed: int) -> Iterator[float]:
+def standard_normal(seed: int) -> Iterator[float]:
     """Standard normal numbers, drawn in blocks because one at a time is slow."""
     generator = np.random.Generator(np.random.PCG64(seed))
     while True:
@@ -70,7 +70,7 @@ class SensorNode:
         self.hears: frozenset[int] = frozenset()
         self._plant = plant
         self._errors = errors
-        self._draw = _standard_normal(seed).__next__
+        self._draw = standard_normal(seed).__next__
         delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []

@@ -8,6 +8,7 @@ from firmware_sim.drive import PumpDrive
 from firmware_sim.external_drive import ExternalDrive
 from firmware_sim.external_valve import ExternalValve
 from firmware_sim.plant import Plant
+from firmware_sim.redundant_sensors import HardwiredNode, SecondMotionNode
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
 from firmware_sim.valve import ValveNode
@@ -17,10 +18,11 @@ from utank_hil.dynamics.tank import negligible
 from utank_hil.runtime import Node
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
-NODE_NAMES: Final = ("sensors", "drive", "valve", "panel")
+NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "drive", "valve", "panel")
 """The emulated nodes, in the order in which they tick; hardware may take the place of each.
 
-Only a ship with a pump has a drive, and only one with a valve has that.
+Only a ship with a pump has a drive, and only one with a valve has that; the second motion sensor
+and the hard-wired inputs are there if the vessel's section `redundancy` says so.
 """
 
 # enabled at zero pressure the pump leaves the tank alone; switched off, its rotor turns with the
@@ -42,6 +44,9 @@ class ShipSide:
     panel : OperatorPanel
     valve : ValveNode or None
         If the tank has one.
+    second_motion : SecondMotionNode or None
+    hardwired : HardwiredNode or None
+        If the vessel's redundancy has them.
     """
 
     vessel: Vessel
@@ -50,12 +55,16 @@ class ShipSide:
     drive: PumpDrive | None
     panel: OperatorPanel
     valve: ValveNode | None = None
+    second_motion: SecondMotionNode | None = None
+    hardwired: HardwiredNode | None = None
 
     @property
     def nodes(self) -> tuple[Node, ...]:
         """The nodes, in the order in which they tick."""
-        actuators = [node for node in (self.drive, self.valve) if node is not None]
-        return self.sensors, *actuators, self.panel
+        optional: tuple[Node | None, ...] = (
+            self.second_motion, self.hardwired, self.drive, self.valve,
+        )  # fmt: skip
+        return self.sensors, *(node for node in optional if node is not None), self.panel
 
     @property
     def refused_commands(self) -> int:
@@ -137,6 +146,15 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         valve = ValveNode(
             plant, vessel.tank, vessel.valve, catalogue, configuration_version=version
         )
+    second_motion = hardwired = None
+    if vessel.redundancy.second_motion_sensor:
+        second_motion = SecondMotionNode(
+            plant, scenario.sensors, catalogue, configuration_version=version, seed=seed + 2
+        )
+    if vessel.redundancy.hardwired_inputs:
+        hardwired = HardwiredNode(
+            plant, scenario.sensors.high_level_m, catalogue, configuration_version=version
+        )
     return ShipSide(
         vessel,
         plant,
@@ -146,4 +164,6 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         drive,
         OperatorPanel(catalogue, configuration_version=version, script=script),
         valve,
+        second_motion,
+        hardwired,
     )

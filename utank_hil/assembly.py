@@ -13,6 +13,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
+from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.parameters import ParameterError
 from utank_hil.retuning import (
@@ -26,6 +27,8 @@ from utank_hil.retuning import (
     make_pulses,
 )
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
+from utank_hil.runtime.commissioning.node import CommissioningNode
+from utank_hil.runtime.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
 from utank_hil.runtime.controller_node import (
     ControllerNode,
     ControllerSettings,
@@ -34,6 +37,7 @@ from utank_hil.runtime.controller_node import (
 )
 from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitors.thresholds import thresholds_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
@@ -137,6 +141,8 @@ def build_controller_node(
     sink: Callable[[FloatArray], None] | None = None,
     sink_every: int = 1,
     event_sink: EventSink | None = None,
+    commissioned: bool = True,
+    monitored: bool = True,
 ) -> ControllerNode:
     """Build the controller node of a configuration.
 
@@ -152,6 +158,10 @@ def build_controller_node(
         Who tells waves and ship from the motion, if the configuration asks for it.
     statistics, sink, sink_every, event_sink
         As `ControllerNode` takes them.
+    commissioned : bool
+        Whether it may be armed. On a bench it may: the ship there is made of the same files.
+    monitored : bool
+        Whether it has monitors.
     """
     law = law or build_law(config)
     tank, catalogue = config.vessel.tank, load_catalogue()
@@ -179,6 +189,8 @@ def build_controller_node(
             command_timeout_s=timeout_s,
             bit_rate=config.bit_rate,
             level_limit_m=tank.level_limit_m,
+            redundancy=config.vessel.redundancy,
+            commissioned=commissioned,
         ),
         catalogue,
         commands=law.commands,
@@ -190,13 +202,58 @@ def build_controller_node(
             config.sensors,
             config.bit_rate,
             compares=law.closes_loop,
-        ),
+            second_motion=config.vessel.redundancy.second_motion_sensor,
+        )
+        if monitored
+        else None,
         retuning=retuning,
         estimator=estimator,
         statistics=statistics,
         sink=sink,
         sink_every=sink_every,
         event_sink=event_sink,
+    )
+
+
+def build_commissioning_node(
+    config: ControllerConfig,
+    *,
+    statistics: LoopStatistics | None = None,
+    event_sink: EventSink | None = None,
+) -> CommissioningNode:
+    """Build the node that leads through the commissioning of a configuration.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+        Its law has no part in it.
+    statistics, event_sink
+        As `ControllerNode` takes them.
+
+    Raises
+    ------
+    ValueError
+        If the vessel has neither pump nor valve.
+    """
+    vessel, plant = config.vessel, config.plant
+    commands = tuple(
+        name for name, part in ((PRESSURE, vessel.pump), (VALVE, vessel.valve)) if part is not None
+    )
+    if not commands:
+        raise ValueError(f"{vessel.name} has neither pump nor valve: nothing can be armed")
+    law = PulseLaw(commands)
+    built = BuiltLaw(lambda: law, ("roll_rad",), closes_loop=False, commands=commands)
+    # a monitor would end the pulses at what they are there to show, before they can say which it is
+    node = build_controller_node(
+        config, built, statistics=statistics, event_sink=event_sink, monitored=False
+    )
+    return CommissioningNode(
+        node,
+        law,
+        plant,
+        plan=None if vessel.pump is None else plan_pulses(plant),
+        stroke=None if vessel.valve is None else plan_stroke(vessel.valve, vessel.tank),
+        volume_m=thresholds_of(plant, config.safety.roll_limit_rad, config.sensors).volume_m,
     )
 
 

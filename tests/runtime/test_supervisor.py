@@ -90,6 +90,9 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.SPIKES, Reaction.RAMP, {"found": Finding.SPIKES}),
     (Fault.SIGNAL_DELAYED, Reaction.RAMP, {"found": Finding.MOTION_LATE}),
     (Fault.ROLL_AMPLIFIED, Reaction.RAMP, {"found": Finding.ROLL_AMPLIFIED}),
+    (Fault.SENSORS_DISAGREE, Reaction.RAMP, {"found": Finding.SENSORS_UNCLEAR}),
+    (Fault.HARDWIRED_STOP, Reaction.STOP, {"hardwired_stop": True}),
+    (Fault.HARDWIRED_SILENT, Reaction.STOP, {"hardwired_age_ms": 160}),
 ]
 
 
@@ -144,6 +147,7 @@ INIT_SIGNS = [
     (Fault.PUMP_SENSOR_SILENT, {"pump_age_ms": 1100}),
     (Fault.DRIVE_SILENT, {"drive_age_ms": 70}),
     (Fault.VERSION_MISMATCH, {"versions_match": False}),
+    (Fault.HARDWIRED_SILENT, {"hardwired_age_ms": 160}),
 ]
 
 
@@ -385,6 +389,15 @@ def test_whatever_ends_active_ends_arming(
     assert supervisor.demand is Demand.ZERO
     for _ in range(50):  # the sign gone, the arm bit held
         assert bench.tick(**ACTIVE).mode is not Mode.ACTIVE
+
+
+def test_arming_is_refused_without_a_commissioning_and_ends_when_it_is_missing() -> None:
+    bench = Bench()
+    bench.tick()
+    supervisor = bench.tick(**ARMING, commissioned=False)
+    assert (supervisor.mode, supervisor.fault) == (Mode.STANDBY, Fault.NOT_COMMISSIONED)
+    assert not supervisor.arming
+    assert not supervisor.drive_wanted
 
 
 def test_a_panel_that_goes_silent_ends_arming_as_it_refuses_it() -> None:
@@ -654,7 +667,7 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[Observat
             edge_since_disarmed = False
 
 
-DEGRADING = ("DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT")
+DEGRADING = ("DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "SENSORS_DISAGREE")
 
 
 @pytest.mark.parametrize("finding", list(Finding), ids=lambda finding: str(finding.name))

@@ -37,9 +37,12 @@ class AlarmLines:
 
     def tell(self, event: AlarmEvent, start_ns: int) -> None:
         """Print an event, with the time since the start; never waits."""
-        time_s = (event.time_ns - start_ns) * 1e-9
+        self.say(f"{(event.time_ns - start_ns) * 1e-9:8.1f} s {event_text(event)}")
+
+    def say(self, line: str) -> None:
+        """Print a line; never waits."""
         with contextlib.suppress(OSError):  # the fault is also the last word of the command
-            os.write(self._pipe, f"{time_s:8.1f} s {event_text(event)}\n".encode())
+            os.write(self._pipe, f"{line}\n".encode())
 
     def close(self) -> None:
         """Have the last line printed; idempotent."""

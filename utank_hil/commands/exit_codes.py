@@ -26,9 +26,10 @@ class ExitCode(IntEnum):
     OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
     REFUSED = (
         1,
-        "`check`, `identify`, `init`, `replay`",
-        "A law misses its margins, a model or its law is refused, no tank can be for a ship, or a "
-        "replay differs. Of any command, with a traceback: an error in the program.",
+        "`check`, `commission`, `identify`, `init`, `replay`",
+        "A law misses its margins, a commissioning is not passed, a model or its law is refused, "
+        "no tank can be for a ship, or a replay differs. Of any command, with a traceback: an "
+        "error in the program.",
     )
     USAGE = (
         2,
@@ -38,7 +39,7 @@ class ExitCode(IntEnum):
     )
     NO_BUS = (
         3,
-        "`run`, `panel`, `bench`, `firmware-sim`",
+        "`run`, `commission`, `panel`, `bench`, `firmware-sim`",
         "The CAN interface can't be opened.",
     )
     BUS_LOST = (
@@ -55,7 +56,7 @@ class ExitCode(IntEnum):
     )
     INTERRUPTED = (
         130,
-        "`bench`, `firmware-sim`",
-        "`bench`: Ctrl-C before the end; results hold what there is. `firmware-sim`: Ctrl-C before "
-        "the first sample.",
+        "`bench`, `commission`, `firmware-sim`",
+        "`bench`: Ctrl-C before the end; results hold what there is. `commission`: Ctrl-C before "
+        "all was checked. `firmware-sim`: Ctrl-C before the first sample.",
     )

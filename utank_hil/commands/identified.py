@@ -12,6 +12,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.provenance import headline
 from utank_hil.retuning import ModelSummary
+from utank_hil.runtime.redundancy import NO_REDUNDANCY
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"
@@ -111,9 +112,9 @@ def _write(
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     """What a vessel's file holds; values at their defaults are left out."""
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
-    for key in ("ship", "tank", "pump", "valve"):
+    for key in ("ship", "tank", "pump", "valve", "redundancy"):
         part = getattr(vessel, key)
-        if part is None:
+        if part is None or part == NO_REDUNDANCY:
             continue
         content[key] = {
             field.name: getattr(part, field.name)

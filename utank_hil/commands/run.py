@@ -16,6 +16,7 @@ from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
+from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.common import (
     OUT,
     Duration,
@@ -72,12 +73,21 @@ def run(
             help="Remove the folder's oldest recordings beyond so much; without it none are.",
         ),
     ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Record of utank-hil commission, if it is not beside the configuration.",
+        ),
+    ] = None,
     json_: Json = False,
     view: View = False,
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
-    It starts in STANDBY. Only an operator at the panel arms it. Recordings are named by the time
+    It starts in STANDBY. Only an operator at the panel arms it, and only if utank-hil commission
+    was passed with this vessel and these sensors; on an emulated bus (vcan0) no record of it is
+    asked for unless --record names one. Recordings are named by the time
     (UTC) of their start and go on in another file every hour; one that fails is reported, and the
     controller runs without. A controller that retunes itself prints each step with its reasons when
     it happens; so does one that raises an alarm, and both are logged in the folder of --out. A
@@ -90,6 +100,9 @@ def run(
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.print("[yellow]repeated late ticks are not judged:[/yellow] safety.overruns_in_ten")
+    refused = why_not_commissioned(loaded, bus, config, record)
+    if refused:
+        notes.print("[yellow]arming will be refused:[/yellow]", escape(refused), soft_wrap=True)
     statistics = LoopStatistics()
     with ExitStack() as stack:
         try:
@@ -163,6 +176,7 @@ def run(
             statistics=statistics,
             sink=None if recording is None else recording.write,
             event_sink=told,
+            commissioned=not refused,
         )
 
         on_bus: Node = node
@@ -192,6 +206,7 @@ def run(
             "exit_code": code,
             "mode": node.mode.name,
             "fault": node.fault.name,
+            "not_commissioned": refused,
             "law_error": node.law_error,
             "fallbacks": node.fallbacks,
             "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],

@@ -13,10 +13,10 @@ from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, Range, refuse
+from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
@@ -38,15 +38,19 @@ class Vessel(Section):
     """Without pump and valve the tank is passive."""
     least_gm_m: Annotated[float, Range(above=0, most=1e3)] | None = None
     """Limit of the stability booklet on the metacentric height, tank water free to move."""
+    redundancy: Redundancy = NO_REDUNDANCY
+    """What the ship has twice, or by wires of its own."""
     _written: frozenset[str] = frozenset()  # keys of the ship in its file
 
     @property
     def version(self) -> int:
         """Hash of everything but the name, for the nodes to compare before arming."""
         parts = (self.ship, self.tank, self.pump)
-        content = [None if part is None else _not_by_default(part) for part in parts]
+        content = [None if part is None else not_by_default(part) for part in parts]
         if self.valve is not None:
-            content.append(_not_by_default(self.valve))
+            content.append(not_by_default(self.valve))
+        if self.redundancy != NO_REDUNDANCY:
+            content.append({"redundancy": asdict(self.redundancy)})
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).digest()
         return int.from_bytes(digest[:4], "big") % NOT_AVAILABLE
 
@@ -112,7 +116,7 @@ class Vessel(Section):
         return in_written_keys(vessel_warnings(self.ship, self.tank, self.pump), self._written)
 
 
-def _not_by_default(part: RollShip | Tank | Pump | Valve) -> dict[str, Any]:
+def not_by_default(part: Any) -> dict[str, Any]:
     """The parameters that differ from their default, so that a new one changes no version."""
     defaults = {field.name: field.default for field in fields(part)}
     return {name: value for name, value in asdict(part).items() if value != defaults[name]}

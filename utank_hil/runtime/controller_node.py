@@ -36,6 +36,7 @@ from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
+from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
@@ -76,12 +77,18 @@ class ControllerSettings:
         Of the bus, to judge its load.
     level_limit_m : float
         Level at which a reservoir is full or empty, to tell what is no measurement.
+    redundancy : Redundancy
+        What else the ship has.
+    commissioned : bool
+        Whether a commissioning was passed with this configuration; else arming is refused.
     """
 
     configuration_version: int
     command_timeout_s: float = 0.05
     bit_rate: int = 250_000
     level_limit_m: float = math.inf
+    redundancy: Redundancy = NO_REDUNDANCY
+    commissioned: bool = True
 
 
 class ControllerNode:
@@ -202,6 +209,7 @@ class ControllerNode:
             pump=pump,
             valve=valve is not None,
             gates=None if monitors is None else monitors.gates,
+            redundancy=settings.redundancy,
         )
         if monitors is not None:
             monitors.watch(self.inbox.watched, self.inbox.expected)
@@ -222,6 +230,7 @@ class ControllerNode:
         self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
+        self.seen.commissioned = settings.commissioned
         self._row = np.zeros(len(SIGNALS))
         self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)

@@ -103,6 +103,27 @@ def _found(reaction: Reaction, limit: str, findings: Finding) -> Condition:
 # Of the conditions with the same reaction, the first that holds names the fault.
 FAULTS: Final = (
     _row(
+        Fault.HARDWIRED_STOP,
+        "The hard-wired stop was pressed, or its loop is broken.",
+        "Release the stop; if none is pressed, look for the break in the loop.",
+        Condition(
+            Reaction.STOP,
+            "the stop loop is open, broken or not available, in any intact frame",
+            lambda seen, _: seen.hardwired_stop,
+        ),
+    ),
+    _row(
+        Fault.HARDWIRED_SILENT,
+        "The node of the hard-wired stop and high-level switches is not heard.",
+        "Check the node's supply and bus connection, and the quality in HARDWIRED_INPUTS.",
+        Condition(
+            Reaction.STOP,
+            "last good frame older than {hardwired_age_ms:g} ms",
+            lambda seen, limits: seen.hardwired_age_ms > limits.hardwired_age_ms,
+            awaited=9,
+        ),
+    ),
+    _row(
         Fault.BUS_LOST,
         "The CAN bus could not be read or written.",
         "Check the interface (ip -details link show), the cable and the termination.",
@@ -301,6 +322,26 @@ FAULTS: Final = (
             zero_within_ms=200,  # 250 after the sample, whose first 30 ms of age are allowed
             awaited=3,
         ),
+        Condition(
+            Reaction.HALVE,
+            "one of two motion sensors: last good sample older than {motion_spare_age_ms:g} ms",
+            lambda seen, limits: seen.motion_spare_age_ms > limits.motion_spare_age_ms,
+        ),
+    ),
+    _row(
+        Fault.SENSORS_DISAGREE,
+        "The two motion sensors disagree, or something speaks against one of them.",
+        "Compare both with the horizon and a plumb line; mend or replace the one that is wrong.",
+        _found(
+            Reaction.RAMP,
+            "roll or rate apart for 1.5 roll periods, and nothing says which one is wrong",
+            Finding.SENSORS_UNCLEAR,
+        ),
+        _found(
+            Reaction.HALVE,
+            "roll apart by half a degree, or their rates; or one found wrong, the other used",
+            Finding.SENSORS_DISAGREE,
+        ),
     ),
     _row(
         Fault.TANK_SILENT,
@@ -461,6 +502,16 @@ FAULTS: Final = (
                 limits.overruns_in_ten is not None
                 and seen.overruns_in_ten >= limits.overruns_in_ten
             ),
+        ),
+    ),
+    _row(
+        Fault.NOT_COMMISSIONED,
+        "No commissioning was passed with this configuration: signs and scales are not known.",
+        "Run utank-hil commission with this controller's file at the quay.",
+        Condition(
+            Reaction.REFUSE,
+            "no record of a passed commissioning with this vessel and these sensors",
+            lambda seen, _: not seen.commissioned,
         ),
     ),
     _row(

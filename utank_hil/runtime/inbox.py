@@ -17,6 +17,7 @@ from utank_hil.canbus import (
     DriveStatus1,
     DriveStatus2,
     Frame,
+    HardwiredInputs,
     Heartbeat,
     Quality,
     Receiver,
@@ -29,8 +30,11 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.canbus.endpoints import MAX_LOST
-from utank_hil.runtime.monitors.spikes import SpikeGates
+from utank_hil.runtime.hardwired import HardwiredHeard
+from utank_hil.runtime.monitors.spikes import MotionGate, SpikeGates
+from utank_hil.runtime.motion_sensors import MotionSensor, MotionSensors
 from utank_hil.runtime.orders import NEVER_HEARD_NS
+from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.runtime.stations import ADDRESSES, Stations
 
 MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
@@ -66,11 +70,19 @@ class Inbox:
         Level at which a reservoir is full or empty; infinite if it is not known.
     pump, valve : bool
         Whether the ship has a pump, and a valve, to be heard.
+    gates : SpikeGates, optional
+        Through which samples of motion sensor and gauges pass.
+    redundancy : Redundancy
+        What else the ship has.
 
     Attributes
     ----------
     roll_rad, roll_rate_rad_s : float
         Of the last good motion sample, received at `motion_ns`.
+    motions : MotionSensors or None
+        Where there are two motion sensors: both. The attributes above are those of the one in use.
+    hardwired : HardwiredHeard or None
+        Where there are hard-wired inputs.
     port_level_m, starboard_level_m : float
         Above still water, received at `tank_ns`, `tank_cycles` of the message after the first.
     high_level : bool
@@ -111,6 +123,7 @@ class Inbox:
         pump: bool = True,
         valve: bool = False,
         gates: SpikeGates | None = None,
+        redundancy: Redundancy = NO_REDUNDANCY,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
@@ -119,7 +132,16 @@ class Inbox:
         self._known = catalogue.can_ids
         self.watched: list[Receiver[Any]] = []
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
-        self._motion = self._subscribe(catalogue.receiver(SensorMotion), self._on_motion)
+        self._motion = catalogue.receiver(SensorMotion)
+        self.motions: MotionSensors | None = None
+        if redundancy.second_motion_sensor:
+            second = catalogue.receiver(SensorMotion, Address.SENSORS_2)
+            self.motions = MotionSensors(self._motion, second)
+            for index, sensor in enumerate((self.motions.first, self.motions.second)):
+                gate = None if gates is None else gates.motions[index]
+                self._subscribe(sensor.receiver, partial(self._on_either_motion, sensor, gate))
+        else:
+            self._subscribe(self._motion, self._on_motion)
         self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
         self._drive_1: Receiver[DriveStatus1] | None = None
         matched = [Address.SENSORS]
@@ -131,6 +153,13 @@ class Inbox:
         if valve:
             matched.append(Address.VALVE)
             self._subscribe(catalogue.receiver(ValveStatus), self._on_valve)
+        self.hardwired: HardwiredHeard | None = None
+        if redundancy.hardwired_inputs:
+            matched.append(Address.HARDWIRED)
+            hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
+            self._subscribe(hardwired.receiver, hardwired.take)
+            self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
+            self.hardwired = hardwired
         self.stations = Stations(catalogue)
         for orders in self.stations.orders.values():
             self._subscriptions[orders.can_id] = orders.accept, orders.obey
@@ -140,6 +169,10 @@ class Inbox:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
+        if self.motions is not None:
+            beats_2 = catalogue.receiver(Heartbeat, Address.SENSORS_2)
+            self._matching[beats_2.can_id] = True  # silent, it is missed but not waited for
+            self._subscribe(beats_2, partial(self._on_heartbeat, beats_2.can_id))
         self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
         self._panels_match = dict.fromkeys(ADDRESSES, False)
         for station, address in ADDRESSES.items():
@@ -182,7 +215,9 @@ class Inbox:
     def protection_valid(self) -> bool:
         """Whether the messages that control stands on keep arriving intact and in order."""
         drive_valid = self._drive_1 is None or self._drive_1.valid
-        return self._motion.valid and self._tank.valid and drive_valid
+        motions = self.motions
+        motion_valid = self._motion.valid if motions is None else motions.used.receiver.valid
+        return motion_valid and self._tank.valid and drive_valid
 
     def _subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
         """Hand the accepted messages of a receiver to `handle`, with the time they came."""
@@ -210,10 +245,33 @@ class Inbox:
         # one test for both: the sum is NaN if either is not available
         if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
             self._gates is None
-            or self._gates.motion_passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
+            or self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
         ):
             self.roll_rad, self.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
             self.motion_ns = now_ns
+
+    def _on_either_motion(
+        self, sensor: MotionSensor, gate: MotionGate | None, motion: SensorMotion, now_ns: int
+    ) -> None:
+        if motion.quality not in _USABLE:
+            return
+        if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
+            gate is None or gate.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
+        ):
+            sensor.roll_rad, sensor.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
+            sensor.heard_ns = now_ns
+            if self.motions is not None and sensor is self.motions.used:
+                self._show_motion(sensor)
+
+    def _show_motion(self, sensor: MotionSensor) -> None:
+        self.roll_rad, self.roll_rate_rad_s = sensor.roll_rad, sensor.roll_rate_rad_s
+        self.motion_ns = sensor.heard_ns
+
+    def exchange_motion(self) -> None:
+        """Use the other motion sensor from now on."""
+        if self.motions is not None:
+            self.motions.exchange()
+            self._show_motion(self.motions.used)
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
         self._count_cycles(now_ns)

@@ -18,7 +18,9 @@ from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.level_stuck import LevelStuck
 from utank_hil.runtime.monitors.motion import RollAgainstRate
-from utank_hil.runtime.monitors.noise import Noise, SecondDifference
+from utank_hil.runtime.monitors.motion_pair import MotionPair, SensorEvidence
+from utank_hil.runtime.monitors.motion_watch import MotionWatch
+from utank_hil.runtime.monitors.noise import Noise
 from utank_hil.runtime.monitors.senders import Heard, Senders, Stream
 from utank_hil.runtime.monitors.spikes import SpikeCount, SpikeGates
 from utank_hil.runtime.monitors.tank_equation import TankEquation
@@ -31,6 +33,8 @@ from utank_hil.tick import TICK_S
 ROUND_TICKS: Final = 10
 LONG_S: Final = ROUND_TICKS * TICK_S
 SHORT_S: Final = LONG_S / 2
+SPARE_MS: Final = 30.0
+"""An older measurement of the other motion sensor is not changed over to."""
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
 SILENT_S: Final = 1.0
@@ -42,7 +46,6 @@ MOST_CHANGE: Final = 10.0
 MOST_DAMPING_RATIO: Final = 1.0
 """Of ship and tank, as identified."""
 
-_NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
 
@@ -61,15 +64,14 @@ class Monitors:
     compares : bool
         Whether the law is meant to roll the ship less than her passive twin; one that stimulates
         her is not.
+    second_motion : bool
+        Whether there is a second motion sensor.
 
     Attributes
     ----------
     thresholds : MonitorThresholds
     twin : PassiveTwin
-    motion : RollAgainstRate
-    rate_noise : Noise
     drive : DriveFollowing
-    equation : TankEquation
     volume : Volume
         The monitors whose statistics are of interest.
     found : int
@@ -84,17 +86,14 @@ class Monitors:
         bit_rate: int,
         *,
         compares: bool = True,
+        second_motion: bool = False,
     ) -> None:
         self.thresholds: MonitorThresholds = thresholds_of(plant, roll_limit_rad, sensors)
         thresholds, ship, tank = self.thresholds, plant.ship, plant.tank
         self.gates = SpikeGates(thresholds)
         self._spikes = SpikeCount()
-        self.motion = RollAgainstRate(thresholds)
-        self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
-        self._rate_bend = SecondDifference()
         self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
         self._saturation = Saturation(thresholds)
-        self.equation = TankEquation(ship, tank, thresholds, LONG_S)
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
         self.volume = Volume(thresholds)
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
@@ -103,12 +102,21 @@ class Monitors:
         # a valve's loss stands neither in the tank's equation here nor in the twin
         self._water_free = plant.valve is None
         self._compares = compares and self._water_free
+        gates = self.gates.motions if second_motion else (None, None)
+        first, second = [
+            SensorEvidence(
+                MotionWatch(thresholds, gate), TankEquation(ship, tank, thresholds, LONG_S)
+            )
+            for gate in gates
+        ]
+        self._of_first = self._used = first
+        self._spare = second if second_motion else None
+        self._pair = MotionPair(thresholds, SHORT_S)
         self._frames_per_s = bit_rate / MEAN_FRAME_BITS
         self._senders = Senders((), self._frames_per_s)
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
-        self._turned_rad = self._last_rate_rad_s = 0.0
-        self._of_motion = self._of_drive = self._of_water = self._of_volume = 0
+        self._of_pair = self._of_drive = self._of_level = self._of_volume = 0
         self._of_senders = self._of_twin = self._of_saturation = 0
         self.found = 0
 
@@ -129,6 +137,21 @@ class Monitors:
             ship, tank = found.ship(ship), found.tank(tank)
         self.twin.take(ship, tank)
 
+    @property
+    def motion(self) -> RollAgainstRate:
+        """Of the motion sensor in use, as the two that follow."""
+        return self._used.watch.motion
+
+    @property
+    def rate_noise(self) -> Noise:
+        """Noise of the roll rate."""
+        return self._used.watch.rate_noise
+
+    @property
+    def equation(self) -> TankEquation:
+        """The tank's equation."""
+        return self._used.equation
+
     def watch(self, receivers: Iterable[Heard], expected: Collection[int]) -> None:
         """Watch the pace of messages; of those `expected`, by identifier, the silence too."""
         streams = [
@@ -140,7 +163,7 @@ class Monitors:
     def twin_message(self) -> PassiveTwinMessage:
         """What the panels are shown of the twin: degraded by what degrades the motion sensor."""
         twin = self.twin
-        quality = Quality.DEGRADED if self._of_motion else Quality.GOOD
+        quality = Quality.DEGRADED if self._used.watch.found else Quality.GOOD
         return PassiveTwinMessage(quality, twin.roll_rad, twin.rms_rad, twin.ship_rms_rad)
 
     def update(
@@ -171,8 +194,15 @@ class Monitors:
         int
             `found`.
         """
-        self._turned_rad += inbox.roll_rate_rad_s * ((now_ns - self._last_ns) * 1e-9)
+        elapsed_s = (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
+        motions, spare = inbox.motions, self._spare
+        if motions is not None and spare is not None:
+            if (motions.used is motions.first) is not (self._used is self._of_first):
+                self._used, self._spare = spare, self._used  # the other one is silent
+                spare = self._spare
+            spare.watch.turned_rad += motions.spare.roll_rate_rad_s * elapsed_s
+        self._used.watch.turned_rad += inbox.roll_rate_rad_s * elapsed_s
         phase = self._phase
         self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
         if phase == 0 or phase == 5:
@@ -204,10 +234,13 @@ class Monitors:
             )
             if self._spikes.update(self.gates.discarded, LONG_S):
                 self._of_saturation |= _SPIKES
+        used = self._used
         self.found = found = (
-            self._of_motion
+            used.watch.found
+            | used.water
+            | self._of_pair
             | self._of_drive
-            | self._of_water
+            | self._of_level
             | self._of_volume
             | self._of_senders
             | self._of_twin
@@ -218,24 +251,34 @@ class Monitors:
     def _look_at_motion(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
         elapsed_s = (now_ns - self._motion_ns) * 1e-9
         self._motion_ns = now_ns
-        rate_rad_s = inbox.roll_rate_rad_s
-        # the sum holds each rate for a tick: half a tick of the ends makes it a trapezoid
-        turned_rad = self._turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
-        self._turned_rad = 0.0
-        self._last_rate_rad_s = rate_rad_s
-        if seen.motion_age_ms > STALE_MS:
-            self.motion.restart()
-            self._rate_bend.restart()
-            self._of_motion = 0
+        stale = seen.motion_age_ms > STALE_MS
+        self._used.watch.update(inbox.roll_rad, inbox.roll_rate_rad_s, elapsed_s, stale=stale)
+        motions, spare = inbox.motions, self._spare
+        if motions is None or spare is None:
             return
-        found = self.motion.update(inbox.roll_rad, rate_rad_s, turned_rad, elapsed_s)
-        if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
-            found |= _NOISE
-        self._of_motion = found
+        other = motions.spare
+        spare_stale = seen.motion_spare_age_ms > STALE_MS
+        spare.watch.update(other.roll_rad, other.roll_rate_rad_s, elapsed_s, stale=spare_stale)
+        both = not (stale or spare_stale)
+        self._leave_accused(inbox, seen, spare)
+        self._of_pair = self._pair.update(
+            inbox.roll_rad - other.roll_rad if both else 0.0,
+            inbox.roll_rate_rad_s - other.roll_rate_rad_s if both else 0.0,
+            self._used,
+            spare,
+        )
+
+    def _leave_accused(self, inbox: Inbox, seen: Observations, spare: SensorEvidence) -> None:
+        """Use the other motion sensor if something speaks against this one alone."""
+        heard = seen.motion_spare_age_ms <= SPARE_MS
+        if heard and self._used.found and not (spare.found or spare.accused):
+            inbox.exchange_motion()
+            self._used.accused = True
+            self._used, self._spare = spare, self._used
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excited: bool) -> None:
         twin = self.twin
-        if excited:
+        if excited or self._pair.apart:
             twin.excuse()
         twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
@@ -245,14 +288,23 @@ class Monitors:
         self._round_ns = now_ns
         oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
         if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S or not self._water_free:
-            self.equation.restart()
+            self._used.restart_water()
+            if self._spare is not None:
+                self._spare.restart_water()
             self._level_stuck.restart()
-            self._of_water = 0
+            self._of_level = 0
             return
         roll_rad, level_m, pressure_pa = inbox.roll_rad, inbox.level_m, inbox.pressure_pa
-        self._of_water = self.equation.update(
-            roll_rad, level_m, pressure_pa
-        ) | self._level_stuck.update(roll_rad, level_m, pressure_pa)
+        self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
+        self._used.water = self._used.equation.update(roll_rad, level_m, pressure_pa)
+        motions, spare = inbox.motions, self._spare
+        if motions is None or spare is None:
+            return
+        if seen.motion_spare_age_ms > STALE_MS:
+            spare.restart_water()
+        else:
+            spare.water = spare.equation.update(motions.spare.roll_rad, level_m, pressure_pa)
+        self._leave_accused(inbox, seen, spare)
 
 
 def _may_be(found: ModelSummary, configured: RollShip) -> bool:

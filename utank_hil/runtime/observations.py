@@ -38,6 +38,10 @@ class Observations:
     ----------
     motion_age_ms, tank_age_ms, pump_age_ms, drive_age_ms, panel_age_ms : float
         Time since the last accepted frame with plausible content; infinite if there was none.
+    motion_spare_age_ms : float
+        The same of the motion sensor that is not in use; zero without a second one.
+    hardwired_age_ms : float
+        The same of the hard-wired inputs; zero without them.
     echo_age_ms : float
         Time since the drive's echo of a new command.
     drive_enabled : bool
@@ -64,12 +68,16 @@ class Observations:
         Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
         So does the operator's panel.
+    commissioned : bool
+        A commissioning was passed with this configuration; never overwritten.
     bus_load : float
         Share of the bus in use over the last second.
     protection_valid : bool
         Messages that control needs arrive intact and in order.
     high_level : bool
         A high-level switch is closed or broken.
+    hardwired_stop : bool
+        The hard-wired stop loop is open or broken.
     roll_rad, heel_rad : float
         Roll, and its low-pass over a minute.
     tick_late_ms : float
@@ -96,6 +104,8 @@ class Observations:
     tank_age_ms: float = math.inf
     pump_age_ms: float = math.inf
     drive_age_ms: float = math.inf
+    motion_spare_age_ms: float = 0.0
+    hardwired_age_ms: float = 0.0
     echo_age_ms: float = math.inf
     panel_age_ms: float = math.inf
     drive_enabled: bool = False
@@ -111,9 +121,11 @@ class Observations:
     address_conflict: bool = False
     versions_match: bool = True
     panel_matches: bool = True
+    commissioned: bool = True
     bus_load: float = 0.0
     protection_valid: bool = True
     high_level: bool = False
+    hardwired_stop: bool = False
     roll_rad: float = 0.0
     heel_rad: float = 0.0
     tick_late_ms: float = 0.0
@@ -178,6 +190,11 @@ class Observer:
         # first of all: who is in command may change
         seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = stations.take()
         seen.requested_mode = stations.requested_mode
+        motions = inbox.motions
+        if motions is not None:
+            if motions.silent(now_ns):
+                inbox.exchange_motion()
+            seen.motion_spare_age_ms = (now_ns - motions.spare.heard_ns) / MILLISECOND_NS
         seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
         seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
         seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
@@ -196,6 +213,11 @@ class Observer:
         seen.panel_matches = inbox.panel_matches
         seen.protection_valid = inbox.protection_valid
         seen.high_level = inbox.high_level
+        hardwired = inbox.hardwired
+        if hardwired is not None:
+            seen.high_level |= hardwired.high_level
+            seen.hardwired_stop = hardwired.stop
+            seen.hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         seen.roll_rad = inbox.roll_rad
         seen.heel_rad += HEEL_SHARE * (inbox.roll_rad - seen.heel_rad)
         if self._load_schedule.due(now_ns):

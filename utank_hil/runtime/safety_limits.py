@@ -34,6 +34,11 @@ class SafetyLimits:
     ----------
     motion_age_ms, tank_age_ms, pump_age_ms : float
         Longest age of a sensor's last good sample while armed.
+    motion_spare_age_ms : float
+        Age of the last good sample of the motion sensor that is not in use, where there are two,
+        from which half the pressure is allowed.
+    hardwired_age_ms : float
+        Longest age of the hard-wired inputs, where there are such.
     tank_degraded_age_ms : float
         Age of the tank's last good sample from which half the pressure is allowed.
     drive_age_ms, echo_age_ms : float
@@ -66,6 +71,8 @@ class SafetyLimits:
     """
 
     motion_age_ms: _Silence = 30.0
+    motion_spare_age_ms: _Silence = 100.0
+    hardwired_age_ms: _Silence = 150.0
     tank_age_ms: _Silence = 1000.0
     tank_degraded_age_ms: _Silence = 100.0
     pump_age_ms: _Silence = 1000.0

@@ -26,3 +26,5 @@ class Finding(IntFlag):
     NODE_SILENT = auto()
     FLOOD = auto()
     ROLL_AMPLIFIED = auto()
+    SENSORS_DISAGREE = auto()
+    SENSORS_UNCLEAR = auto()

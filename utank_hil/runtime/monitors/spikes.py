@@ -46,8 +46,8 @@ class SpikeGate:
         return False
 
 
-class SpikeGates:
-    """The gates of the motion sensor and of the level gauges.
+class MotionGate:
+    """The gates of one motion sensor.
 
     Parameters
     ----------
@@ -57,13 +57,38 @@ class SpikeGates:
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
         self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
-        self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
-        self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
 
-    def motion_passes(self, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
-        """Whether a sample of the motion sensor may be used."""
+    def passes(self, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
+        """Whether a sample may be used."""
         # both see every sample
         return self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
+
+    @property
+    def discarded(self) -> int:
+        """Samples so far that did not pass."""
+        return self._roll.discarded + self._rate.discarded
+
+
+class SpikeGates:
+    """The gates of the motion sensor and of the level gauges.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+
+    Attributes
+    ----------
+    motion : MotionGate
+        Of the only motion sensor.
+    motions : tuple of MotionGate
+        Of both where there are two, of which the first is not `motion`.
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        self.motion = MotionGate(thresholds)
+        self.motions = MotionGate(thresholds), MotionGate(thresholds)
+        self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
 
     def levels_pass(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
         """Whether a sample of the level gauges may be used."""
@@ -71,9 +96,8 @@ class SpikeGates:
 
     @property
     def discarded(self) -> int:
-        """Samples so far that did not pass."""
-        motion = self._roll.discarded + self._rate.discarded
-        return motion + self._port.discarded + self._starboard.discarded
+        """Samples of the only motion sensor and of the gauges so far that did not pass."""
+        return self.motion.discarded + self._port.discarded + self._starboard.discarded
 
 
 class SpikeCount:

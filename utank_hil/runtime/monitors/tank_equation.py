@@ -54,8 +54,21 @@ def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
     return float(push / (tank.density_kg_m3 * tank.reservoir_area_m2))
 
 
-class _Filter:
-    """1 / (s / w + 1)^2 with its first and second derivative, for inputs that run straight."""
+class DerivativeFilter:
+    """1 / (s / w + 1)^2 with its first and second derivative, for inputs that run straight.
+
+    Parameters
+    ----------
+    frequency_rad_s : float
+        w.
+    period_s : float
+        Time between two inputs.
+
+    Attributes
+    ----------
+    value, rate : float
+        Output and its first derivative.
+    """
 
     __slots__ = (
         "_a11", "_a12", "_a21", "_a22", "_b1", "_b2", "_c1", "_c2", "_last", "_w", "rate", "value",
@@ -73,6 +86,7 @@ class _Filter:
         self.start(0.0)
 
     def start(self, value: float) -> None:
+        """Begin anew with a constant input."""
         self._last = self.value = value
         self.rate = 0.0
 
@@ -121,9 +135,9 @@ class TankEquation:
         frequency_rad_s = tank.natural_frequency_rad_s
         self._push_at_w0 = roll_push_at_natural_frequency(ship, tank)
         self._most_m = FULL_SHARE * tank.level_limit_m
-        self._level = _Filter(2 * frequency_rad_s, period_s)
-        self._roll = _Filter(2 * frequency_rad_s, period_s)
-        self._pump = _Filter(2 * frequency_rad_s, period_s)
+        self._level = DerivativeFilter(2 * frequency_rad_s, period_s)
+        self._roll = DerivativeFilter(2 * frequency_rad_s, period_s)
+        self._pump = DerivativeFilter(2 * frequency_rad_s, period_s)
         self._settle = math.ceil(SETTLED / (2 * frequency_rad_s * period_s))
         self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.roll_period_s))
         self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.roll_period_s))

@@ -1,0 +1,255 @@
+"""``utank-hil commission`` and its record: what it says, what it writes, what run makes of it."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from ports import QuietBus
+from typer.testing import CliRunner
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.cli import app
+from utank_hil.commands import commission as module
+from utank_hil.commands import run
+from utank_hil.commands.commissioning_record import (
+    make_record,
+    record_path,
+    why_not_commissioned,
+    write_record,
+)
+from utank_hil.commands.common import new_app
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.commissioning.checks import Check
+from utank_hil.runtime.panel import Action, TimedAction
+
+SHIPS = Path("configs/ships").resolve()
+GOOD = Check("roll", "roll, by what it does to the water", 1.01, 1.0, 0.3, "1", "Turn it round.")
+BAD = Check("port_level", "port level", float("nan"), 1.0, 0.15, "1", "Look at the gauge.")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    content = yaml.safe_load(Path("configs/controllers/naval_constrained_gpc.yaml").read_text())
+    path = tmp_path / "naval.yaml"
+    path.write_text(yaml.safe_dump(content | {"vessel": str(SHIPS / "naval_vessel.yaml")}))
+    return path
+
+
+def loaded(file: Path) -> ControllerConfig:
+    return load_config(file, ControllerConfig)
+
+
+def reason(file: Path, bus: str = "can0", path: Path | None = None) -> str:
+    return why_not_commissioned(loaded(file), bus, file, path)
+
+
+def passed(file: Path, bus: str = "can0", *checks: Check, ended: str = "") -> Path:
+    path = record_path(file)
+    write_record(path, make_record(loaded(file), file, bus, list(checks or (GOOD,)), ended))
+    return path
+
+
+def test_without_a_record_the_reason_names_the_command(file: Path) -> None:
+    assert reason(file) == (
+        f"{record_path(file)}: there is no record of a commissioning; run utank-hil commission "
+        f"{file} --channel can0 at the quay"
+    )
+
+
+def test_a_passed_one_admits_and_says_who_when_and_what(file: Path) -> None:
+    path = passed(file)
+    assert path == file.with_name("naval.commissioning.json")
+    assert reason(file) == ""
+    record = json.loads(path.read_text())
+    assert record["passed"] is True
+    assert record["configuration_version"] == loaded(file).vessel.version
+    assert record["date"].endswith("Z")
+    assert {"program", "version", "commit", "bus", "commissioned_for"} <= set(record)
+    assert record["commissioned_for"]["catalogue_version"]
+    (check,) = record["checks"]
+    assert (check["measured"], check["expected"], check["tolerance"]) == (1.01, 1.0, 0.3)
+    assert check["verdict"] == "pass"
+    assert path.stat().st_mode & 0o777 == 0o644
+
+
+@pytest.mark.parametrize(
+    ("checks", "ended"), [((GOOD, BAD), ""), ((GOOD,), "Disarmed before the end."), ((), "")]
+)
+def test_one_that_was_not_passed_does_not_admit(
+    file: Path, checks: tuple[Check, ...], ended: str
+) -> None:
+    record = make_record(loaded(file), file, "can0", list(checks), ended)
+    write_record(record_path(file), record)
+    assert "was not passed" in reason(file)
+    assert [check["measured"] for check in record["checks"]] == [1.01, None][: len(checks)]
+
+
+def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Path) -> None:
+    path = passed(file)
+    content = yaml.safe_load(file.read_text())
+    vessel = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())
+    vessel["tank"]["width_m"] = 6.5
+    vessel["name"] = "Renamed"
+    (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
+    file.write_text(yaml.safe_dump(content | {"vessel": "ship.yaml"}))
+    assert "these changed: tank.width_m; run utank-hil commission" in reason(file)
+    file.write_text(yaml.safe_dump(content | {"sensors": {"level_noise_m": 0.006}}))
+    assert "these changed: sensors.level_noise_m" in reason(file)
+    # the law and its limits are judged by other means
+    file.write_text(yaml.safe_dump(content | {"name": "Another", "law": {"kind": "passive"}}))
+    assert reason(file) == ""
+    record = json.loads(path.read_text())
+    record["commissioned_for"]["catalogue_version"] += 1
+    path.write_text(json.dumps(record))
+    assert "these changed: catalogue_version" in reason(file)
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"passed": true}', "\x00"])
+def test_a_file_that_is_no_record_does_not_admit(file: Path, content: str) -> None:
+    record_path(file).write_text(content)
+    assert "is no record of a commissioning" in reason(file)
+
+
+def test_an_emulated_bus_asks_only_for_a_record_that_was_named(file: Path, tmp_path: Path) -> None:
+    assert reason(file, "vcan0") == ""
+    assert "there is no record" in reason(file, "vcan0", tmp_path / "none.json")
+    path = passed(file, "vcan0")
+    assert reason(file, "vcan0", path) == ""
+    assert "was made on vcan0, where no hardware is" in reason(file, "can0")
+
+
+def test_a_ship_with_nothing_to_arm_needs_none(file: Path) -> None:
+    vessel = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())
+    del vessel["pump"]
+    content = {"name": "none", "vessel": vessel, "law": {"kind": "passive"}}
+    file.write_text(yaml.safe_dump(content))
+    assert reason(file) == ""
+
+
+def test_a_record_is_there_as_a_whole_or_not_at_all(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = passed(file)
+    before = path.read_text()
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_record(path, {"passed": False})
+    assert path.read_text() == before
+    assert sorted(each.name for each in file.parent.iterdir()) == [path.name, file.name]
+
+
+class AtTheQuay:
+    """Stands for the real-time loop: the same nodes in lockstep, with the ship's side."""
+
+    script = (TimedAction(22.0, Action.ARM),)
+    stop_after_s = 300.0
+
+    def __init__(self, nodes: list[Any], port: object, statistics: object) -> None:
+        config = load_config(Path("configs/controllers/naval_constrained_gpc.yaml"),
+                             ControllerConfig)  # fmt: skip
+        scenario = Scenario.model_validate(
+            {
+                "name": "quay",
+                "vessel": config.vessel,
+                "sea": {"kind": "regular", "amplitude_m": 0.0, "period_s": 10.0},
+                "controllers": {"any": config},
+                "operator": self.script,
+                "duration_s": 300.0,
+                "settle_s": 0.0,
+            }
+        )
+        self._lockstep = Lockstep([*build_ship_side(scenario, 1, self.script).nodes, *nodes])
+
+    def run(self, stop: Any) -> None:
+        while not stop() and self._lockstep.now_ns < self.stop_after_s * 1e9:
+            self._lockstep.run_until(self._lockstep.now_ns + 10_000_000)
+
+
+def commission(monkeypatch: pytest.MonkeyPatch, loop: type[AtTheQuay], *words: object) -> Any:
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(module, "RealTimeLoop", loop)
+    application = new_app()
+    application.command()(module.commission)
+    return CliRunner().invoke(application, [*map(str, words), "--channel", "can0"])
+
+
+def test_the_command_leads_through_and_writes_the_record(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    result = commission(monkeypatch, AtTheQuay, file)
+    assert result.exit_code == ExitCode.OK, result.output
+    assert "roll, by what it does to the water" in result.stdout
+    assert "passed; record: " in result.stdout
+    said = capfd.readouterr().err
+    places = [said.index(words) for words in ("Waiting until", "Measuring the zeros", "Arm at the",
+                                              "move a little. Stop", "Done.")]  # fmt: skip
+    assert places == sorted(places)
+    assert " of 27 s" in said
+    assert reason(file) == ""
+
+
+def test_json_is_the_record_and_nothing_else(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "elsewhere.json"
+    result = commission(monkeypatch, AtTheQuay, file, "--record", path, "--json")
+    assert result.exit_code == ExitCode.OK
+    printed = json.loads(result.stdout)
+    assert printed.pop("record") == str(path)
+    assert printed == json.loads(path.read_text())
+    assert len(printed["checks"]) == 15
+
+
+def test_ended_before_the_end_it_writes_nothing(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Short(AtTheQuay):
+        stop_after_s = 10.0
+
+    result = commission(monkeypatch, Short, file)
+    assert result.exit_code == ExitCode.INTERRUPTED
+    assert not record_path(file).exists()
+
+
+def test_stopped_by_the_operator_it_is_not_passed(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stopped(AtTheQuay):
+        script = (*AtTheQuay.script, TimedAction(24.0, Action.STOP))
+
+    result = commission(monkeypatch, Stopped, file)
+    assert result.exit_code == ExitCode.REFUSED
+    assert "ended early: Disarmed before the end." in result.stdout
+    assert "not passed: arming is refused" in result.stdout
+    assert "was not passed" in reason(file)
+
+
+def test_a_place_that_is_not_writable_is_named_before_the_ship_is_moved(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    result = commission(monkeypatch, AtTheQuay, file, "--record", tmp_path / "file" / "r.json")
+    assert result.exit_code == ExitCode.USAGE
+    assert "--record" in result.output
+
+
+def test_run_says_why_arming_will_be_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "SocketCanPort", QuietBus)
+    words = ["run", str(file), "--bus", "any0", "--duration", "0.1", "--json"]
+    result = CliRunner().invoke(app, words)
+    assert json.loads(result.stdout)["not_commissioned"].startswith(f"{record_path(file)}: there")
+    assert "arming will be refused:" in result.stderr
+    passed(file)
+    result = CliRunner().invoke(app, words)
+    assert json.loads(result.stdout)["not_commissioned"] == ""
+    assert "refused" not in result.stderr

@@ -1,0 +1,182 @@
+"""The pages for makers of devices: their frames and limits, computed apart from the product."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import cantools
+import pytest
+from cantools.database.can import Database
+
+from utank_hil.canbus import (
+    ControlWord,
+    Frame,
+    Mode,
+    OperatorCommand,
+    PumpCommand,
+    Quality,
+    SensorMotion,
+    load_catalogue,
+)
+from utank_hil.canbus.enumerations import Address
+from utank_hil.runtime.faults import FAULTS
+from utank_hil.runtime.safety_limits import SafetyLimits
+
+PAGES = Path("docs/how-to")
+DATABASE = cantools.database.load_file("utank_hil/canbus/utank.dbc")
+assert isinstance(DATABASE, Database)
+CATALOGUE = load_catalogue()
+LIMITS = SafetyLimits()
+
+
+def text(page: str) -> str:
+    return (PAGES / f"{page}.md").read_text(encoding="utf-8")
+
+
+def hexes(words: str) -> list[int]:
+    return [int(each, 16) for each in re.findall(r"0x([0-9A-F]{2})\b", words)]
+
+
+def registers(data: Sequence[int]) -> list[int]:
+    """The CRC's register after each byte, as the page words it."""
+    register, found = 0xFF, []
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register <<= 1
+            if register & 0x100:
+                register = (register & 0xFF) ^ 0x2F
+        found.append(register)
+    return found
+
+
+def data_id(name: str, counter: int) -> int:
+    dbc = DATABASE.get_message_by_name(name).dbc
+    assert dbc is not None
+    return bytes.fromhex(str(dbc.attributes["DataIDs"].value))[counter]
+
+
+def encoded(name: str, counter: int, **signals: float) -> bytes:
+    message = DATABASE.get_message_by_name(name)
+    raw = {"crc": 0, "counter": counter, **signals}
+    rest = message.encode(raw, strict=False)[1:]
+    return bytes([registers([*rest, data_id(name, counter)])[-1] ^ 0xFF]) + rest
+
+
+def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
+    page = text("device")
+    table = page.partition("| byte | value | is |")[2].partition("The CRC is")[0]
+    shown = bytes(
+        value
+        for row in re.findall(r"^\| [\d, ]+ \| ([^|]*) \|", table, re.M)
+        for value in hexes(row)
+    )
+    assert shown == encoded("SENSOR_MOTION", 5, roll_rad=0.1, roll_rate_rad_s=-0.05, quality=0)
+    taken, after = (
+        hexes(re.search(rf"^\| {start}.*$", page, re.M)[0])  # type: ignore[index]
+        for start in ("byte taken in", "register after it")
+    )
+    assert taken == [*shown[1:], data_id("SENSOR_MOTION", 5)]
+    assert after == registers(taken)
+    assert after[-1] ^ 0xFF == shown[0]
+    begins = re.search(r"begins\n([0-9A-F ]+),", page)
+    assert begins is not None
+    listed = bytes.fromhex(begins[1])
+    assert listed == bytes(data_id("SENSOR_MOTION", counter) for counter in range(6))
+    frame = Frame(CATALOGUE.codec(SensorMotion).can_id, shown)
+    message = CATALOGUE.receiver(SensorMotion).accept(frame)
+    assert message is not None
+    assert message.quality is Quality.GOOD
+    assert (message.roll_rad, message.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
+    assert f"0x{frame.can_id:08X}" in page
+
+
+@pytest.mark.parametrize(
+    ("page", "name", "counter", "signals", "kind", "content"),
+    [
+        (
+            "drive",
+            "PUMP_CMD",
+            3,
+            {"pressure_pa": 12000, "control_word": 0x0F, "timeout_s": 0.05},
+            PumpCommand,
+            {"control_word": ControlWord.ENABLE_OPERATION, "pressure_pa": 12000.0},
+        ),
+        (
+            "panel",
+            "OPERATOR_CMD",
+            9,
+            {
+                "mode_request": 3,
+                "arm": 1,
+                **dict.fromkeys(("stop", "reset", "acknowledge", "retune", "undo"), 0),
+                "forbid_retuning": 0,
+                "take_command": 0,
+                "acknowledge_code": 0xFF,
+                "power_budget_w": 100 * 0xFFFF,
+            },
+            OperatorCommand,
+            {"mode_request": Mode.ACTIVE, "arm": True, "stop": False, "acknowledge_code": None},
+        ),
+    ],
+)
+def test_frames_of_the_other_pages_are_right(
+    page: str,
+    name: str,
+    counter: int,
+    signals: dict[str, float],
+    kind: type,
+    content: dict[str, object],
+) -> None:
+    row = re.search(rf"^\| {name} \| (0x.*)$", text(page), re.M)
+    assert row is not None
+    shown = bytes(hexes(row[1]))
+    assert shown == encoded(name, counter, **signals)
+    assert f"data ID is 0x{data_id(name, counter):02X}" in text(page).replace("\n", " ")
+    codec = CATALOGUE.codec(kind, Address.OPERATOR if name == "OPERATOR_CMD" else None)
+    assert f"{name} (0x{codec.can_id:08X})" in text(page)
+    message = codec.decode(shown)
+    assert {key: getattr(message, key) for key in content} == content
+
+
+def test_cycles_of_the_pages_are_the_catalogues() -> None:
+    found = []
+    for page in ("sensor", "drive", "panel"):
+        found += re.findall(r"^\| ([A-Z_0-9]+)(?:, \w+)? \| (\d+) ms", text(page), re.M)
+    assert len(found) == 12
+    for name, cycle in found:
+        assert DATABASE.get_message_by_name(name).cycle_time == int(cycle), name
+
+
+@pytest.mark.parametrize(
+    ("page", "words", "limit_ms"),
+    [
+        ("sensor", "no good SENSOR_MOTION | 30 ms", LIMITS.motion_age_ms),
+        ("sensor", "no good SENSOR_TANK | 100 ms; 1 s", LIMITS.tank_degraded_age_ms),
+        ("sensor", "no good SENSOR_PUMP | 1 s", LIMITS.pump_age_ms),
+        ("sensor", "no HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
+        ("drive", "DRIVE_STATUS_1 silent | 60 ms", LIMITS.drive_age_ms),
+        ("drive", "the echo stands still | 100 ms", LIMITS.echo_age_ms),
+        ("drive", "out of OPERATION_ENABLED while active | 40 ms", LIMITS.drive_enabled_within_ms),
+        ("panel", "silent, before arming | 600 ms", LIMITS.panel_age_to_arm_ms),
+        ("panel", "silent, while armed | 5 s", LIMITS.panel_age_armed_ms),
+    ],
+)
+def test_limits_of_the_pages_are_those_that_are_judged(
+    page: str, words: str, limit_ms: float
+) -> None:
+    assert words in text(page)
+    number, unit = re.findall(r"([\d.]+) (ms|s)\b", words)[0]
+    assert float(number) * (1000 if unit == "s" else 1) == limit_ms
+
+
+def test_addresses_and_fault_codes_exist() -> None:
+    addresses = {f"0x{address:02X}" for address in Address}
+    sentence = text("device").partition("Addresses are fixed: ")[2].partition(".")[0]
+    assert {f"0x{each:02X}" for each in hexes(sentence)} == addresses
+    codes = {row.code.name for row in FAULTS}
+    everything = " ".join(map(text, ("device", "sensor", "drive", "panel")))
+    for named in ("FOREIGN_SENDER", "ADDRESS_CONFLICT", "PROTECTION", "SIGNAL_DELAYED", "NOISE",
+                  "SPIKES"):  # fmt: skip
+        assert named in everything
+        assert named in codes

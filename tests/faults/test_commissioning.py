@@ -1,0 +1,225 @@
+"""Commissioning in lockstep: a ship that is as her files say passes; whatever is not is named."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fault_bench import SECOND, altered
+from quay import ARM_S, another_ship, commissioned, controller, still_water
+
+from firmware_sim.scenario_sea import RegularSea
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import Fault, Mode, PumpCommand, SensorTank, Switch
+from utank_hil.retuning import RetuningEvent
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
+from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
+from utank_hil.runtime.commissioning.pulses import plan_pulses
+from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.telemetry import event_text
+
+NAVAL = controller("naval_constrained_gpc")
+LEVELS = ("port_level_m", "starboard_level_m")
+MOTION = ("roll_rad", "roll_rate_rad_s")
+
+Record = dict[str, FloatArray]
+
+
+@pytest.fixture(scope="module")
+def healthy() -> CommissioningNode:
+    return commissioned(NAVAL)
+
+
+def failed(node: CommissioningNode) -> dict[str, str]:
+    """Checks that failed, with their remedies."""
+    return {check.name: check.remedy for check in node.checks() if not check.passed}
+
+
+@pytest.mark.parametrize(
+    "name", ["gpc", "naval_constrained_gpc", "patti_b_constrained_gpc", "pump_with_valve"]
+)
+def test_every_shipped_ship_passes_with_room_to_spare(name: str) -> None:
+    node = commissioned(controller(name), seed=2)
+    assert node.stage is Stage.DONE
+    assert not node.ended
+    checks = node.checks()
+    assert len(checks) == (17 if name == "pump_with_valve" else 15)
+    for check in checks:
+        assert abs(check.measured - check.expected) <= 0.5 * check.tolerance, check
+
+
+def scaled(names: tuple[str, ...], factor: float) -> Callable[[Record], Record]:
+    return lambda record: {
+        name: factor * column if name in names else column for name, column in record.items()
+    }
+
+
+def shifted(name: str, offset: float) -> Callable[[Record], Record]:
+    return lambda record: {**record, name: record[name] + offset}
+
+
+def swapped(record: Record) -> Record:
+    port, starboard = (record[name] for name in LEVELS)
+    return {**record, "port_level_m": starboard, "starboard_level_m": port}
+
+
+# no measurement steers the pump: what a wrong sensor would have shown follows from a good record
+@pytest.mark.parametrize(
+    ("wrong", "names", "word"),
+    [
+        (swapped, {"port_level", "starboard_level"}, "port and starboard are swapped"),
+        (scaled(LEVELS[:1], -1), {"port_level"}, "Only the port gauge counts downwards"),
+        (scaled(LEVELS[1:], -1), {"starboard_level"}, "Only the starboard gauge counts downwards"),
+        (scaled(LEVELS[1:], 0), {"starboard_level"}, "does not move"),
+        (scaled(LEVELS[:1], 1.4), {"port_level"}, "Correct the port gauge's scaling"),
+        (scaled(LEVELS, 0.7), {"port_level", "starboard_level"}, "gauge's scaling"),
+        (scaled(MOTION, -1), {"roll"}, "Turn the motion sensor round"),
+        (scaled(MOTION[:1], -1), {"roll", "roll_rate"}, "The roll has the wrong sign"),
+        (scaled(MOTION[1:], -1), {"roll_rate"}, "The roll rate has the wrong sign"),
+        (scaled(MOTION[1:], 180 / np.pi), {"roll_rate"}, "scaling of the roll rate"),
+        (scaled(MOTION, 2), {"roll"}, "Correct the roll's scaling"),
+        (scaled(MOTION, 0), {"roll", "roll_rate", "roll_period"}, "The motion sensor shows no"),
+        (scaled(("pressure_pa",), -1), {"pressure", *(f"{x}_level" for x in ("port", "starboard")),
+                                        "roll"}, "exchange its sides"),
+        (scaled(("pressure_pa",), 0.5), {"pressure", "port_level", "starboard_level", "roll"},
+         "correct the pressure sensor's scaling"),
+        (shifted("port_level_m", 0.05), {"port_level_zero"}, "Set the port gauge's zero"),
+        (shifted("roll_rad", 0.03), {"roll_zero", "port_level_zero", "starboard_level_zero"},
+         "mount the motion sensor level"),
+        (shifted("roll_rate_rad_s", 0.01), {"roll_rate_zero"}, "zero of the gyroscope"),
+        (shifted("pressure_pa", 900), {"pressure_zero"}, "Set the pressure sensor's zero"),
+        (shifted("high_level", 1.0), {"high_level_switches"}, "Check the switches"),
+    ],
+)  # fmt: skip
+def test_a_wrong_sensor_fails_its_own_checks_with_its_remedy(
+    healthy: CommissioningNode,
+    monkeypatch: pytest.MonkeyPatch,
+    wrong: Callable[[Record], Record],
+    names: set[str],
+    word: str,
+) -> None:
+    assert not failed(healthy)
+    monkeypatch.setattr(healthy, "rest", wrong(dict(healthy.rest)))
+    monkeypatch.setattr(healthy, "moved", wrong(dict(healthy.moved)))
+    found = failed(healthy)
+    assert set(found) == names
+    assert word in found[min(names, key=list(found).index)]
+
+
+@pytest.mark.parametrize(("factor", "word"), [(-1.0, "pushes to port"), (0.6, "blockage"),
+                                              (0.0, "no pressure")])  # fmt: skip
+def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(
+    factor: float, word: str
+) -> None:
+    def wrong(command: PumpCommand) -> PumpCommand:
+        return command._replace(pressure_pa=factor * command.pressure_pa)
+
+    found = failed(commissioned(NAVAL, spoil={"controller": altered(PumpCommand, wrong)}))
+    assert word in found.pop("pressure")
+    assert bool(found) is (factor == 0.0)
+
+
+def test_another_tank_and_another_loading_fail_by_their_periods() -> None:
+    vessel = NAVAL.vessel
+    shorter = replace(vessel.tank, duct_area_m2=1.4 * vessel.tank.duct_area_m2)
+    found = failed(commissioned(NAVAL, nodes=another_ship(NAVAL, vessel.ship, shorter)))
+    assert set(found) == {"tank_period"}
+    tender = replace(vessel.ship, stiffness_nm_rad=0.7 * vessel.ship.stiffness_nm_rad)
+    node = commissioned(NAVAL, nodes=another_ship(NAVAL, tender, vessel.tank))
+    assert set(failed(node)) == {"roll_period"}
+    measured = next(check.measured for check in node.checks() if check.name == "roll_period")
+    truth_s = 2 * np.pi / tender.natural_frequency_rad_s
+    assert measured == pytest.approx(truth_s, rel=0.05)
+
+
+def test_a_list_that_gauges_and_motion_sensor_agree_on_is_named_by_the_roll_alone() -> None:
+    vessel = NAVAL.vessel
+    heeled = replace(vessel.ship, offset_moment_nm=0.03 * vessel.ship.stiffness_nm_rad)
+    node = commissioned(NAVAL, nodes=another_ship(NAVAL, heeled, vessel.tank))
+    # she starts upright, and is not at rest yet
+    assert set(failed(node)) == {"roll_zero", "roll_still", "level_still"}
+    assert not node.moved  # nothing was pushed
+    assert node.node.mode is not Mode.ACTIVE
+
+
+def test_a_ship_that_moves_by_herself_is_not_pushed() -> None:
+    scenario = still_water(NAVAL).model_copy(
+        update={"sea": RegularSea(kind="regular", amplitude_m=0.02, period_s=5.6)}
+    )
+    nodes = build_ship_side(scenario, 1, scenario.operator).nodes
+    node = commissioned(NAVAL, nodes=nodes)
+    assert "roll_still" in failed(node)
+    assert not node.moved
+
+
+def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(
+    healthy: CommissioningNode,
+) -> None:
+    plan, limits = plan_pulses(NAVAL.plant), NAVAL.limits
+    assert plan.pressure_pa <= 0.12 * limits.pressure_pa
+    assert plan.level_m <= 0.2 * limits.level_m
+    assert plan.roll_rad <= 0.035
+    record = healthy.moved
+    assert np.abs(record["command_pa"]).max() == pytest.approx(plan.pressure_pa)
+    level_m = np.abs(record["starboard_level_m"] - record["port_level_m"]).max() / 2
+    assert level_m == pytest.approx(plan.level_m, rel=0.15)
+    assert healthy.node.command_pa == 0.0
+
+
+def test_the_operators_stop_ends_it() -> None:
+    stop = TimedAction(ARM_S + 8.0, Action.STOP)
+    node = commissioned(NAVAL, stop)
+    assert node.ended == "Disarmed before the end."
+    assert node.node.command_pa == 0.0
+    assert node.node.mode is Mode.STANDBY
+    assert {check.name for check in node.checks()} >= {"pressure", "port_level"}
+
+
+def test_a_level_far_beyond_the_plan_ends_it() -> None:
+    def far(tank: SensorTank) -> SensorTank:
+        return tank._replace(**{name: 4 * getattr(tank, name) for name in LEVELS})
+
+    node = commissioned(NAVAL, spoil={"sensors": altered(SensorTank, far)})
+    assert node.ended.startswith("The level went 3 times as far as planned")
+    assert node.node.command_pa == 0.0
+
+
+def test_a_fault_ends_it_with_its_words() -> None:
+    begin_ns = round((ARM_S + 8.0) * SECOND)
+
+    def high(tank: SensorTank) -> SensorTank:
+        return tank._replace(port_high=Switch.ON)
+
+    node = commissioned(NAVAL, spoil={"sensors": altered(SensorTank, high)}, begin_ns=begin_ns)
+    assert node.ended.startswith("LEVEL_LIMIT: The water in a reservoir is too high")
+    assert node.node.command_pa == 0.0
+
+
+def test_without_a_signs_meaning_two_faults_at_a_time_are_both_named() -> None:
+    remedies = remedies_of(Each(-1.0, 1.0, 1.0, -1.0, 1.0))
+    assert "pushes to port" in remedies.pressure
+    assert "Turn the motion sensor round" in remedies.roll
+    remedies = remedies_of(Each(1.0, -1.0, -1.0, 1.0, -1.0))
+    assert "swapped" in remedies.port
+    assert "wrong sign" in remedies.rate
+
+
+def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so() -> None:
+    events: list[AlarmEvent | RetuningEvent] = []
+    scenario = still_water(NAVAL)
+    ship = build_ship_side(scenario, 1, scenario.operator)
+    node = build_controller_node(
+        NAVAL, commissioned=False, event_sink=lambda event, start_ns: events.append(event)
+    )
+    Lockstep([*ship.nodes, node]).run_until(round((ARM_S + 2.0) * SECOND))
+    assert ship.panel.status is not None
+    assert (ship.panel.status.mode, ship.panel.status.fault) == (
+        Mode.STANDBY,
+        Fault.NOT_COMMISSIONED,
+    )
+    assert [alarm.code for alarm in ship.panel.alarms] == [Fault.NOT_COMMISSIONED]
+    assert "utank-hil commission" in event_text(events[0])

@@ -1,0 +1,301 @@
+"""A ship with a second motion sensor and hard-wired inputs: no broken node alone goes unseen."""
+
+import random
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+from fault_bench import ARMED, MS, SECOND, Failing, altered, dropped, storm
+from quay import commissioned, controller
+
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import ShipSide, build_ship_side
+from utank_hil.assembly import build_controller_node
+from utank_hil.canbus import (
+    Address,
+    Fault,
+    Frame,
+    HardwiredInputs,
+    Mode,
+    Quality,
+    SensorMotion,
+    SensorTank,
+    Switch,
+    load_catalogue,
+)
+from utank_hil.configuration import ControllerConfig
+from utank_hil.runtime import Lockstep
+from utank_hil.runtime.redundancy import Redundancy
+
+CATALOGUE = load_catalogue()
+T0_S = 12.0
+T0 = round(T0_S * SECOND)
+PERIOD_S = 10.7
+BOTH = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
+
+
+@cache
+def config(redundancy: Redundancy = BOTH, name: str = "gpc") -> ControllerConfig:
+    given = storm().controllers[name]
+    vessel = given.vessel.model_copy(update={"redundancy": redundancy})
+    return given.model_copy(update={"vessel": vessel})
+
+
+@cache
+def scenario(redundancy: Redundancy = BOTH) -> Scenario:
+    controllers = {"gpc": config(redundancy)}
+    return storm().model_copy(
+        update={"vessel": controllers["gpc"].vessel, "controllers": controllers}
+    )
+
+
+class Bench:
+    """The storm with the ship's redundant nodes, each behind a `Failing`."""
+
+    def __init__(self, redundancy: Redundancy = BOTH) -> None:
+        self.ship: ShipSide = build_ship_side(scenario(redundancy), 1, ARMED)
+        self.node = build_controller_node(config(redundancy))
+        self.failing = {node.name: Failing(node) for node in (*self.ship.nodes, self.node)}
+        self.lockstep = Lockstep([*self.failing.values()])
+        self.degraded: set[Fault] = set()
+
+    def fail(self, name: str, spoil: Callable[[Frame], object], begin_ns: int = T0) -> None:
+        self.failing[name].begin_ns = begin_ns
+        self.failing[name].spoil = spoil  # type: ignore[assignment]
+
+    def run(self, until_s: float) -> None:
+        self.lockstep.run_until(round(until_s * SECOND))
+
+    def run_to_fault(self, until_s: float) -> float:
+        """Run to FAULT; when it was."""
+        while self.node.mode is not Mode.FAULT and self.lockstep.now_ns < until_s * SECOND:
+            self.lockstep.run_until(self.lockstep.now_ns + 10 * MS)
+        assert self.node.mode is Mode.FAULT
+        return self.lockstep.now_ns * 1e-9
+
+
+def motion(change: Callable[[float, float], tuple[float, float]], address: Address | None = None):
+    """What a motion sensor sends instead of roll and rate."""
+    receiver = CATALOGUE.receiver(SensorMotion, address)
+    transmitter = CATALOGUE.transmitter(SensorMotion, address)
+
+    def alter(frame: Frame) -> tuple[Frame]:
+        if frame.can_id != receiver.can_id:
+            return (frame,)
+        message = receiver.accept(frame)
+        assert message is not None
+        transmitter.counter = frame.data[1] - 1
+        roll_rad, rate_rad_s = change(message.roll_rad, message.roll_rate_rad_s)
+        return (transmitter.frame(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD)),)
+
+    return alter
+
+
+def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
+    bench = Bench()
+    degraded = False
+    while bench.lockstep.now_ns < 60 * SECOND:
+        bench.run(bench.lockstep.now_ns * 1e-9 + 1.0)
+        degraded |= bench.node.supervisor.degraded
+    assert bench.node.mode is Mode.ACTIVE
+    assert not degraded
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    assert motions.used is motions.first
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_one_silent_motion_sensor_leaves_the_other_and_half_the_pressure(first: bool) -> None:
+    bench = Bench()
+    bench.fail("sensors" if first else "sensors_2", dropped(SensorMotion) if first else dropped())
+    bench.run(T0_S + 5.0)
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    assert motions.used is (motions.second if first else motions.first)
+    assert bench.node.mode is Mode.ACTIVE
+    assert bench.node.supervisor.degraded
+    assert Fault.MOTION_SILENT in {alarm.code for alarm in bench.ship.panel.alarms}
+    assert bench.node.inbox.roll_rad == pytest.approx(bench.ship.plant.roll_rad, abs=0.01)
+
+
+def test_both_silent_end_it_in_time() -> None:
+    bench = Bench()
+    bench.fail("sensors", dropped(SensorMotion))
+    bench.fail("sensors_2", dropped(), T0 + SECOND)
+    found_s = bench.run_to_fault(T0_S + 3.0) - T0_S - 1.0
+    assert bench.node.fault is Fault.MOTION_SILENT
+    assert found_s <= 0.05
+    bench.run(T0_S + 1.0 + 0.25)
+    assert bench.node.command_pa == 0.0
+
+
+def noisy(times: float) -> Callable[[float, float], tuple[float, float]]:
+    draw = random.Random(1).gauss
+    return lambda roll, rate: (roll + draw(0, times * 2e-4), rate + draw(0, times * 5e-4))
+
+
+def held() -> Callable[[float, float], tuple[float, float]]:
+    kept: list[tuple[float, float]] = []
+
+    def change(roll: float, rate: float) -> tuple[float, float]:
+        kept.append((roll, rate))
+        return kept[0]
+
+    return change
+
+
+WRONG = {
+    "flipped": lambda roll, rate: (-roll, -rate),
+    "roll flipped": lambda roll, rate: (-roll, rate),
+    "rate flipped": lambda roll, rate: (roll, -rate),
+    "noisy": noisy(20.0),
+    "in degrees": lambda roll, rate: (3 * roll, 3 * rate),
+}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "first"),
+    [*((wrong, True) for wrong in [*WRONG, "both stuck"]), ("flipped", False)],
+)
+def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> None:
+    bench = Bench()
+    address = None if first else Address.SENSORS_2
+    name = "sensors" if first else "sensors_2"
+    bench.fail(name, motion(WRONG.get(wrong) or held(), address))
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    end_ns = T0 + round(1.5 * PERIOD_S * SECOND)
+    while bench.lockstep.now_ns < end_ns and (not first or motions.used is motions.first):
+        bench.run(bench.lockstep.now_ns * 1e-9 + 0.1)
+    assert motions.used is (motions.second if first else motions.first)
+    bench.run(bench.lockstep.now_ns * 1e-9 + 0.5)
+    assert bench.node.mode is Mode.ACTIVE, bench.node.fault
+    assert bench.node.supervisor.degraded
+    assert Fault.SENSORS_DISAGREE in {alarm.code for alarm in bench.ship.panel.alarms}
+
+
+def test_an_offset_that_nothing_explains_halves_and_then_ends_it() -> None:
+    bench = Bench()
+    bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2), MS)
+    bench.run(5.0)
+    assert bench.node.supervisor.degraded or bench.node.mode is not Mode.ACTIVE
+    bench.run_to_fault(60.0)
+    assert bench.node.fault is Fault.SENSORS_DISAGREE
+
+
+def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> None:
+    bench = Bench()
+
+    def swap(tank: SensorTank) -> SensorTank:
+        return tank._replace(
+            port_level_m=tank.starboard_level_m, starboard_level_m=tank.port_level_m
+        )
+
+    bench.fail("sensors", altered(SensorTank, swap), 0)
+    bench.run_to_fault(40.0)
+    assert bench.node.fault in (Fault.MOTION_SIGN_FLIP, Fault.SIGN_FLIP, Fault.STUCK_SIGNAL)
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    assert motions.used is motions.first
+
+
+def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
+    def broken(tank: SensorTank) -> SensorTank:
+        return SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)
+
+    bench = Bench()
+    bench.fail("sensors", altered(SensorTank, broken), T0)
+    limit_m = scenario().sensors.high_level_m
+    plant = bench.ship.plant
+    bench.run(T0_S)
+    # the water is driven over the switch, whatever the monitors would have said before
+    bench.node.monitors = None
+    assert bench.node.mode is Mode.ACTIVE
+    while abs(plant.level_m) <= limit_m and bench.lockstep.now_ns < 600 * SECOND:
+        bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
+    high_ns = bench.lockstep.now_ns
+    assert not bench.node.inbox.high_level  # the gauges' node hides it
+    bench.run_to_fault(high_ns * 1e-9 + 1.0)
+    assert bench.node.fault is Fault.LEVEL_LIMIT
+    assert bench.lockstep.now_ns - high_ns <= 120 * MS
+    assert bench.node.command_pa == 0.0
+
+
+def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
+    bench = Bench()
+    hardwired = bench.ship.hardwired
+    assert hardwired is not None
+    bench.run(T0_S)
+    assert bench.node.mode is Mode.ACTIVE
+    hardwired.stop_pressed = True
+    found_s = bench.run_to_fault(T0_S + 1.0) - T0_S
+    assert bench.node.fault is Fault.HARDWIRED_STOP
+    assert found_s <= 0.07  # its cycle and two ticks
+    assert bench.node.command_pa == 0.0
+
+
+@pytest.mark.parametrize("switch", [Switch.ON, Switch.ERROR, None])
+def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
+    switch: Switch | None,
+) -> None:
+    node = build_controller_node(config())
+    transmitter = CATALOGUE.transmitter(HardwiredInputs)
+    shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
+    for tick in range(3):
+        node.receive(transmitter.frame(shut), tick * 50 * MS)
+    hardwired = node.inbox.hardwired
+    assert hardwired is not None
+    assert not hardwired.stop
+    transmitter.counter += 7
+    bad = HardwiredInputs(Switch.OFF, Switch.OFF, switch, Quality.BAD)
+    node.receive(transmitter.frame(bad), 200 * MS)
+    assert hardwired.stop
+    assert hardwired.heard_ns == 100 * MS
+    for tick in range(4, 8):
+        node.receive(transmitter.frame(shut), tick * 50 * MS)
+    assert not hardwired.stop
+
+
+def test_silent_hard_wired_inputs_end_it_and_are_waited_for() -> None:
+    bench = Bench()
+    bench.fail("hardwired", dropped())
+    found_s = bench.run_to_fault(T0_S + 1.0) - T0_S
+    assert bench.node.fault is Fault.HARDWIRED_SILENT
+    assert found_s <= 0.21
+    bench = Bench()
+    bench.fail("hardwired", dropped(HardwiredInputs), 0)
+    bench.run(3.0)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.HARDWIRED_SILENT)
+
+
+def test_a_second_motion_sensor_of_another_version_keeps_it_from_arming() -> None:
+    bench = Bench()
+    node = bench.failing["sensors_2"].node
+    node._housekeeping._configuration_version += 1  # type: ignore[attr-defined]
+    bench.run(3.0)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VERSION_MISMATCH)
+
+
+def test_a_ship_with_redundancy_is_another_configuration_and_one_without_is_as_before() -> None:
+    without, both = config(Redundancy()).vessel, config().vessel
+    assert without.version == storm().vessel.version
+    versions = {
+        config(Redundancy(*each)).vessel.version
+        for each in ((False, False), (True, False), (False, True), (True, True))
+    }
+    assert len(versions) == 4
+    assert both.version != without.version
+
+
+def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
+    naval = controller("naval_constrained_gpc")
+    vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
+    naval = naval.model_copy(update={"vessel": vessel})
+    node = commissioned(naval)
+    assert all(check.passed for check in node.checks())
+    assert {"roll_2_zero", "roll_rate_2_zero", "roll_2", "roll_rate_2"} <= {
+        check.name for check in node.checks()
+    }
+    wrong = motion(lambda roll, rate: (-roll, -rate), Address.SENSORS_2)
+    node = commissioned(naval, spoil={"sensors_2": wrong})
+    assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]

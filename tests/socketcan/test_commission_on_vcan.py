@@ -1,0 +1,92 @@
+"""``utank-hil commission`` on vcan0: refused before, led through, and armed with its record."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from busy_machine import first_that_can_be_judged, judged_by
+from two_processes import CHANNEL, CONFIGS, Program, Watcher, patient_controller, running
+
+from utank_hil.canbus import Fault, Mode
+from utank_hil.commands.exit_codes import ExitCode
+
+pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
+
+
+def still_water(folder: Path, controller: Path, arm_s: float) -> Path:
+    """The first ship at the quay, with an operator who arms at a time."""
+    path = folder / "quay.yaml"
+    content = {
+        "name": "quay",
+        "vessel": str(CONFIGS / "ships" / "thesis_first.yaml"),
+        "sea": {"kind": "regular", "amplitude_m": 0.0, "period_s": 10.0},
+        "controllers": {"any": str(controller)},
+        "operator": [{"time_s": arm_s, "action": "arm"}],
+        "duration_s": 600,
+        "settle_s": 0,
+    }
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path
+
+
+def ship_of(folder: Path, controller: Path, arm_s: float) -> Program:
+    quay = still_water(folder, controller, arm_s)
+    return Program(folder, "firmware-sim", quay, "--bus", CHANNEL, "--json")
+
+
+def run_until(folder: Path, controller: Path, record: Path, mode: Mode, fault: Fault) -> str:
+    """Have an operator arm under `run`, until mode and fault are there; what it said."""
+    words = ("utank-hil", "run", controller, "--bus", CHANNEL, "--record", record, "--json")
+    watcher = Watcher()
+    try:
+        with (
+            judged_by(watcher.machine.failure),
+            running(ship_of(folder, controller, 1.0)),
+            running(Program(folder, *words)) as run,
+        ):
+            watcher.wait(
+                lambda w: w.status is not None and (w.status.mode, w.status.fault) == (mode, fault)
+            )
+            return run.end()[1]
+    finally:
+        watcher.close()
+
+
+def commission(folder: Path, controller: Path, record: Path) -> dict[str, Any]:
+    words = ("utank-hil", "commission", controller, "--channel", CHANNEL, "--json")
+    watcher = Watcher()
+    try:
+        with (
+            judged_by(watcher.machine.failure),
+            running(ship_of(folder, controller, 24.0)),
+            running(Program(folder, *words, "--record", record)) as program,
+        ):
+            watcher.wait(lambda w: program.code is not None, timeout_s=400.0)
+            made, _ = program.end(ExitCode.OK, ExitCode.REFUSED, interrupt=False)
+            failed = [each for each in made["checks"] if each["verdict"] != "pass"]
+            assert made["passed"], (made["ended"], failed)
+            return made
+    finally:
+        watcher.close()
+
+
+def story(folder: Path) -> dict[str, Any]:
+    controller, record = patient_controller(folder, 100.0), folder / "record.json"
+    said = run_until(folder, controller, record, Mode.STANDBY, Fault.NOT_COMMISSIONED)
+    assert "there is no record of a commissioning" in said
+    assert "NOT_COMMISSIONED: No commissioning was passed" in said
+    made = commission(folder, controller, record)
+    assert "refused" not in run_until(folder, controller, record, Mode.ACTIVE, Fault.NONE)
+    return made
+
+
+def test_a_controller_arms_once_it_was_commissioned(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp("quay")
+    made = first_that_can_be_judged(story, folder)
+    assert made["passed"] is True
+    assert len(made["checks"]) == 15
+    print(json.dumps({each["name"]: each["measured"] for each in made["checks"]}))

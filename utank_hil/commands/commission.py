@@ -1,0 +1,171 @@
+"""``utank-hil commission``: signs, zeros and scales at the quay, before anything may be armed."""
+
+import json
+import sys
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from utank_hil.assembly import build_commissioning_node
+from utank_hil.canbus import PortError, SocketCanPort
+from utank_hil.commands.alarm_lines import AlarmLines
+from utank_hil.commands.commissioning_record import make_record, record_path, write_record
+from utank_hil.commands.common import Json, fail, lead_on, load, notes, shown, why_not_writable
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.tables import print_table
+from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.retuning.adaptive import RetuningEvent
+from utank_hil.runtime import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
+from utank_hil.runtime.faults import fault_text
+from utank_hil.tick import TICK_S
+
+SAY_TICKS: Final = 500
+"""Between two lines about one stage."""
+
+
+def commission(
+    config: Annotated[Path, typer.Argument(help="Controller configuration.")],
+    channel: Annotated[
+        str, typer.Option("--channel", "--bus", help="SocketCAN interface, for example can0.")
+    ],
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Where the record goes; without it beside the configuration, with the ending "
+            ".commissioning.json.",
+        ),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Check every sensor, the pump and the valve at the quay, and write the record of it.
+
+    The ship is to lie still and upright, with slack moorings, and an operator at the panel. First
+    the zeros are measured. Then the operator arms, and the pump pushes the water a little to and
+    fro: with at most 12 % of its pressure limit, the level up to a fifth of its limit, the roll up
+    to 2 degrees. Stop and disarm act as always. What is wrong is named with its remedy. Without a
+    record that it was passed, utank-hil run refuses to arm (docs/commissioning.md).
+
+    [bold]Example:[/bold] utank-hil commission controller.yaml --channel can0
+    """
+    loaded = load(config, ControllerConfig)
+    path = record or record_path(config)
+    reason = why_not_writable(path.parent, (path.name,))
+    if reason is not None:
+        fail(f"{reason}; choose another place with --record")
+    statistics = LoopStatistics()
+    with ExitStack() as stack:
+        try:
+            port = SocketCanPort(channel)
+        except OSError as error:
+            fail(error, ExitCode.NO_BUS)
+        stack.callback(port.close)
+        stop = stack.enter_context(stop_on_signals())
+        try:
+            lines = AlarmLines()
+        except OSError as error:
+            fail(f"no process to print on the terminal: {error}")
+        stack.callback(lines.close)
+
+        def tell(event: RetuningEvent | AlarmEvent, start_ns: int) -> None:
+            if isinstance(event, AlarmEvent):
+                lines.tell(event, start_ns)
+
+        try:
+            node = build_commissioning_node(loaded, statistics=statistics, event_sink=tell)
+        except ValueError as error:
+            fail(f"{config}: vessel: {error}")
+        guide = Guide(node, lines)
+        notes.print(
+            f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
+            "nothing is recorded.",
+            soft_wrap=True,
+        )
+        with suppress(PortError):  # the loop meets it too, and its node reacts
+            port.receive()  # what came before is old, and must not look fresh
+        with real_time_scheduling() as scheduling:
+            for line in scheduling.lines():
+                notes.print(line, soft_wrap=True)
+            RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
+    if node.stage is not Stage.DONE:
+        fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)
+    made = make_record(loaded, config, channel, node.checks(), node.ended)
+    try:
+        write_record(path, made)
+    except OSError as error:
+        fail(f"{path}: the record can't be written: {error.strerror}")
+    if json_:
+        sys.stdout.write(json.dumps({**made, "record": str(path)}) + "\n")
+    else:
+        _print(made, path, config)
+    raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
+
+
+class Guide:
+    """Says what is done and what is to do, while the loop goes on.
+
+    Parameters
+    ----------
+    node : CommissioningNode
+    lines : AlarmLines
+        Where it is said.
+    """
+
+    def __init__(self, node: CommissioningNode, lines: AlarmLines) -> None:
+        self._node = node
+        self._lines = lines
+        self._stage: Stage | None = None
+        self._ticks = 0
+
+    def look(self) -> bool:
+        """Say what is new, before a tick; return whether all is done."""
+        node = self._node
+        self._ticks = self._ticks + 1 if node.stage is self._stage else 0
+        if self._ticks % SAY_TICKS == 0:
+            self._stage = node.stage
+            if self._ticks == 0:
+                self._lines.say(node.stage.value)
+            elif node.stage is Stage.WAITING:
+                self._lines.say(f"  still {node.node.mode.name}: {fault_text(node.node.fault)}")
+            elif node.stage is Stage.ARM:
+                self._lines.say("  waiting for the operator to arm")
+            else:
+                done_s = self._ticks * TICK_S
+                self._lines.say(f"  {done_s:.0f} of {node.length_s:.0f} s")
+        return node.stage is Stage.DONE
+
+
+def _print(record: dict[str, Any], path: Path, config: Path) -> None:
+    """The checks as a table, then what to do about those that failed."""
+    console = Console(highlight=False)
+    table = Table(title=f"Commissioning of {record['vessel']}")
+    for heading in ("check", "measured", "expected", "unit", "verdict"):
+        table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
+    for check in record["checks"]:
+        measured = check["measured"]
+        table.add_row(
+            check["what"],
+            "none" if measured is None else f"{measured:.3g}",
+            f"{check['expected']:.3g} ± {check['tolerance']:.2g}",
+            check["unit"],
+            check["verdict"] if check["verdict"] == "pass" else "[red]FAIL[/red]",
+        )
+    print_table(console, table)
+    for check in record["checks"]:
+        if check["verdict"] != "pass":
+            console.print(
+                f"[red]{escape(check['what'])}:[/red] {escape(check['remedy'])}", soft_wrap=True
+            )
+    if record["ended"]:
+        console.print(f"[red]ended early:[/red] {escape(record['ended'])}", soft_wrap=True)
+    verdict = "passed" if record["passed"] else "[red]not passed: arming is refused[/red]"
+    console.print(f"{verdict}; record: {escape(shown(path))}", soft_wrap=True)
+    if record["passed"]:
+        lead_on(console, f"run {shown(config)} --bus {record['bus']} --out log")

@@ -1,0 +1,153 @@
+"""The record of a commissioning: written by ``commission``, asked for by ``run``."""
+
+import json
+import math
+import os
+import tempfile
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+
+from utank_hil.canbus import load_catalogue
+from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.vessel import not_by_default
+from utank_hil.provenance import PROGRAM, commit, version
+from utank_hil.runtime.commissioning.checks import Check
+
+SUFFIX: Final = ".commissioning.json"
+EMULATED: Final = ("vcan", "vxcan")
+"""Begin the names of interfaces that no hardware is on."""
+
+
+def record_path(config: Path) -> Path:
+    """Where the record of a controller's file is, if nothing else is said: beside it."""
+    return config.with_suffix(SUFFIX)
+
+
+def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
+    """What of a configuration a commissioning stands for; a change of it makes the record void."""
+    vessel = config.vessel
+    parts = {name: getattr(vessel, name) for name in ("ship", "tank", "pump", "valve")}
+    return {
+        "catalogue_version": load_catalogue().version,
+        **{name: not_by_default(part) for name, part in parts.items() if part is not None},
+        "redundancy": not_by_default(vessel.redundancy),
+        "sensors": not_by_default(config.sensors),
+    }
+
+
+def make_record(
+    config: ControllerConfig, file: Path, bus: str, checks: list[Check], ended: str
+) -> dict[str, Any]:
+    """The record of a commissioning, ready for `json.dumps`.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+    file : Path
+        It was read from.
+    bus : str
+        Interface on which it was done.
+    checks : list of Check
+    ended : str
+        Why it ended before its time; empty if it did not.
+    """
+    return {
+        "program": PROGRAM,
+        "version": version(),
+        "commit": commit(),
+        "date": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        "controller": config.name,
+        "vessel": config.vessel.name,
+        "file": file.name,
+        "bus": bus,
+        "configuration_version": config.vessel.version,
+        "commissioned_for": commissioned_for(config),
+        "passed": not ended and bool(checks) and all(check.passed for check in checks),
+        "ended": ended,
+        "checks": [
+            {
+                **asdict(check),
+                "measured": check.measured if math.isfinite(check.measured) else None,
+                "verdict": "pass" if check.passed else "fail",
+                "remedy": "" if check.passed else check.remedy,
+            }
+            for check in checks
+        ],
+    }
+
+
+def write_record(path: Path, record: dict[str, Any]) -> None:
+    """Write a record so that at any time there is the old one or the new one as a whole.
+
+    Raises
+    ------
+    OSError
+        If it can't be written.
+    """
+    with tempfile.NamedTemporaryFile(
+        "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
+    ) as file:
+        try:
+            json.dump(record, file, indent=1)
+            file.write("\n")
+            file.flush()
+            os.fsync(file.fileno())
+            os.chmod(file.name, 0o644)
+            os.replace(file.name, path)
+        except BaseException:
+            os.unlink(file.name)
+            raise
+
+
+def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:
+    """Why a controller must not be armed, with what to do; empty if it may.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+    bus : str
+        Interface of the run. On an emulated one no record is asked for unless `path` is given: the
+        ship there is made of the same files.
+    file : Path
+        The configuration was read from.
+    path : Path, optional
+        Of the record, if it is not `record_path`.
+    """
+    vessel = config.vessel
+    if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
+        return ""
+    path = path or record_path(file)
+    remedy = f"run utank-hil commission {file} --channel {bus} at the quay"
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        stands_for, passed, date = (record[key] for key in ("commissioned_for", "passed", "date"))
+        on_bus = str(record["bus"])
+    except FileNotFoundError:
+        return f"{path}: there is no record of a commissioning; {remedy}"
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return f"{path}: is no record of a commissioning ({error}); {remedy}"
+    changed = _differences(stands_for, json.loads(json.dumps(commissioned_for(config))))
+    if changed:
+        return f"{path}: since {date} these changed: {', '.join(changed)}; {remedy}"
+    if passed is not True:
+        return f"{path}: the commissioning of {date} was not passed; {remedy}"
+    if _is_emulated(on_bus) and not _is_emulated(bus):
+        return f"{path}: was made on {on_bus}, where no hardware is; {remedy}"
+    return ""
+
+
+def _is_emulated(bus: str) -> bool:
+    return bus.startswith(EMULATED)
+
+
+def _differences(before: Any, now: Any, key: str = "") -> list[str]:
+    """Keys of a configuration that differ."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        return [
+            found
+            for name in sorted({*before, *now})
+            for found in _differences(before.get(name), now.get(name), f"{key}.{name}".lstrip("."))
+        ]
+    return [] if before == now else [key]

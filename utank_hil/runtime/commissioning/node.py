@@ -1,0 +1,245 @@
+"""The commissioning as a node: a controller node whose law gives pulses, and what looks on."""
+
+from collections.abc import Iterable
+from enum import Enum
+from operator import attrgetter
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Frame, Mode
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE
+from utank_hil.runtime.commissioning.checks import (
+    Check,
+    Record,
+    judge_rest,
+    judge_valve,
+)
+from utank_hil.runtime.commissioning.pulse_checks import judge_pulses
+from utank_hil.runtime.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
+from utank_hil.runtime.controller_node import ControllerNode
+from utank_hil.runtime.faults import fault_text
+from utank_hil.tick import TICK_NS, TICK_S
+
+ROW_TICKS: Final = 5
+ROW_S: Final = ROW_TICKS * TICK_S
+"""A row is the mean of so much time."""
+REST_S: Final = 20.0
+SETTLE_S: Final = 1.0
+"""From ACTIVE to the first pulse."""
+MOST_OVER_PLAN: Final = 3.0
+"""A level so many times the plan's ends the pulses."""
+
+_ALWAYS: Final = {
+    "roll_rad": "inbox.roll_rad",
+    "roll_rate_rad_s": "inbox.roll_rate_rad_s",
+    "port_level_m": "inbox.port_level_m",
+    "starboard_level_m": "inbox.starboard_level_m",
+    "high_level": "seen.high_level",
+}
+_OF_PUMP: Final = {"pressure_pa": "inbox.pressure_pa", "command_pa": "command_pa"}
+# each sensor by itself, whichever is in use
+_OF_PAIR: Final = {
+    "roll_rad": "inbox.motions.first.roll_rad",
+    "roll_rate_rad_s": "inbox.motions.first.roll_rate_rad_s",
+    "roll_2_rad": "inbox.motions.second.roll_rad",
+    "roll_rate_2_rad_s": "inbox.motions.second.roll_rate_rad_s",
+}
+_OF_VALVE: Final = {"valve_opening": "inbox.valve_opening"}
+
+
+class Stage(Enum):
+    """Where a commissioning stands, with what the operator is to know of it."""
+
+    WAITING = "Waiting until the controller is ready."
+    REST = "Measuring the zeros. Keep the ship still."
+    ARM = "The zeros are right. Arm at the panel: pump and valve will move a little."
+    MOVING = "Pump and valve move a little. Stop or disarm at the panel ends it."
+    DONE = "Done."
+
+
+class CommissioningNode:
+    """Leads through a commissioning; on the bus it is the controller.
+
+    Parameters
+    ----------
+    node : ControllerNode
+        With `law` in it.
+    law : PulseLaw
+    plant : DesignPlant
+        As the files describe it.
+    plan : PulsePlan, optional
+        If the tank has a pump.
+    stroke : ValveStroke, optional
+        If it has a valve.
+    volume_m : float
+        Sum of both levels at which the volume's monitor speaks.
+
+    Attributes
+    ----------
+    node : ControllerNode
+    stage : Stage
+    rest, moved : Record
+        What was recorded at rest, and from ACTIVE on; empty before.
+    ended : str
+        Why it ended before its time, in words; else empty.
+    """
+
+    name = "controller"
+    period_ns = TICK_NS
+
+    def __init__(
+        self,
+        node: ControllerNode,
+        law: PulseLaw,
+        plant: DesignPlant,
+        *,
+        plan: PulsePlan | None,
+        stroke: ValveStroke | None,
+        volume_m: float,
+    ) -> None:
+        self.node = node
+        self._law = law
+        self._plant = plant
+        self._plan = plan
+        self._stroke = stroke
+        self._volume_m = volume_m
+        self._pulses_s = 0.0 if plan is None else plan.duration_s
+        self._moving_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
+        sources = dict(_ALWAYS)
+        if plan is not None:
+            sources |= _OF_PUMP
+        if node.inbox.motions is not None:
+            sources |= _OF_PAIR
+        if stroke is not None:
+            sources |= _OF_VALVE
+        self._names = tuple(sources)
+        self._values = attrgetter(*sources.values())
+        self.stage = Stage.WAITING
+        self.ended = ""
+        self._since_ns = 0
+        self.rest: Record = {}
+        self.moved: Record = {}
+        self._rows: list[FloatArray] = []
+        self._sum = np.zeros(len(self._names))
+        self._ticks = 0
+
+    def checks(self) -> list[Check]:
+        """Judge what was recorded; takes tens of milliseconds, so not while the loop runs."""
+        if not self.rest:
+            return []
+        checks = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
+        begin = round(SETTLE_S / ROW_S)
+        end = begin + round(self._pulses_s / ROW_S)
+        record, plan, stroke = self.moved, self._plan, self._stroke
+        rows = len(record.get("roll_rad", ()))
+        if plan is not None and rows >= begin + plan.period_s / ROW_S:
+            pulses = {name: column[begin:end] for name, column in record.items()}
+            checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
+        if stroke is not None and rows >= end + stroke.duration_s / ROW_S - 1:
+            checks += judge_valve(record["valve_opening"][end:], stroke, ROW_S)
+        return checks
+
+    @property
+    def duration_s(self) -> float:
+        """Time that it takes at least, without waiting and arming."""
+        return REST_S + SETTLE_S + self._moving_s
+
+    @property
+    def length_s(self) -> float:
+        """Length of the stage that it is in, where it has one."""
+        return REST_S if self.stage is Stage.REST else SETTLE_S + self._moving_s
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take one frame from the bus."""
+        self.node.receive(frame, now_ns)
+
+    def other_frames(self, count: int) -> None:
+        """Take note of frames of other kinds on the bus."""
+        self.node.other_frames(count)
+
+    def link_error(self, now_ns: int, reason: str) -> None:
+        """Take note that the bus could not be read or written."""
+        self.node.link_error(now_ns, reason)
+
+    def stop(self, now_ns: int) -> Iterable[Frame]:
+        """Leave the pump at zero."""
+        return self.node.stop(now_ns)
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Let the controller do its tick, and look at what came of it."""
+        frames = self.node.tick(now_ns)
+        if self.stage is not Stage.DONE:
+            self._note()
+            self._go_on(now_ns)
+        return frames
+
+    def _note(self) -> None:
+        self._sum += self._values(self.node)
+        self._ticks += 1
+        if self._ticks == ROW_TICKS:
+            self._rows.append(self._sum / ROW_TICKS)
+            self._sum = np.zeros(len(self._names))
+            self._ticks = 0
+
+    def _enter(self, stage: Stage, now_ns: int) -> None:
+        self.stage = stage
+        self._since_ns = now_ns
+        self._rows = []
+        self._sum = np.zeros(len(self._names))
+        self._ticks = 0
+
+    def _record(self) -> Record:
+        return dict(zip(self._names, np.array(self._rows).T, strict=True))
+
+    def _go_on(self, now_ns: int) -> None:
+        mode = self.node.mode
+        passed_s = (now_ns - self._since_ns) * 1e-9
+        if self.stage is Stage.MOVING:
+            self._move(passed_s - SETTLE_S, now_ns)
+        elif mode in (Mode.INIT, Mode.FAULT):
+            if self.stage is not Stage.WAITING:
+                self._enter(Stage.WAITING, now_ns)
+        elif self.stage is Stage.WAITING:
+            self._enter(Stage.REST, now_ns)
+        elif self.stage is Stage.REST and passed_s >= REST_S:
+            self.rest = self._record()
+            zeros = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
+            passed = all(check.passed for check in zeros)
+            self._enter(Stage.ARM if passed else Stage.DONE, now_ns)
+        elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
+            self._enter(Stage.MOVING, now_ns)
+
+    def _move(self, time_s: float, now_ns: int) -> None:
+        """Command what is due, and end when all is done or something is wrong."""
+        node, plan = self.node, self._plan
+        if node.mode is not Mode.ACTIVE:
+            self.ended = (
+                fault_text(node.fault) if node.mode is Mode.FAULT else "Disarmed before the end."
+            )
+        elif plan is not None and self._level_m() > MOST_OVER_PLAN * plan.level_m:
+            self.ended = (
+                f"The level went {MOST_OVER_PLAN:g} times as far as planned. Check the gauges' "
+                "scaling, the pump's limits and the ship's file."
+            )
+        if self.ended or time_s >= self._moving_s:
+            self._law.reset()
+            self.moved = self._record()
+            self._enter(Stage.DONE, now_ns)
+        elif time_s >= 0:
+            self._law.set(
+                {
+                    PRESSURE: 0.0 if plan is None else plan.pressure_at(time_s),
+                    VALVE: 0.0
+                    if self._stroke is None
+                    else self._stroke.loss_at(time_s - self._pulses_s),
+                }
+            )
+
+    def _level_m(self) -> float:
+        """How far the level is from where it was at rest."""
+        inbox, rest = self.node.inbox, self.rest
+        at_rest_m = float(rest["starboard_level_m"].mean() - rest["port_level_m"].mean()) / 2
+        return abs(inbox.level_m - at_rest_m)

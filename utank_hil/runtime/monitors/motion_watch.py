@@ -1,0 +1,62 @@
+"""All that is judged of one motion sensor by itself."""
+
+import math
+from typing import Final
+
+from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.motion import RollAgainstRate
+from utank_hil.runtime.monitors.noise import Noise, SecondDifference
+from utank_hil.runtime.monitors.spikes import MotionGate, SpikeCount
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+from utank_hil.tick import TICK_S
+
+_NOISE: Final = int(Finding.NOISE)
+_SPIKES: Final = int(Finding.SPIKES)
+
+
+class MotionWatch:
+    """The monitors of one motion sensor.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+    gate : MotionGate, optional
+        Whose discarded samples count here.
+
+    Attributes
+    ----------
+    motion : RollAgainstRate
+    rate_noise : Noise
+    turned_rad : float
+        Integral of the rate since the last update, each rate held for a tick: kept by the caller.
+    found : int
+        Bits of `Finding`.
+    """
+
+    def __init__(self, thresholds: MonitorThresholds, gate: MotionGate | None = None) -> None:
+        self.motion = RollAgainstRate(thresholds)
+        self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
+        self._rate_bend = SecondDifference()
+        self._gate = gate
+        self._spikes = SpikeCount()
+        self._last_rate_rad_s = 0.0
+        self.turned_rad = 0.0
+        self.found = 0
+
+    def update(self, roll_rad: float, rate_rad_s: float, elapsed_s: float, *, stale: bool) -> None:
+        """Take a sample, and set `found`; one that is `stale` begins anew."""
+        # the sum holds each rate for a tick: half a tick of the ends makes it a trapezoid
+        turned_rad = self.turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
+        self.turned_rad = 0.0
+        self._last_rate_rad_s = rate_rad_s
+        if stale:
+            self.motion.restart()
+            self._rate_bend.restart()
+            self.found = 0
+            return
+        found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
+        if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
+            found |= _NOISE
+        if self._gate is not None and self._spikes.update(self._gate.discarded, elapsed_s):
+            found |= _SPIKES
+        self.found = found
