@@ -77,6 +77,12 @@ PARTS = (
         10,
     ),
     Part(
+        "campaign_kills",
+        "python -m tools.studies.campaign_kills --json",
+        "a campaign whose workers and driver are killed, and what a case costs on one and two",
+        40,
+    ),
+    Part(
         "starter_ships",
         "python -m tools.studies.starter_ships --json",
         "from a ship's dimensions to the bench: tank, pump and law of `utank-hil init`",
