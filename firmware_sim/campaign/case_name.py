@@ -3,7 +3,7 @@
 import hashlib
 import importlib.metadata
 import json
-import os
+import re
 from datetime import date
 from functools import cache
 from pathlib import Path
@@ -14,6 +14,7 @@ _SUFFIXES: Final = (".py", ".dbc")
 _NUMERICAL: Final = ("numpy", "scipy", "numba")
 _ROOT: Final = Path(__file__).resolve().parents[2]
 _DIGITS: Final = 24
+_PATH: Final = re.compile(r'"([^"\\]*/[^"\\]*)"')
 _WAVES: Final = ("sea", "voyage", "duration_s", "settle_s")
 
 
@@ -58,18 +59,8 @@ def as_text(content: Any) -> str:
 
 
 def _digest(content: Any) -> str:
-    return hashlib.sha256(as_text(_by_content(content)).encode()).hexdigest()[:_DIGITS]
-
-
-def _by_content(value: Any) -> Any:
-    """A value with data files by what is in them."""
-    if isinstance(value, dict):
-        return {key: _by_content(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_by_content(each) for each in value]
-    if isinstance(value, str) and os.sep in value:
-        return _file_digest(value) or value
-    return value
+    text = _PATH.sub(lambda found: _file_digest(found[1]) or found[0], as_text(content))
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
 
 
 @cache

@@ -1,7 +1,6 @@
 """Changes to a scenario's content by dotted keys, such as ``vessel.ship.gm_m``."""
 
 from collections.abc import Iterator, Mapping
-from copy import deepcopy
 from typing import Any, Final
 
 from firmware_sim.scenario import Scenario
@@ -37,12 +36,11 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
     OverrideError
         If a key leads into a value, or to a name that is not there.
     """
-    new = deepcopy(dict(values.get(WHOLE, content)))
+    new: Content = values.get(WHOLE, content)
     for key, value in values.items():
-        if key == WHOLE:
-            continue
-        for path in _paths(new, key.split(".")):
-            _set(new, path, deepcopy(value))
+        if key != WHOLE:
+            for path in list(_paths(new, key.split("."))):
+                new = _with(new, path, value)
     return new
 
 
@@ -70,26 +68,21 @@ def _inside(content: Any, path: list[str]) -> Any:
     return content
 
 
-def _set(content: Content, path: list[str], value: Any) -> None:
-    place: Any = content
-    for depth, part in enumerate(path):
-        above = ".".join(path[:depth])
-        last = depth == len(path) - 1
-        if isinstance(place, list):
-            if not (part.isdecimal() and int(part) < len(place)):
-                raise OverrideError(f"names item {part} of {above}, which has {len(place)}")
-            if last:
-                place[int(part)] = value
-            else:
-                place = place[int(part)]
-        elif not isinstance(place, dict):
-            raise OverrideError(f"leads into {above}, which is a value and has no keys")
-        elif last:
-            place[part] = value
-        else:
-            if part not in place:
-                _refuse_stranger(place, path[: depth + 1])
-            place = place.setdefault(part, {})
+def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:
+    """A copy of a section, as deep as the path goes, with another value at its end."""
+    if depth == len(path):
+        return value
+    part, above = path[depth], ".".join(path[:depth])
+    if isinstance(place, list):
+        if not (part.isdecimal() and int(part) < len(place)):
+            raise OverrideError(f"names item {part} of {above}, which has {len(place)}")
+        inner = _with(place[int(part)], path, value, depth + 1)
+        return [*place[: int(part)], inner, *place[int(part) + 1 :]]
+    if not isinstance(place, dict):
+        raise OverrideError(f"leads into {above}, which is a value and has no keys")
+    if part not in place and depth < len(path) - 1:
+        _refuse_stranger(place, path[: depth + 1])
+    return {**place, part: _with(place.get(part, {}), path, value, depth + 1)}
 
 
 def _refuse_stranger(place: Content, path: list[str]) -> None:

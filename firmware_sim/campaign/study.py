@@ -158,14 +158,14 @@ def load_study(path: Path) -> LoadedStudy:
     files = files_named(path)
     axes = _axes(study, files)
     averaged = {*study.average_over, *(study.random.samples_drawn()[0] if study.random else ())}
-    varied = [key for axis in axes for key in axis[0]]
+    varied = list(dict.fromkeys(key for axis in axes for each in axis for key in each))
     for key in study.average_over:
         if key != SEED and key not in varied:
             problem = f"names {key}, which is not varied"
             raise ConfigError([ConfigProblem(path, "average_over", problem)])
     # what is averaged over varies slowest: every group has its first cases early
-    axes.sort(key=lambda axis: not set(axis[0]) <= averaged)
-    keys = tuple(dict.fromkeys(key for key in varied if key not in averaged))
+    axes.sort(key=lambda axis: any(key not in averaged for each in axis for key in each))
+    keys = tuple(key for key in varied if key not in averaged)
     cases = []
     checked = set()
     for index, parts in enumerate(itertools.product(*axes)):
@@ -217,7 +217,7 @@ def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[
         [{key: labelled(value, ("grid", key, place))} for place, value in enumerate(values)]
         for key, values in study.grid.items()
     ]
-    return [axis for axis in axes if axis[0]]
+    return [axis for axis in axes if any(axis)]
 
 
 def _check(path: Path, study: Study, values: Content, content: Content) -> None:

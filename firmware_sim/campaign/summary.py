@@ -91,6 +91,8 @@ def figure(values: Sequence[float]) -> Figure:
 
 def summary(results: Results) -> list[dict[str, Any]]:
     """Figures of every group, ready for JSON."""
+    groups = groups_of(results)
+    waves = {case["case"]: case["waves"] for case in results.cases}
     return [
         {
             "parameters": group.parameters,
@@ -100,8 +102,9 @@ def summary(results: Results) -> list[dict[str, Any]]:
             "lost": group.lost,
             "runs": {run: _run(group, run) for run in group.runs},
             "paired": _paired(group),
+            "beside_first": [] if group is groups[0] else _beside(groups[0], group, waves),
         }
-        for group in groups_of(results)
+        for group in groups
     ]
 
 
@@ -133,15 +136,30 @@ def _paired(group: Group) -> list[dict[str, Any]]:
     for against, run in itertools.combinations(runs, 2):
         both = [(rows[against][ROLL], rows[run][ROLL]) for rows in _counted(group, against, run)]
         if both:
-            pairs.append(
-                {
-                    "run": run,
-                    "against": against,
-                    "roll_rms_difference_rad": figure([one - other for other, one in both]),
-                    "share_below": figure([1 - one / other for other, one in both if other > 0]),
-                }
-            )
+            pairs.append({"run": run, "against": against, **_pair(both)})
     return pairs
+
+
+def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Roll RMS of each run against the same run of the study's first group, in the same waves."""
+    pairs = []
+    for run in group.runs:
+        there, here = (
+            {waves[row["case"]]: row[ROLL] for row in each.of_run(run) if not row["mark"]}
+            for each in (first, group)
+        )
+        both = [(there[name], roll) for name, roll in here.items() if name in there]
+        if both:
+            pairs.append({"run": run, **_pair(both)})
+    return pairs
+
+
+def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
+    """Rolls of one, and of another in the same waves."""
+    return {
+        "roll_rms_difference_rad": figure([one - other for other, one in both]),
+        "share_below": figure([1 - one / other for other, one in both if other > 0]),
+    }
 
 
 def _counted(group: Group, *runs: str) -> list[Mapping[str, Mapping[str, float]]]:

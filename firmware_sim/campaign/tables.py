@@ -68,6 +68,15 @@ def pairs_table(groups: list[dict[str, Any]]) -> Table:
                 interval(pair["share_below"], 100, 1),
                 interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
             )
+        for pair in group["beside_first"]:
+            table.add_row(
+                pair["run"],
+                "first row's",
+                *(_short(value) for value in group["parameters"].values()),
+                str(pair["share_below"]["cases"]),
+                interval(pair["share_below"], 100, 1),
+                interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
+            )
     return table
 
 

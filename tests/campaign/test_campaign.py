@@ -19,6 +19,7 @@ from firmware_sim.campaign.driver import Count, Driver, batch_of
 from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
+from tools.evidence import campaign_part
 from utank_hil.commands.common import new_app
 
 pytestmark = pytest.mark.slow
@@ -99,6 +100,8 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert pair["share_below"] == pytest.approx(shares)
     assert shares["cases"] == 3
     assert shares["half_width"] > 0
+    # headings are another sea: nothing is beside the first
+    assert [group["beside_first"] for group in found["groups"]] == [[], [], []]
     out = tmp_path / "out"
     assert (out / "campaign.png").stat().st_size > 10_000
     about = json.loads((out / "study.json").read_text())
@@ -114,6 +117,18 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert sorted((out / "rows").iterdir()) == rows
 
 
+def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Path):
+    pressures = [5e4, 1.5e4]
+    grid = {"seed": {"first": 1, "count": 3}, "controllers.*.limits.pressure_pa": pressures}
+    found = json.loads(run(written(tmp_path, grid=grid), "--json").stdout)["groups"]
+    rolls = [group["runs"]["gpc"]["roll_rms_rad"]["mean"] for group in found]
+    bare, passive, gpc = found[1]["beside_first"]
+    assert gpc["roll_rms_difference_rad"]["mean"] == pytest.approx(rolls[1] - rolls[0], rel=1e-9)
+    assert gpc["share_below"]["cases"] == 3
+    for same in (bare, passive):
+        assert same["roll_rms_difference_rad"] == {"mean": 0.0, "half_width": 0.0, "cases": 3}
+
+
 def test_campaign_stops_where_its_interval_is_narrow(run, tmp_path: Path):
     stop = {"metric": "roll_below_passive", "half_width": 0.2, "least": 5}
     path = written(tmp_path, grid={"seed": {"first": 1, "count": 200}}, stop=stop)
@@ -125,6 +140,20 @@ def test_campaign_stops_where_its_interval_is_narrow(run, tmp_path: Path):
     # more cases may have been computed; they do not count
     assert found["cases"] == 200
     assert group["counted"] == figure["cases"]
+
+
+def test_study_as_a_part_of_the_evidence_keeps_its_rows(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    path = written(tmp_path, grid={"sea.heading_deg": [90.0, 0.0]})
+    monkeypatch.setattr(campaign_part, "FOLDER", tmp_path)
+    monkeypatch.setattr("sys.argv", ["campaign_part", str(path)])
+    assert campaign_part.main() == 0
+    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    rows = {(row["sea.heading_deg"], row["run"]): row for row in found["rows"]}
+    assert list(rows) == [(90.0, "no tank"), (90.0, "passive"), (90.0, "gpc"), (0.0, "")]
+    assert rows[90.0, "no tank"]["strikes"] is None
+    assert rows[0.0, ""]["status"] == "failed"
 
 
 def test_wrong_study_ends_before_anything_is_computed(run, tmp_path: Path):

@@ -36,6 +36,12 @@ def test_every_value_meets_every_other_and_seeds_make_no_group(tmp_path: Path):
     assert len({case.waves for case in found.cases}) == 2 * 4
 
 
+def test_entries_of_cases_may_have_keys_of_their_own(tmp_path: Path):
+    found = small(tmp_path, cases=[{}, {"plant": "linear"}, {"sea.speed_m_s": 3.0}])
+    assert found.keys == ("plant", "sea.speed_m_s")
+    assert [case.group for case in found.cases] == [("", ""), ("linear", ""), ("", 3.0)]
+
+
 def test_ranges_are_spaced_counted_and_the_hours_of_a_file(tmp_path: Path):
     spaced = small(tmp_path, grid={"sea.heading_deg": {"low": 30, "high": 150, "count": 5}})
     assert [case.parameters["sea.heading_deg"] for case in spaced.cases] == [30, 60, 90, 120, 150]

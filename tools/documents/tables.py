@@ -4,6 +4,7 @@ Such a table stands between `<!-- table: NAME -->` and `<!-- end of table -->`, 
 command and date of its numbers.
 """
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import Any
 
 from tools.evidence.parts import PARTS
 from tools.evidence.record import Record, read
-from tools.studies.shipped_scenarios import HEADINGS, cells
 from utank_hil.thesis.figure import Verdict, printed_text
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -166,11 +166,30 @@ def thesis_statements(result: dict[str, Any]) -> Rows:
     ]
 
 
-def scenarios(result: dict[str, dict[str, Any]]) -> Rows:
+def scenarios(result: dict[str, Any]) -> Rows:
     """Every run of every shipped scenario."""
+    linear = {(row["scenario"], row["run"]): row["roll_rms_rad"] for row in result["rows"]
+              if row["plant"] == "linear"}  # fmt: skip
+
+    def cells(row: dict[str, Any]) -> list[str]:
+        alike, roll_rad = linear.get((row["scenario"], row["run"])), row["roll_rms_rad"]
+        power_w, passive = row["power_mean_w"], row["run"] == "passive"
+        return [
+            row["scenario"],
+            row["run"],
+            f"{math.degrees(roll_rad):.2f}",
+            number(row["roll_below_no_tank"], ".1%"),
+            "" if passive else number(row["roll_below_passive"], ".1%"),
+            number(row["strikes"], ".0f"),
+            "" if power_w is None else f"{power_w / 1e3:.3g}",
+            f"{roll_rad / alike - 1:+.1%}" if alike else "",
+        ]
+
+    headings = ("scenario", "run", "roll RMS, °", "below no tank", "below passive", "strikes",
+                "shaft power, kW", "roll against linear plant")  # fmt: skip
     return [
-        list(HEADINGS),
-        *(cells(name, run, row) for name, rows in result.items() for run, row in rows.items()),
+        list(headings),
+        *(cells(row) for row in result["rows"] if row["plant"] is None and row["run"]),
     ]
 
 
