@@ -94,7 +94,14 @@ def disturbed(study: Path, out: Path, kills: int, restarts: int) -> dict[str, An
         [(rng.uniform(0.02, 0.98), "worker") for _ in range(kills)]
         + [(rng.uniform(0.2, 0.8), "driver") for _ in range(restarts)]
     )
-    command = [sys.executable, "-m", "tools.studies.campaign_kills", "--drive", study, out]
+    command = [
+        sys.executable,
+        "-m",
+        "tools.studies.campaign_kills",
+        "--drive",
+        str(study),
+        str(out),
+    ]
     started, drivers, killed = time.monotonic(), 1, 0
     driver = subprocess.Popen(command)
     while driver.poll() is None or driver.returncode == -signal.SIGKILL:
@@ -219,7 +226,8 @@ def main() -> None:
     parser.add_argument("--drive", nargs=2, type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.drive:
-        drive(*arguments.drive, 2)
+        study, out = arguments.drive
+        drive(study, out, 2)
         return
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
