@@ -128,14 +128,15 @@ def disturbed(study: Path, out: Path, kills: int, restarts: int) -> dict[str, An
 
 def kill_worker(driver: int, rng: random.Random) -> int:
     """Kill one of a driver's workers; none may be there yet."""
-    names = [
-        child
-        for child in psutil.Process(driver).children()
-        if any("spawn_main" in word for word in child.cmdline())
-    ]
-    if not names:
+    try:
+        names = [
+            child
+            for child in psutil.Process(driver).children()
+            if any("spawn_main" in word for word in child.cmdline())
+        ]
+        rng.choice(names).kill()
+    except (psutil.Error, IndexError):  # it has just ended, or none has begun
         return 0
-    rng.choice(names).kill()
     return 1
 
 
@@ -242,6 +243,7 @@ def main() -> None:
             study = study_of(folder, simulation, count)
             found["killed"][simulation] = disturbed(study, out, kills, restarts)
             found["scaling"][simulation] = scaled(folder, simulation)
+            sys.stderr.write(json.dumps(found) + "\n")  # should the rest fail
     text = json.dumps(found, indent=None if arguments.json else 1)
     sys.stdout.write(text + "\n")
 
