@@ -92,7 +92,9 @@ class Uniform(Section):
     """Numbers of equal probability between two."""
 
     low: Finite
+    """The least."""
     high: Finite
+    """The greatest."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """So many of them."""
@@ -103,7 +105,9 @@ class Normal(Section):
     """Normally distributed numbers."""
 
     mean: Finite
+    """Of the distribution."""
     std: Positive
+    """Standard deviation."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """So many of them."""
@@ -114,6 +118,7 @@ class Consecutive(Section):
     """Whole numbers, another for each sample: seeds."""
 
     first: Annotated[int, Range(least=0)]
+    """The first of them."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:  # noqa: ARG002
         """So many of them."""
@@ -124,6 +129,7 @@ class Choice(Section):
     """One of some values, each as often as the others."""
 
     one_of: Annotated[list[Value], Field(min_length=1)]
+    """The values."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """So many of them."""
@@ -134,8 +140,11 @@ class Draws(Section):
     """Samples of keys that are drawn independently of one another, and of the rows of a table."""
 
     samples: _Count
+    """How many."""
     seed: Annotated[int, Range(least=0)] = 1
+    """Of the draws; another than that of the waves."""
     keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)
+    """What is drawn for each dotted key."""
     table: Path | None = None
     """CSV: its heading names keys, and `weight`; a sample takes the values of one row."""
 

@@ -38,6 +38,7 @@ class Stop(Section):
     """
 
     metric: str
+    """The figure: a column of the results."""
     half_width: Positive | None = None
     """Of the 95 % interval, in the metric's unit."""
     relative: Positive | None = None
@@ -61,7 +62,9 @@ class Study(Section):
 
     name: str
     scenario: Content
+    """What is varied: the file of a scenario."""
     simulation: Literal["bus", "linear", "nonlinear"]
+    """How a case is computed, and what is left out of it."""
     set: Content = Field(default_factory=dict)
     """Values by dotted key that hold for every case."""
     cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)
@@ -69,9 +72,11 @@ class Study(Section):
     grid: dict[str, Axis] = Field(default_factory=dict)
     """Values by dotted key, every one with every other."""
     random: Draws | None = None
+    """Samples that are drawn, every one with all of `cases` and `grid`."""
     average_over: tuple[str, ...] = (SEED,)
     """Keys whose values make no group of their own; all that is drawn belongs to them."""
     stop: Stop | None = None
+    """When a group needs no more cases."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Study":
