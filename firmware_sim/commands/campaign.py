@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.common import OUT, Json, fail, fail_with, notes, prepare_out, shown
+from utank_hil.commands.common import OUT, Json, fail, fail_with, lead_on, notes, prepare_out, shown
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import ConfigError
@@ -77,7 +77,9 @@ def campaign(
         sys.stdout.write(json.dumps(content) + "\n")
     else:
         _print(loaded, groups, failed)
-        Console().print(f"results: {shown(folder)}", soft_wrap=True)
+        console = Console()
+        console.print(f"results: {shown(folder)}", soft_wrap=True)
+        lead_on(console, f"campaign {shown(study)} --resume", f"compare {shown(folder)} OTHER")
     if interrupted:
         notes.print("interrupted: the same command with --resume goes on from here")
         raise typer.Exit(ExitCode.INTERRUPTED)

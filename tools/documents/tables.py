@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from tools.evidence.parts import PARTS
+from tools.evidence.parts import PARTS, Part
 from tools.evidence.record import Record, read
 from utank_hil.thesis.figure import Verdict, printed_text
 
@@ -215,11 +215,12 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
 }
 
 
-def source(kept: Record) -> str:
+def source(part: Part, kept: Record) -> str:
     """Where the numbers are from."""
     data = f"evidence/{kept['part']}.json"
-    command = kept["command"].removesuffix(" --json")
-    return f"`{command}`, {kept['date']}; machine, versions and commit: [{data}]({data})."
+    command = part.command.removesuffix(" --json")
+    before = "" if kept["command"] == part.command else f" as it was at {kept['commit']}"
+    return f"`{command}`{before}, {kept['date']}; machine, versions and commit: [{data}]({data})."
 
 
 def table(name: str) -> str:
@@ -233,7 +234,8 @@ def table(name: str) -> str:
     if name not in TABLES:
         raise TableError(f"no table {name!r}: there are {', '.join(TABLES)}")
     part_name, rows_of = TABLES[name]
-    kept = read(next(part for part in PARTS if part.name == part_name))
+    part = next(part for part in PARTS if part.name == part_name)
+    kept = read(part)
     if kept is None:
         raise TableError(f"run `python -m tools.evidence --part {part_name}` first")
     heading, *rows = (
@@ -241,7 +243,7 @@ def table(name: str) -> str:
     )
     lines = [heading, "|".join(["---"] * (heading.count("|") + 1)), *rows]
     drawn = "\n".join(f"|{line}|" for line in lines)
-    return f"{drawn}\n\n{source(kept)}\n"
+    return f"{drawn}\n\n{source(part, kept)}\n"
 
 
 def pages() -> Iterator[tuple[Path, str]]:
