@@ -92,7 +92,8 @@ def figure(values: Sequence[float]) -> Figure:
 def summary(results: Results) -> list[dict[str, Any]]:
     """Figures of every group, ready for JSON."""
     groups = groups_of(results)
-    waves = {case["case"]: case["waves"] for case in results.cases}
+    cases = {case["case"]: case for case in results.cases}
+    waves = {name: case["waves"] for name, case in cases.items()}
     return [
         {
             "parameters": group.parameters,
@@ -100,7 +101,7 @@ def summary(results: Results) -> list[dict[str, Any]]:
             "counted": len(group.rows),
             "failed": group.failed,
             "lost": group.lost,
-            "runs": {run: _run(group, run) for run in group.runs},
+            "runs": {run: _run(group, run, cases) for run in group.runs},
             "paired": _paired(group),
             "beside_first": [] if group is groups[0] else _beside(groups[0], group, waves),
         }
@@ -117,7 +118,7 @@ def failures(results: Results) -> dict[str, int]:
     return reasons
 
 
-def _run(group: Group, run: str) -> dict[str, Any]:
+def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     rows = group.of_run(run)
     counted = [row for row in rows if not row["mark"]]
     marks = [row["mark"] for row in rows if row["mark"]]
@@ -125,7 +126,8 @@ def _run(group: Group, run: str) -> dict[str, Any]:
     made["marked"] = {mark: marks.count(mark) for mark in dict.fromkeys(marks)}
     # of all of them: a ship that capsized had the worst case
     worst = max(rows, key=lambda row: row[ROLL])
-    made["worst"] = {name: _json(worst[name]) for name in ("case", "mark", ROLL, "roll_max_rad")}
+    made["worst"] = {name: worst[name] for name in ("mark", ROLL, "roll_max_rad")}
+    made["worst"] |= cases[worst["case"]]
     return made
 
 
@@ -166,7 +168,3 @@ def _counted(group: Group, *runs: str) -> list[Mapping[str, Mapping[str, float]]
     """The rows of cases in which some runs count, by run."""
     by_run = ({row["run"]: row for row in rows if not row["mark"]} for rows in group.rows)
     return [rows for rows in by_run if all(run in rows for run in runs)]
-
-
-def _json(value: Any) -> Any:
-    return None if isinstance(value, float) and math.isnan(value) else value

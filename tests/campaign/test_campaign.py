@@ -100,6 +100,10 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert pair["share_below"] == pytest.approx(shares)
     assert shares["cases"] == 3
     assert shares["half_width"] > 0
+    worst = groups[90.0]["runs"]["gpc"]["worst"]
+    assert worst["sea.heading_deg"] == 90.0
+    assert worst["seed"] in (1, 2, 3)
+    assert worst["roll_rms_rad"] > groups[90.0]["runs"]["gpc"]["roll_rms_rad"]["mean"]
     # headings are another sea: nothing is beside the first
     assert [group["beside_first"] for group in found["groups"]] == [[], [], []]
     out = tmp_path / "out"
