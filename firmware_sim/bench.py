@@ -167,7 +167,7 @@ def _prepare(board: _Board) -> None:
 
 
 @contextmanager
-def _interrupts_waiting() -> Iterator[None]:
+def interrupts_waiting() -> Iterator[None]:
     """Let processes start with Ctrl-C held back: it must not end them while they import."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -323,7 +323,7 @@ def _run_all(
     progress: Progress,
 ) -> Iterable[Run]:
     def start(function: Callable[..., Any], index: int, *arguments: object) -> Future[Any]:
-        with _interrupts_waiting():
+        with interrupts_waiting():
             return pool.submit(_call, function, index, *arguments)
 
     def wait(futures: list[Future[Any]]) -> list[Any]:

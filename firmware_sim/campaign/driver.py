@@ -4,7 +4,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Final
 
 from firmware_sim.campaign.case_name import as_text, code_digest
 from firmware_sim.campaign.simulations import Row
@@ -21,6 +22,8 @@ BATCH_S: Final = 0.5
 MOST_TOGETHER: Final = 200
 AHEAD: Final = 2
 """Batches that wait at each worker or run there."""
+LOOK_S: Final = 5.0
+"""So often workers that are gone for good are replaced."""
 FLUSH_S: Final = 1.0
 """Rows are on disk so long after they came back."""
 
@@ -101,28 +104,38 @@ class Driver:
         OtherCodeError
             If a worker has other code.
         """
-        from distributed import as_completed
+        from firmware_sim.campaign.cluster import replace_lost
 
-        self._written_s = time.monotonic()
-        running = as_completed(with_results=False)
+        self._written_s = looked_s = time.monotonic()
+        ended: SimpleQueue[Future[list[Row]]] = SimpleQueue()
         batches: dict[str, list[Case]] = {}
         try:
-            self._send(client, running, batches)
+            self._send(client, ended, batches)
             while batches:
-                future = next(running)
-                cases = batches.pop(str(future.key))
-                self._take(self._rows(future, cases))
-                self._send(client, running, batches)
+                if time.monotonic() - looked_s > LOOK_S:
+                    replace_lost(client)
+                    looked_s = time.monotonic()
+                try:
+                    future = ended.get(timeout=LOOK_S)
+                except Empty:
+                    continue
+                self._take(self._rows(client, future, batches.pop(str(future.key))))
+                self._send(client, ended, batches)
         finally:
             self._write()
         self.store.gather()
 
-    def _send(self, client: "Client", running: Any, batches: dict[str, list[Case]]) -> None:
+    def _send(
+        self,
+        client: "Client",
+        ended: "SimpleQueue[Future[list[Row]]]",
+        batches: dict[str, list[Case]],
+    ) -> None:
         most = AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
         while len(batches) < most and (cases := self._next()):
             future = client.submit(self.work, batch_of(self.loaded, cases), pure=False)
             batches[str(future.key)] = cases
-            running.add(future)
+            future.add_done_callback(ended.put)
 
     def _next(self) -> list[Case]:
         """The next cases, about `BATCH_S` of work."""
@@ -138,15 +151,19 @@ class Driver:
                 self.count.needed -= 1
         return taken
 
-    def _rows(self, future: "Future[list[Row]]", cases: list[Case]) -> list[Row]:
+    def _rows(self, client: "Client", future: "Future[list[Row]]", cases: list[Case]) -> list[Row]:
         from distributed import KilledWorker
 
-        try:
-            rows = future.result()
-        except KilledWorker:
-            reason = "the workers that computed it died again and again: too little memory?"
-            return [failed_row(case.name, LOST, reason) for case in cases]
-        return rows
+        from firmware_sim.campaign.cluster import replace_lost
+
+        while True:
+            try:
+                return future.result(timeout=LOOK_S)
+            except TimeoutError:  # it is lost with its worker, and has to be computed again
+                replace_lost(client)
+            except KilledWorker:
+                reason = "the workers that computed it died again and again: too little memory?"
+                return [failed_row(case.name, LOST, reason) for case in cases]
 
     def _take(self, rows: list[Row]) -> None:
         self._unwritten += rows

@@ -49,7 +49,15 @@ def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path: Pat
             first.run(client)
         done = store.done()
         assert 8 < len(done) < 16
-        second = Driver(loaded, store, lambda count: None)
+        closed: list[int] = []
+
+        def close(count: Count) -> None:
+            """Have every nanny give up."""
+            while len(closed) < 2:
+                client.cluster.sync(list(client.cluster.workers.values())[len(closed)].close)
+                closed.append(count.done)
+
+        second = Driver(loaded, store, close)
         assert second.count.needed == 16 - len(done)
         second.run(client)
     found = read_results(tmp_path / "out").rows
