@@ -29,7 +29,10 @@ def without_times(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return [{key: value for key, value in row.items() if key != "wall_s"} for row in rows]
 
 
-def test_workers_that_are_killed_and_an_interruption_change_no_bit(tmp_path: Path):
+def test_workers_that_are_killed_and_an_interruption_change_no_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("firmware_sim.campaign.driver.LOOK_S", 1.0)
     loaded = small(tmp_path, grid={"seed": {"first": 1, "count": 16}})
     store = Store(tmp_path / "out")
     store.begin(loaded, {"keys": loaded.keys, "configuration": {"stop": None}}, resume=False)
