@@ -32,6 +32,7 @@ from utank_hil.control import BuiltLaw, PassiveDesign
 from utank_hil.runtime import stop_on_signals
 from utank_hil.telemetry.frame_log import SUFFIX
 
+LOCKSTEP: Final = "lockstep"
 POLL_S: Final = 0.1
 BEGIN_AFTER_NS: Final = 200_000_000
 """From the moment when both sides are ready to the first tick of both: they look every 10 ms."""
@@ -171,7 +172,7 @@ def _prepare(board: _Board) -> None:
 
 
 @contextmanager
-def _interrupts_waiting() -> Iterator[None]:
+def interrupts_waiting() -> Iterator[None]:
     """Let processes start with Ctrl-C held back: it must not end them while they import."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -253,14 +254,49 @@ def run_bench(
         interrupted = stopped()
     if not runs or len(runs[0].rows) == 0:
         raise InterruptedError("ended before the first sample")
+    return _result(jobs, runs, _mode(options), interrupted, started)
+
+
+def run_in_turn(
+    scenario: Scenario, seed: int, laws: Mapping[str, BuiltLaw] | None = None
+) -> BenchResult:
+    """`run_bench` in lockstep within this process, one run after the other; the same rows.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+        Instead of the scenario's.
+    laws : mapping of str to BuiltLaw, optional
+        As in `run_bench`.
+    """
+    started = time.monotonic()
+    jobs = jobs_of(scenario, seed, scenario.duration_s, laws)
+    return _result(
+        jobs, [run_lockstep(job, _Unwatched()) for job in jobs], LOCKSTEP, False, started
+    )
+
+
+class _Unwatched:
+    """The watch of a run that nobody looks on at."""
+
+    def stopped(self, done_s: float) -> bool:  # noqa: ARG002, goes on to the end
+        return False
+
+
+def _result(
+    jobs: list[Job], runs: list[Run], mode: str, interrupted: bool, started: float
+) -> BenchResult:
+    """What the runs of a bench come to; `started` is the monotonic time of its beginning."""
+    scenario, seed = jobs[0].scenario, jobs[0].seed
     done = tuple(run for run in runs if len(run.rows))
     settle_s, end_s = window_s(done, scenario.settle_s)
     bare_rad, bare_capsized_s = roll_without_tank(scenario, seed, round(end_s / RECORD_S))
     return BenchResult(
         scenario,
-        _mode(options),
+        mode,
         seed,
-        duration_s,
+        jobs[0].duration_s,
         settle_s,
         end_s,
         bare_rad,
@@ -299,7 +335,7 @@ def _run_all(
     progress: Progress,
 ) -> Iterable[Run]:
     def start(function: Callable[..., Any], index: int, *arguments: object) -> Future[Any]:
-        with _interrupts_waiting():
+        with interrupts_waiting():
             return pool.submit(_call, function, index, *arguments)
 
     def wait(futures: list[Future[Any]]) -> list[Any]:
@@ -335,5 +371,5 @@ def _run_all(
 
 def _mode(options: BenchOptions) -> str:
     if not options.real_time:
-        return "lockstep"
+        return LOCKSTEP
     return "real time" if options.channel is None else f"real time on {options.channel}"

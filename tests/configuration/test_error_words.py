@@ -48,7 +48,9 @@ def places(content: Any, key: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any,
         yield from places(value, (*key, name))
 
 
-SHIPPED = {path: whole(path) for path in sorted(CONFIGS.glob("*/*.yaml"))}
+SHIPPED = {
+    path: whole(path) for name in sorted(MODELS) for path in sorted((CONFIGS / name).glob("*.yaml"))
+}
 PLACES = [(path, *place) for path, content in SHIPPED.items() for place in places(content)]
 NUMBERS = [
     (path, key)

@@ -96,7 +96,6 @@ def test_benchmark_times_every_kind_of_controller():
         (("studies.share_of_possible", "--seeds", "1"), "--seeds must be 2 or more"),
         (("studies.constrained_campaign", "--horizon-s", "2"), "--horizon-s must be 12 or more"),
         (("studies.model_errors", "--seconds", "nan"), "--seconds must be 60 or more"),
-        (("studies.storm_seeds", "nowhere.yaml"), "nowhere.yaml: can't be read"),
     ],
 )
 def test_wrong_arguments_are_refused_with_the_remedy(tool, arguments, message):

@@ -18,6 +18,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from firmware_sim.campaign.study import Study
 from firmware_sim.scenario import Scenario
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.parameters import Range
@@ -41,6 +42,8 @@ FILES = (
      "[how-to/ship.md](how-to/ship.md)."),
     (ControllerConfig, "Controller files", "`configs/controllers`: what `utank-hil run` takes."),
     (Scenario, "Scenario files", "`configs/scenarios`: what `utank-hil bench` takes."),
+    (Study, "Study files", "`configs/studies`: what `utank-hil campaign` takes, see "
+     "[campaigns.md](campaigns.md)."),
 )  # fmt: skip
 
 GENERAL = {
@@ -156,7 +159,7 @@ def _sections(hint: Any) -> Iterator[type]:
 def _value(hint: Any) -> str:
     """What a value must be, in words."""
     members = list(_alone(hint))
-    kinds = [_kind(each) for each in members if _is_section(each)]
+    kinds = [kind for each in members if _is_section(each) and (kind := _kind(each))]
     if len(kinds) > 1:
         return "section of one `kind`: " + ", ".join(kinds)
     return " or ".join(dict.fromkeys(_one(each) for each in members))
@@ -179,7 +182,13 @@ def _one(hint: Any) -> str:
         return " or ".join(f"`{each.value}`" for each in hint)
     if _is_section(hint):
         return f"section of `kind`: {kind}" if (kind := _kind(hint)) else "section"
-    words = {float: "number", int: "whole number", bool: "`true` or `false`", str: "text"}
+    words = {
+        float: "number",
+        int: "whole number",
+        bool: "`true` or `false`",
+        str: "text",
+        Any: "any value",
+    }
     return words.get(hint, "path" if hint is Path else getattr(hint, "__name__", "value"))
 
 

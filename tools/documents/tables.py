@@ -4,14 +4,14 @@ Such a table stands between `<!-- table: NAME -->` and `<!-- end of table -->`, 
 command and date of its numbers.
 """
 
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from tools.evidence.parts import PARTS
+from tools.evidence.parts import PARTS, Part
 from tools.evidence.record import Record, read
-from tools.studies.shipped_scenarios import HEADINGS, cells
 from utank_hil.thesis.figure import Verdict, printed_text
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -166,11 +166,30 @@ def thesis_statements(result: dict[str, Any]) -> Rows:
     ]
 
 
-def scenarios(result: dict[str, dict[str, Any]]) -> Rows:
+def scenarios(result: dict[str, Any]) -> Rows:
     """Every run of every shipped scenario."""
+    linear = {(row["scenario"], row["run"]): row["roll_rms_rad"] for row in result["rows"]
+              if row["plant"] == "linear"}  # fmt: skip
+
+    def cells(row: dict[str, Any]) -> list[str]:
+        alike, roll_rad = linear.get((row["scenario"], row["run"])), row["roll_rms_rad"]
+        power_w, passive = row["power_mean_w"], row["run"] == "passive"
+        return [
+            row["scenario"],
+            row["run"],
+            f"{math.degrees(roll_rad):.2f}",
+            number(row["roll_below_no_tank"], ".1%"),
+            "" if passive else number(row["roll_below_passive"], ".1%"),
+            number(row["strikes"], ".0f"),
+            "" if power_w is None else f"{power_w / 1e3:.3g}",
+            f"{roll_rad / alike - 1:+.1%}" if alike else "",
+        ]
+
+    headings = ("scenario", "run", "roll RMS, °", "below no tank", "below passive", "strikes",
+                "shaft power, kW", "roll against linear plant")  # fmt: skip
     return [
-        list(HEADINGS),
-        *(cells(name, run, row) for name, rows in result.items() for run, row in rows.items()),
+        list(headings),
+        *(cells(row) for row in result["rows"] if row["plant"] is None and row["run"]),
     ]
 
 
@@ -196,11 +215,12 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
 }
 
 
-def source(kept: Record) -> str:
+def source(part: Part, kept: Record) -> str:
     """Where the numbers are from."""
     data = f"evidence/{kept['part']}.json"
-    command = kept["command"].removesuffix(" --json")
-    return f"`{command}`, {kept['date']}; machine, versions and commit: [{data}]({data})."
+    command = part.command.removesuffix(" --json")
+    before = "" if kept["command"] == part.command else f" as it was at {kept['commit']}"
+    return f"`{command}`{before}, {kept['date']}; machine, versions and commit: [{data}]({data})."
 
 
 def table(name: str) -> str:
@@ -214,7 +234,8 @@ def table(name: str) -> str:
     if name not in TABLES:
         raise TableError(f"no table {name!r}: there are {', '.join(TABLES)}")
     part_name, rows_of = TABLES[name]
-    kept = read(next(part for part in PARTS if part.name == part_name))
+    part = next(part for part in PARTS if part.name == part_name)
+    kept = read(part)
     if kept is None:
         raise TableError(f"run `python -m tools.evidence --part {part_name}` first")
     heading, *rows = (
@@ -222,7 +243,7 @@ def table(name: str) -> str:
     )
     lines = [heading, "|".join(["---"] * (heading.count("|") + 1)), *rows]
     drawn = "\n".join(f"|{line}|" for line in lines)
-    return f"{drawn}\n\n{source(kept)}\n"
+    return f"{drawn}\n\n{source(part, kept)}\n"
 
 
 def pages() -> Iterator[tuple[Path, str]]:

@@ -66,15 +66,27 @@ PARTS = (
     ),
     Part(
         "storm_seeds",
-        "python -m tools.studies.storm_seeds configs/scenarios/storm_all.yaml --seeds 16 --json",
+        "python -m tools.evidence.campaign_part configs/studies/storm_seeds.yaml",
         "every law on the bench over sixteen hours of the storm",
         30,
     ),
     Part(
         "shipped_scenarios",
-        "python -m tools.studies.shipped_scenarios --json",
+        "python -m tools.evidence.campaign_part configs/studies/shipped_scenarios.yaml",
         "the shipped scenarios on the bench, beside the linear plant",
         10,
+    ),
+    Part(
+        "campaign_kills",
+        "python -m tools.studies.campaign_kills --json",
+        "a campaign whose workers and driver are killed, and what a case costs on one and two",
+        40,
+    ),
+    Part(
+        "year_of_seas",
+        "python -m tools.evidence.campaign_part configs/studies/year_of_seas.yaml",
+        "a year of seas for the first ship and the laws of the storm: roll, power, worst hour",
+        30,
     ),
     Part(
         "starter_ships",
@@ -125,6 +137,12 @@ PARTS = (
         "python -m tools.thesis.derive_tank_forces --json",
         "every printed term of the tank's forces that differs from the derivation",
         1,
+    ),
+    Part(
+        "cost_campaign",
+        "python -m tools.benchmarks.campaign --json",
+        "what a case of a campaign costs: duration, order, horizon, nodes, number of cases",
+        2,
     ),
     Part(
         "cost_codec",

@@ -10,6 +10,8 @@ from utank_hil.commands.exit_codes import ExitCode
 EXTRA_OF: Final = {
     "clarabel": "bench",
     "control": "bench",
+    "dask": "bench",
+    "distributed": "bench",
     "jinja2": "bench",
     "matplotlib": "bench",
     "numba": "bench",

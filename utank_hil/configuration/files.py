@@ -116,6 +116,28 @@ def located(error: ParameterError, path: Path | str, key: str = "") -> ConfigErr
     )
 
 
+def files_named(path: Path | str) -> dict[Key, Path]:
+    """The files that a configuration file names, by the keys at which their content stands.
+
+    Raises
+    ------
+    ConfigError
+        If one of them can't be read.
+    """
+    reader = _Reader()
+    reader.read(Path(path))
+    if reader.problems:
+        raise ConfigError(reader.problems)
+    return {key: file for key, file in reader.origins.items() if key}
+
+
+def problems_in_words(
+    error: ValidationError, content: Any, model: type[BaseModel]
+) -> list[tuple[Key, str]]:
+    """What is wrong with a content that was put together, by the keys within it."""
+    return [found for item in error.errors() for found in _in_words(item, content, model)]
+
+
 def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
     """Which of several models a file is written for, by its keys.
 
@@ -164,12 +186,14 @@ class _Reader:
     problems : list of ConfigProblem
     unread : set of Key
         Keys of the whole that stand for files which could not be read.
+    origins : dict of Key to Path
+        Files by the keys of the whole at which their content stands.
     """
 
     def __init__(self) -> None:
         self.problems: list[ConfigProblem] = []
         self.unread: set[Key] = set()
-        self._origins: dict[Key, Path] = {}
+        self.origins: dict[Key, Path] = {}
 
     def read(
         self, file: Path, key: Key = (), stack: tuple[Path, ...] = (), namer: Key | None = None
@@ -208,12 +232,12 @@ class _Reader:
         if not isinstance(content, dict):
             reason = "must hold a mapping of keys to values"
             return self._give_up(key, ConfigProblem(file, "", reason))
-        self._origins[key] = file
+        self.origins[key] = file
         return self._resolve(content, key, file, (*stack, resolved))
 
     def refuse_strangers(self, content: Any, model: type[BaseModel]) -> None:
         """Name the files that were written for something else than they are named for."""
-        for key, file in sorted(self._origins.items(), key=lambda item: len(item[0])):
+        for key, file in sorted(self.origins.items(), key=lambda item: len(item[0])):
             part = content
             for name in key:
                 part = part[name]
@@ -233,17 +257,11 @@ class _Reader:
 
     def located(self, error: Any, content: Any, model: type[BaseModel]) -> list[ConfigProblem]:
         """An error of validation as problems at the place where the value was written."""
-        at = _written(error, content)
-        if error["type"] == "union_tag_invalid":
-            at = (*at, "kind")
-        if any(at[: len(key)] == key for key in self.unread):
-            return []
-        cause = error.get("ctx", {}).get("error")
-        if isinstance(cause, ParameterError):
-            found = [(at + _split(name), reason) for name, reason in cause.problems]
-        else:
-            found = [(at, words_for(error, model))]
-        return [self.problem(key, reason) for key, reason in found]
+        return [
+            self.problem(at, reason)
+            for at, reason in _in_words(error, content, model)
+            if not any(at[: len(key)] == key for key in self.unread)
+        ]
 
     def problem(self, key: Key, reason: str) -> ConfigProblem:
         """A problem at the place where the value of a key is written."""
@@ -258,7 +276,7 @@ class _Reader:
     def _give_up(self, key: Key, problem: ConfigProblem) -> dict[str, Any]:
         self.problems.append(problem)
         self.unread.add(key)
-        self._origins.setdefault(key, problem.file)
+        self.origins.setdefault(key, problem.file)
         return {}
 
     def _resolve(self, value: Any, key: Key, file: Path, stack: tuple[Path, ...]) -> Any:
@@ -280,8 +298,8 @@ class _Reader:
 
     def _within(self, key: Key) -> tuple[Path, Key]:
         """File that holds `key`, and the rest of the key within that file."""
-        depth = max(n for n in range(len(key) + 1) if key[:n] in self._origins)
-        return self._origins[key[:depth]], key[depth:]
+        depth = max(n for n in range(len(key) + 1) if key[:n] in self.origins)
+        return self.origins[key[:depth]], key[depth:]
 
 
 def _why(error: Exception) -> str:
@@ -296,6 +314,17 @@ def _dotted(key: Key) -> str:
 
 def _split(name: str) -> Key:
     return tuple(name.split(".")) if name else ()
+
+
+def _in_words(error: Any, content: Any, model: type[BaseModel]) -> list[tuple[Key, str]]:
+    """One error of pydantic: the keys as written, and what is wrong with each."""
+    at = _written(error, content)
+    if error["type"] == "union_tag_invalid":
+        at = (*at, "kind")
+    cause = error.get("ctx", {}).get("error")
+    if isinstance(cause, ParameterError):
+        return [(at + _split(name), reason) for name, reason in cause.problems]
+    return [(at, words_for(error, model))]
 
 
 def _written(error: Any, content: Any) -> Key:

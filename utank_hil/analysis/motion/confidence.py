@@ -1,10 +1,17 @@
-"""Mean of a few independent values with its confidence interval."""
+"""Means with their confidence intervals: of independent values, and of records by batch means.
+
+A record's samples depend on one another. Means over batches that are long beside the time after
+which a motion has forgotten itself hardly do, so Student's t of them gives the interval of the
+record's mean (A. M. Law, Simulation Modeling and Analysis, 5th ed., section 9.5.3).
+"""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from utank_hil.arrays import FloatArray
 
 
 class Interval(NamedTuple):
@@ -44,3 +51,29 @@ def mean_interval(values: npt.ArrayLike, confidence: float = 0.95) -> Interval:
         raise ValueError(f"confidence must be between 0 and 1, got {confidence}")
     quantile = float(student.ppf((1 + confidence) / 2, n - 1))
     return Interval(float(numbers.mean()), quantile * float(numbers.std(ddof=1)) / math.sqrt(n))
+
+
+def batch_means(values: FloatArray, batches: int) -> FloatArray:
+    """Means of as many equal parts of a record, shape (batches,); a rest at its end is left out.
+
+    Raises
+    ------
+    ValueError
+        If the record has fewer values than batches.
+    """
+    length = len(values) // batches
+    if length < 1:
+        raise ValueError(f"{len(values)} values make no {batches} batches")
+    means: FloatArray = values[: batches * length].reshape(batches, length).mean(axis=1)
+    return means
+
+
+def rms_batches(values: FloatArray, batches: int) -> FloatArray:
+    """The root mean square of a record as the mean of one value for each batch, shape (batches,).
+
+    Linear about the mean square (the delta method), so that differences of such values of two
+    records in the same waves have the interval of the difference of their root mean squares.
+    """
+    squares = batch_means(np.square(values), batches)
+    rms = math.sqrt(float(squares.mean()))
+    return rms + (squares - rms**2) / (2.0 * rms) if rms > 0 else np.zeros(batches)

@@ -1,0 +1,199 @@
+"""Values that a key takes in a study: lists, ranges, hours of a measured file, random draws."""
+
+import csv
+import zlib
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from utank_hil.configuration import Section
+from utank_hil.configuration.spectra import read_spectra, utc
+from utank_hil.parameters import Finite, Positive, Range, refuse
+
+Value = Any
+"""A number, text, time or truth value, or the content of a file that was named."""
+MOST_CASES: Final = 1_000_000
+WEIGHT: Final = "weight"
+"""Column of a table of draws: how often a row is drawn, relative to the others."""
+
+_Count = Annotated[int, Range(least=1, most=MOST_CASES)]
+
+
+class Spaced(Section):
+    """Numbers at equal distances, both ends included."""
+
+    low: Finite
+    high: Finite
+    count: _Count
+
+    def values(self) -> list[float]:
+        """The numbers."""
+        return [float(each) for each in np.linspace(self.low, self.high, self.count)]
+
+
+class Counted(Section):
+    """Whole numbers from a first one on, such as seeds."""
+
+    first: Annotated[int, Range(least=0)]
+    count: _Count
+
+    def values(self) -> list[int]:
+        """The numbers."""
+        return list(range(self.first, self.first + self.count))
+
+
+class Hours(Section):
+    """Times of the records in a measured file."""
+
+    hours_of: Path
+    since: datetime = datetime.min
+    until: datetime = datetime.max
+
+    @field_validator("hours_of")
+    @classmethod
+    def _readable(cls, file: Path) -> Path:
+        read_spectra(file)
+        return file
+
+    def values(self) -> list[str]:
+        """The times, as a scenario writes them."""
+        found = read_spectra(self.hours_of).times(utc(self.since), utc(self.until))
+        return [each.isoformat() for each in found]
+
+
+_KINDS: Final[dict[str, type[Spaced | Counted | Hours]]] = {
+    "low": Spaced,
+    "first": Counted,
+    "hours_of": Hours,
+}
+
+
+def _listed(written: Any) -> Any:
+    """A list as it is, a range as the list of its values."""
+    if not isinstance(written, dict):
+        return written
+    for key, kind in _KINDS.items():
+        if key in written:
+            return kind.model_validate(written).values()
+    raise ValueError(
+        "must be a list of values, {low, high, count}, {first, count} of whole numbers, or "
+        "{hours_of, since, until}"
+    )
+
+
+Axis = Annotated[list[Value], BeforeValidator(_listed), Field(min_length=1)]
+"""The values that one key takes, one after the other."""
+
+
+class Uniform(Section):
+    """Numbers of equal probability between two."""
+
+    low: Finite
+    """The least."""
+    high: Finite
+    """The greatest."""
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
+        """So many of them."""
+        return [float(each) for each in self.low + (self.high - self.low) * rng.random(count)]
+
+
+class Normal(Section):
+    """Normally distributed numbers."""
+
+    mean: Finite
+    """Of the distribution."""
+    std: Positive
+    """Standard deviation."""
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
+        """So many of them."""
+        return [float(each) for each in self.mean + self.std * rng.standard_normal(count)]
+
+
+class Consecutive(Section):
+    """Whole numbers, another for each sample: seeds."""
+
+    first: Annotated[int, Range(least=0)]
+    """The first of them."""
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:  # noqa: ARG002
+        """So many of them."""
+        return list(range(self.first, self.first + count))
+
+
+class Choice(Section):
+    """One of some values, each as often as the others."""
+
+    one_of: Annotated[list[Value], Field(min_length=1)]
+    """The values."""
+
+    def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
+        """So many of them."""
+        return [self.one_of[int(each)] for each in rng.integers(len(self.one_of), size=count)]
+
+
+class Draws(Section):
+    """Samples of keys that are drawn independently of one another, and of the rows of a table."""
+
+    samples: _Count
+    """How many."""
+    seed: Annotated[int, Range(least=0)] = 1
+    """Of the draws; another than that of the waves."""
+    keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)
+    """What is drawn for each dotted key."""
+    table: Path | None = None
+    """CSV: its heading names keys, and `weight`; a sample takes the values of one row."""
+
+    @model_validator(mode="after")
+    def _something_to_draw(self) -> "Draws":
+        if not self.keys and self.table is None:
+            refuse("random", [("keys", "is required but missing, and there is no table either")])
+        if self.table is not None:
+            try:
+                _rows(self.table)
+            except (OSError, ValueError) as error:
+                refuse("random", [("table", f"can't be drawn from: {error}")])
+        return self
+
+    def samples_drawn(self) -> list[dict[str, Value]]:
+        """Each sample's values by key; the same for the same seed, whatever else is drawn."""
+        columns = {key: each.drawn(self._rng(key), self.samples) for key, each in self.keys.items()}
+        samples = [
+            {key: values[index] for key, values in columns.items()} for index in range(self.samples)
+        ]
+        if self.table is None:
+            return samples
+        rows, weights = _rows(self.table)
+        below = np.cumsum(weights) / np.sum(weights)
+        places = np.searchsorted(below, self._rng(WEIGHT).random(self.samples), side="right")
+        taken = [rows[min(int(place), len(rows) - 1)] for place in places]
+        return [{**sample, **row} for sample, row in zip(samples, taken, strict=True)]
+
+    def _rng(self, key: str) -> np.random.Generator:
+        return np.random.Generator(np.random.PCG64([self.seed, zlib.crc32(key.encode())]))
+
+
+def _rows(table: Path) -> tuple[list[dict[str, Value]], list[float]]:
+    """Rows of a table without their weights, and the weights."""
+    with table.open(newline="", encoding="utf-8") as lines:
+        written = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    if not written or any(None in row or None in row.values() for row in written):
+        raise ValueError(f"{table}: needs a heading, and rows of as many cells")
+    rows = [{key: _number(cell) for key, cell in row.items() if key != WEIGHT} for row in written]
+    weights = [float(row.get(WEIGHT, 1)) for row in written]
+    if not (min(weights) >= 0 and 0 < sum(weights) < np.inf):
+        raise ValueError(f"{table}: {WEIGHT} must be zero or more, and not zero in every row")
+    return rows, weights
+
+
+def _number(cell: str) -> Value:
+    for kind in (int, float):
+        try:
+            return kind(cell)
+        except ValueError:
+            continue
+    return cell

@@ -1,0 +1,75 @@
+"""Names of cases: the hash of configuration, seed and code, so that the same is computed once."""
+
+import hashlib
+import importlib.metadata
+import json
+import re
+from datetime import date
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+_PACKAGES: Final = ("utank_hil", "firmware_sim")
+_SUFFIXES: Final = (".py", ".dbc")
+_NUMERICAL: Final = ("numpy", "scipy", "numba")
+_ROOT: Final = Path(__file__).resolve().parents[2]
+_DIGITS: Final = 24
+_PATH: Final = re.compile(r'"([^"\\]*/[^"\\]*)"')
+_WAVES: Final = ("sea", "voyage", "duration_s", "settle_s")
+
+
+@cache
+def code_digest() -> str:
+    """Hash of the program's files and of the versions of the packages that compute for it."""
+    whole = hashlib.sha256()
+    for package in _PACKAGES:
+        files = (file for file in (_ROOT / package).rglob("*") if file.suffix in _SUFFIXES)
+        for file in sorted(files):
+            content = file.read_bytes()
+            name = file.relative_to(_ROOT).as_posix()
+            whole.update(f"{name}\n{len(content)}\n".encode() + content)
+    for name in _NUMERICAL:
+        whole.update(f"{name} {importlib.metadata.version(name)}\n".encode())
+    return whole.hexdigest()[:_DIGITS]
+
+
+def case_name(simulation: str, content: dict[str, Any]) -> str:
+    """Name of a case.
+
+    Parameters
+    ----------
+    simulation : str
+    content : dict
+        Of the scenario, its seed included. A data file counts by what is in it.
+    """
+    return _digest([simulation, content, code_digest()])
+
+
+def waves_name(content: dict[str, Any]) -> str:
+    """What a scenario's waves are named by, and the span that is judged.
+
+    Two runs of one name met the same waves: they are compared pair by pair.
+    """
+    return _digest([{key: content.get(key) for key in _WAVES}, content.get("seed", 1)])
+
+
+def as_text(content: Any) -> str:
+    """A content as JSON, in one form."""
+    return json.dumps(content, sort_keys=True, default=_plain)
+
+
+def _digest(content: Any) -> str:
+    text = _PATH.sub(lambda found: _file_digest(found[1]) or found[0], as_text(content))
+    return hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]
+
+
+@cache
+def _file_digest(name: str) -> str:
+    file = Path(name)
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, date):
+        return value.isoformat()
+    raise TypeError(f"{type(value).__name__} is no content of a configuration")

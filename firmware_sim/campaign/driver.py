@@ -1,0 +1,190 @@
+"""Runs the cases of a study that are missing, and keeps their rows as they come."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Final
+
+from firmware_sim.campaign.case_name import as_text, code_digest
+from firmware_sim.campaign.simulations import Row
+from firmware_sim.campaign.stopping import Stopping
+from firmware_sim.campaign.store import Store
+from firmware_sim.campaign.study import Case, LoadedStudy
+from firmware_sim.campaign.work import FAILED, LOST, Batch, failed_row, run_batch
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+BATCH_S: Final = 0.5
+"""Work that is sent together: ample beside the 10 ms that sending costs, little to lose."""
+MOST_TOGETHER: Final = 200
+AHEAD: Final = 2
+"""Batches that wait at each worker or run there."""
+LOOK_S: Final = 5.0
+"""So often workers that are gone for good are replaced."""
+FLUSH_S: Final = 1.0
+"""Rows are on disk so long after they came back."""
+
+Work = Callable[[Batch], list[Row]]
+
+
+@dataclass(slots=True)
+class Count:
+    """How far a campaign is.
+
+    Attributes
+    ----------
+    needed : int
+        Cases that are still to be computed, or were.
+    done, failed, lost : int
+        Of those: computed, failed, ended from outside.
+    case_s : float
+        Mean time of a case.
+    """
+
+    needed: int
+    done: int = 0
+    failed: int = 0
+    lost: int = 0
+    case_s: float = 0.0
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Count the cases of some rows."""
+        for row in {row["case"]: row for row in rows}.values():
+            self.done += 1
+            self.failed += row["status"] == FAILED
+            self.lost += row["status"] == LOST
+            self.case_s += (float(row["wall_s"]) - self.case_s) / self.done
+
+
+Progress = Callable[[Count], None]
+
+
+@dataclass(slots=True)
+class Driver:
+    """Sends the missing cases of a study to workers.
+
+    Parameters
+    ----------
+    loaded : LoadedStudy
+    store : Store
+        Begun for this study.
+    progress : callable
+        Called with the state after each batch.
+    work : callable
+        What a worker does.
+    """
+
+    loaded: LoadedStudy
+    store: Store
+    progress: Progress
+    work: Work = run_batch
+    stopping: Stopping = field(init=False)
+    count: Count = field(init=False)
+    _waiting: deque[Case] = field(init=False)
+    _unwritten: list[Row] = field(init=False, default_factory=list)
+    _written_s: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        done = self.store.done()
+        self.stopping = Stopping(self.loaded.study.stop, self.loaded.cases)
+        self.stopping.add(self.store.rows().to_pylist())
+        # the same case may stand in a study twice
+        missing = {case.name: case for case in self.loaded.cases if case.name not in done}
+        self._waiting = deque(case for case in missing.values() if self.stopping.needs(case))
+        self.count = Count(len(self._waiting))
+
+    def run(self, client: "Client") -> None:
+        """Compute what is missing.
+
+        Raises
+        ------
+        OtherCodeError
+            If a worker has other code.
+        """
+        from firmware_sim.campaign.cluster import replace_lost
+
+        self._written_s = looked_s = time.monotonic()
+        ended: SimpleQueue[Future[list[Row]]] = SimpleQueue()
+        batches: dict[str, list[Case]] = {}
+        try:
+            self._send(client, ended, batches)
+            while batches:
+                if time.monotonic() - looked_s > LOOK_S:
+                    replace_lost(client)
+                    looked_s = time.monotonic()
+                try:
+                    future = ended.get(timeout=LOOK_S)
+                except Empty:
+                    continue
+                self._take(self._rows(client, future, batches.pop(str(future.key))))
+                self._send(client, ended, batches)
+        finally:
+            self._write()
+        self.store.gather()
+
+    def _send(
+        self,
+        client: "Client",
+        ended: "SimpleQueue[Future[list[Row]]]",
+        batches: dict[str, list[Case]],
+    ) -> None:
+        most = AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        while len(batches) < most and (cases := self._next()):
+            future = client.submit(self.work, batch_of(self.loaded, cases), pure=False)
+            batches[str(future.key)] = cases
+            future.add_done_callback(ended.put)
+
+    def _next(self) -> list[Case]:
+        """The next cases, about `BATCH_S` of work."""
+        size = 1
+        if self.count.done:
+            size = round(BATCH_S / max(self.count.case_s, BATCH_S / MOST_TOGETHER))
+        taken: list[Case] = []
+        while self._waiting and len(taken) < max(size, 1):
+            case = self._waiting.popleft()
+            if self.stopping.needs(case):
+                taken.append(case)
+            else:
+                self.count.needed -= 1
+        return taken
+
+    def _rows(self, client: "Client", future: "Future[list[Row]]", cases: list[Case]) -> list[Row]:
+        from distributed import KilledWorker
+
+        from firmware_sim.campaign.cluster import replace_lost
+
+        while True:
+            try:
+                return future.result(timeout=LOOK_S)
+            except TimeoutError:  # it is lost with its worker, and has to be computed again
+                replace_lost(client)
+            except KilledWorker:
+                reason = "the workers that computed it died again and again: too little memory?"
+                return [failed_row(case.name, LOST, reason) for case in cases]
+
+    def _take(self, rows: list[Row]) -> None:
+        self._unwritten += rows
+        self.stopping.add(rows)
+        self.count.add(rows)
+        if time.monotonic() - self._written_s > FLUSH_S:
+            self._write()
+        self.progress(self.count)
+
+    def _write(self) -> None:
+        self.store.write(self._unwritten)
+        self._unwritten = []
+        self._written_s = time.monotonic()
+
+
+def batch_of(loaded: LoadedStudy, cases: Iterable[Case]) -> Batch:
+    """Cases of a study, ready to be sent."""
+    study = loaded.study
+    return Batch(
+        study.simulation,
+        as_text(study.scenario),
+        code_digest(),
+        tuple((case.name, case.seed, as_text(case.values)) for case in cases),
+    )

@@ -1,0 +1,269 @@
+"""One case computed: the bare ship, the passive tank and every controller, in the same waves."""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from firmware_sim.bench import run_in_turn
+from firmware_sim.figures import LEAST_ROLL_RAD, figures
+from firmware_sim.plant import Plant
+from firmware_sim.report_tables import NO_TANK
+from firmware_sim.run import RECORD_S, RECORD_TICKS, roll_without_tank
+from firmware_sim.scenario import PASSIVE, Scenario
+from firmware_sim.verdicts import mark_of
+from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
+from utank_hil.analysis.motion import bare_ship
+from utank_hil.analysis.motion.statistics import (
+    PumpStatistics,
+    RollStatistics,
+    pump_statistics,
+    roll_statistics,
+)
+from utank_hil.arrays import FloatArray
+from utank_hil.configuration import ControllerConfig
+from utank_hil.control import BuiltLaw, DesignPlant
+from utank_hil.control.interface import PRESSURE
+from utank_hil.control.limits import CommandLimiter
+from utank_hil.dynamics.linear import STATES
+from utank_hil.tick import TICK_NS, TICK_S
+
+Row = dict[str, str | float]
+Laws = Mapping[str, BuiltLaw]
+CAPSIZED: Final = "capsized"
+_NO_FIGURE: Final = math.nan
+_LEVEL, _LEVEL_RATE = STATES.index("level_m"), STATES.index("level_rate_m_s")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Record:
+    """A run of a fast simulation, every `RECORD_S`; arrays of shape (n,)."""
+
+    name: str
+    roll_rad: FloatArray
+    level_m: FloatArray
+    pressure_pa: FloatArray
+    power_w: FloatArray
+    strikes: int = 0
+    capsized_s: float = math.inf
+
+
+def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
+    """Compute a case.
+
+    Parameters
+    ----------
+    simulation : str
+        "bus", "linear" or "nonlinear".
+    scenario : Scenario
+    seed : int
+        Instead of the scenario's.
+    laws : mapping of str to BuiltLaw
+        Of its controllers.
+
+    Returns
+    -------
+    list of dict
+        A row for the ship without a tank and for each run: ``run``, ``mark`` (why it does not
+        count, or empty) and the figures of `METRICS`.
+
+    Raises
+    ------
+    ValueError
+        If this kind of simulation can't compute the scenario.
+    """
+    if simulation == "bus":
+        return _on_the_bus(scenario, seed, laws)
+    records = {"linear": _linear, "nonlinear": _nonlinear}[simulation](scenario, seed, laws)
+    return _judged(scenario, list(records))
+
+
+def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
+    result = run_in_turn(scenario, seed, laws)
+    bare, runs = figures(result)
+    marks = {run.name: mark_of(result, run) for run in result.runs}
+    sunk = result.without_tank_capsized_s < result.end_s
+    rows = [_row(NO_TANK, CAPSIZED if sunk else "", bare)]
+    for run in runs:
+        mark = marks[run.name]
+        row = _row(run.name, "" if mark is None else mark.word, run.roll, run.pump, run.strikes)
+        row["roll_below_no_tank"] = _number(run.roll_below_no_tank)
+        row["roll_below_passive"] = _number(run.roll_below_passive)
+        row["active_share"] = run.active_share
+        rows.append(row)
+    return rows
+
+
+def _judged(scenario: Scenario, records: list[_Record]) -> list[Row]:
+    """Rows of a fast simulation, over the scenario's window."""
+    window = slice(round(scenario.settle_s / RECORD_S), None)
+    rows: list[Row] = []
+    rolls: dict[str, float] = {}
+    references = {"roll_below_no_tank": NO_TANK, "roll_below_passive": PASSIVE}
+    for record in records:
+        roll = roll_statistics(record.roll_rad[window])
+        sunk = record.capsized_s < scenario.duration_s
+        if record.name == NO_TANK:
+            row = _row(NO_TANK, CAPSIZED if sunk else "", roll)
+        else:
+            pump = pump_statistics(
+                record.pressure_pa[window], record.power_w[window], record.level_m[window]
+            )
+            row = _row(record.name, CAPSIZED if sunk else "", roll, pump, record.strikes)
+            row["active_share"] = float(record.name != PASSIVE)
+        if not sunk:
+            rolls[record.name] = roll.rms_rad
+            for key, reference in references.items():
+                if record.name != NO_TANK and rolls.get(reference, 0.0) >= LEAST_ROLL_RAD:
+                    row[key] = 1.0 - roll.rms_rad / rolls[reference]
+        rows.append(row)
+    return rows
+
+
+def _row(
+    name: str,
+    mark: str,
+    roll: RollStatistics,
+    pump: PumpStatistics | None = None,
+    strikes: float = _NO_FIGURE,
+) -> Row:
+    row: Row = {
+        "run": name,
+        "mark": mark,
+        "roll_rms_rad": roll.rms_rad,
+        "roll_significant_rad": _number(roll.significant_rad),
+        "roll_max_rad": roll.maximum_rad,
+        "roll_below_no_tank": _NO_FIGURE,
+        "roll_below_passive": _NO_FIGURE,
+        "strikes": float(strikes),
+        "active_share": _NO_FIGURE,
+    }
+    for key in ("level_peak_m", "pressure_rms_pa", "pressure_peak_pa", "power_mean_w",
+                "power_peak_w"):  # fmt: skip
+        row[key] = _NO_FIGURE if pump is None else getattr(pump, key)
+    return row
+
+
+def _number(value: float | None) -> float:
+    return _NO_FIGURE if value is None else value
+
+
+def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
+    """Linear ship and tank; the law with limiter, level observer and sensor noise."""
+    _refuse_valve(scenario)
+    ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
+    changes = scenario.voyage or len(scenario.sea.spectra) > 1
+    if changes or (scenario.actual_ship and scenario.actual_from_s > 0):
+        raise ValueError("simulation: linear keeps ship, course and sea: take nonlinear or bus")
+    if ship.heeling_moment_nm:
+        raise ValueError("simulation: linear knows no steady heel: take nonlinear or bus")
+    moment = scenario.wave_moment(seed)
+    count = round(scenario.duration_s / RECORD_S)
+    at_rest = np.zeros(count)
+    yield _Record(
+        NO_TANK,
+        bare_ship.roll_without_tank(ship, moment, RECORD_S, count),
+        at_rest,
+        at_rest,
+        at_rest,
+    )
+    passive = passive_motion(ship, tank, moment, TICK_S, count * RECORD_TICKS)
+    shown = slice(None, None, RECORD_TICKS)
+    yield _Record(PASSIVE, passive[shown, 0], passive[shown, _LEVEL], at_rest, at_rest)
+    errors = scenario.sensors
+    noise = SensorNoise(
+        errors.roll_noise_rad,
+        errors.roll_rate_noise_rad_s,
+        errors.level_noise_m / math.sqrt(2.0),
+        errors.pressure_noise_pa,
+    )
+    for name, controller in scenario.controllers.items():
+        law = _pump_law(name, laws[name])
+        plant = controller.plant
+        run = simulate_loop(
+            DesignPlant(ship, tank, plant.delay_s, plant.lag_s, plant.limits),
+            passive,
+            law.controller(),
+            law.measured,
+            noise=noise,
+            seed=seed,
+        )
+        motion, pressure_pa = run.motion[shown], run.pressure_pa[shown]
+        power_w = pressure_pa * tank.reservoir_area_m2 * motion[:, _LEVEL_RATE]
+        yield _Record(name, motion[:, 0], motion[:, _LEVEL], pressure_pa, power_w)
+
+
+def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
+    """The bench's plant with its pump; the law with its limiter, on the true motion."""
+    _refuse_valve(scenario)
+    if scenario.plant == "linear":
+        raise ValueError("plant: linear is not simulation: nonlinear; remove one")
+    count = round(scenario.duration_s / RECORD_S)
+    roll_rad, capsized_s = roll_without_tank(scenario, seed, count)
+    at_rest = np.zeros(count)
+    yield _Record(NO_TANK, roll_rad, at_rest, at_rest, at_rest, capsized_s=capsized_s)
+    yield _sailed(PASSIVE, scenario, seed, lambda plant: 0.0)  # noqa: ARG005
+    for name, controller in scenario.controllers.items():
+        command = _Commander(controller, _pump_law(name, laws[name]))
+        yield _sailed(name, scenario, seed, command)
+
+
+def _sailed(name: str, scenario: Scenario, seed: int, command: Callable[[Plant], float]) -> _Record:
+    """Sail with what is asked each tick for the pump's set-point."""
+    plant = Plant(
+        scenario.ship_at, scenario.vessel.tank, scenario.vessel.pump, scenario.waves(seed)
+    )
+    count = round(scenario.duration_s / RECORD_S)
+    rows = np.empty((count, 4))
+    for tick in range(count * RECORD_TICKS):
+        plant.advance(tick * TICK_NS)
+        if tick % RECORD_TICKS == 0:
+            rows[tick // RECORD_TICKS] = (
+                plant.roll_rad, plant.level_m, plant.pressure_pa, plant.pump_power_w
+            )  # fmt: skip
+        plant.drive_pump(command(plant), enabled=True)
+    roll_rad, level_m, pressure_pa, power_w = rows.T
+    return _Record(name, roll_rad, level_m, pressure_pa, power_w, plant.strikes, plant.capsized_s)
+
+
+class _Commander:
+    """Law, limiter and delay between a plant and its pump, once a tick."""
+
+    def __init__(self, controller: ControllerConfig, law: BuiltLaw) -> None:
+        self._law = law.controller()
+        self._samples = round(self._law.sample_time_s / TICK_S)
+        self._limiter = CommandLimiter(controller.limits, controller.vessel.tank, TICK_S)
+        self._area_m2 = controller.vessel.tank.reservoir_area_m2
+        self._measured = law.measured
+        self._waiting = deque([0.0] * round(controller.delay_s / TICK_S))
+        self._wish_pa = 0.0
+        self._tick = 0
+
+    def __call__(self, plant: Plant) -> float:
+        """The set-point from now on."""
+        level_m, rate_m_s = plant.level_m, plant.flow_m3_s / self._area_m2
+        if self._tick % self._samples == 0:
+            if self._tick:
+                self._law.applied(np.array([self._limiter.mean_since_last_call()]))
+            motion = (plant.roll_rad, plant.roll_rate_rad_s, level_m, rate_m_s)
+            seen = dict(zip(STATES, motion, strict=True))
+            self._wish_pa = float(
+                self._law.step(np.array([seen[name] for name in self._measured]))[0]
+            )
+        self._tick += 1
+        self._waiting.append(self._limiter.limit(self._wish_pa, level_m, rate_m_s))
+        return self._waiting.popleft()
+
+
+def _refuse_valve(scenario: Scenario) -> None:
+    if scenario.vessel.valve is not None:
+        raise ValueError("vessel.valve is moved by simulation: bus alone: take that")
+
+
+def _pump_law(name: str, law: BuiltLaw) -> BuiltLaw:
+    if law.commands != (PRESSURE,):
+        raise ValueError(f"controllers.{name} moves a valve: take simulation: bus")
+    return law

@@ -1,0 +1,99 @@
+"""When a group of cases is known well enough, whatever the order in which they come back."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from firmware_sim.campaign.study import Case, Scalar, Stop
+from firmware_sim.report_tables import NO_TANK
+from utank_hil.analysis.motion.confidence import mean_interval
+
+_NOTHING: Final[Mapping[str, float]] = {}
+
+Figures = Mapping[str, float]
+"""A metric by run; empty of a case that failed."""
+
+
+def figures_of(rows: Iterable[Mapping[str, Any]], metric: str) -> dict[str, float]:
+    """A metric by run, of the runs that count and have it."""
+    return {
+        str(row["run"]): float(row[metric])
+        for row in rows
+        if row["run"] not in ("", NO_TANK) and not row["mark"] and not math.isnan(row[metric])
+    }
+
+
+def enough(stop: Stop, figures: Sequence[Figures]) -> bool:
+    """Whether the intervals of all runs over these cases are as narrow as asked."""
+    if len(figures) < stop.least:
+        return False
+    runs = {run for each in figures for run in each}
+    for run in runs:
+        values = [each[run] for each in figures if run in each]
+        if len(values) < stop.least:
+            return False
+        found = mean_interval(values)
+        allowed = stop.half_width
+        if allowed is None:
+            assert stop.relative is not None
+            allowed = stop.relative * abs(found.mean)
+        if found.half_width > allowed:
+            return False
+    return bool(runs)
+
+
+class Stopping:
+    """Which cases a campaign still needs.
+
+    Parameters
+    ----------
+    stop : Stop or None
+        None needs all.
+    cases : sequence of Case
+    """
+
+    def __init__(self, stop: Stop | None, cases: Sequence[Case]) -> None:
+        self._stop = stop
+        self._groups: dict[tuple[Scalar, ...], list[str]] = {}
+        for case in cases:
+            self._groups.setdefault(case.group, []).append(case.name)
+        self._group_of = {case.name: case.group for case in cases}
+        self._figures: dict[str, Figures] = {}
+        self._judged = dict.fromkeys(self._groups, 0)
+        self._closed: dict[tuple[Scalar, ...], int] = {}
+
+    def add(self, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Take the rows of cases that are done."""
+        if self._stop is None:
+            return
+        by_case: dict[str, list[Mapping[str, Any]]] = {}
+        for row in rows:
+            by_case.setdefault(row["case"], []).append(row)
+        for name, of_case in by_case.items():
+            if name in self._group_of:
+                self._figures[name] = figures_of(
+                    (row for row in of_case if row["run"]), self._stop.metric
+                )
+        for group in {self._group_of[name] for name in by_case if name in self._group_of}:
+            self._judge(group)
+
+    def needs(self, case: Case) -> bool:
+        """Whether a case that is not computed is still to be."""
+        return case.group not in self._closed
+
+    def used(self, group: tuple[Scalar, ...]) -> list[str]:
+        """Names of the cases of a group that count: the first ones, up to where it was enough."""
+        return self._groups[group][: self._closed.get(group)]
+
+    def _judge(self, group: tuple[Scalar, ...]) -> None:
+        """Go on along the group's cases, in their order, as far as they are known."""
+        assert self._stop is not None
+        if group in self._closed:
+            return
+        names = self._groups[group]
+        while self._judged[group] < len(names) and names[self._judged[group]] in self._figures:
+            self._judged[group] += 1
+            count = self._judged[group]
+            if enough(self._stop, [self._figures[name] for name in names[:count]]):
+                self._closed[group] = count
+                return

@@ -1,0 +1,175 @@
+"""A campaign's folder: study, where it comes from, cases and rows.
+
+Rows are written in parts, each whole or not at all (temporary name, then renamed), and never
+changed. A case that stands in several counts once.
+"""
+
+import json
+import os
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from firmware_sim.campaign.metrics import METRICS
+from firmware_sim.campaign.simulations import Row
+from firmware_sim.campaign.study import LoadedStudy
+from firmware_sim.campaign.work import LOST
+
+STUDY, ABOUT, CASES, ROWS = "study.yaml", "study.json", "cases.parquet", "rows"
+SUMMARY, PICTURE = "summary.json", "campaign.png"
+FILES: Final = (STUDY, ABOUT, CASES, SUMMARY, PICTURE)
+_TEXTS: Final = ("case", "run", "status", "reason", "mark")
+_SCHEMA: Final = pa.schema(
+    [(name, pa.string()) for name in _TEXTS]
+    + [(name, pa.float64()) for name in (*METRICS, "wall_s")]
+)
+
+
+class StoreError(Exception):
+    """A folder that can't be used as it is; the message says what to do."""
+
+
+class Store:
+    """The folder of a campaign.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._rows = folder / ROWS
+
+    def begin(self, loaded: LoadedStudy, about: Mapping[str, Any], *, resume: bool) -> None:
+        """Write down what will be computed.
+
+        Raises
+        ------
+        StoreError
+            If there are results and they are not to be gone on with.
+        """
+        if not resume and any(self._rows.glob("*.parquet")):
+            raise StoreError(
+                f"{self.folder}: holds results; add --resume to go on with them, or choose another "
+                "folder with --out"
+            )
+        self._rows.mkdir(parents=True, exist_ok=True)
+        for left in self._rows.glob("*.part"):
+            left.unlink()
+        with _replacing(self.folder / STUDY) as file:
+            file.write_bytes(loaded.path.read_bytes())
+        with _replacing(self.folder / ABOUT) as file:
+            file.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+        names = list(dict.fromkeys(key for case in loaded.cases for key in case.parameters))
+        columns: dict[str, list[Any]] = {
+            "case": [case.name for case in loaded.cases],
+            "index": [case.index for case in loaded.cases],
+            "waves": [case.waves for case in loaded.cases],
+        }
+        columns |= {name: [case.parameters.get(name) for case in loaded.cases] for name in names}
+        with _replacing(self.folder / CASES) as file:
+            pq.write_table(pa.table({name: _column(each) for name, each in columns.items()}), file)
+
+    def write(self, rows: list[Row]) -> None:
+        """Add rows as a part of their own."""
+        if rows:
+            table = pa.Table.from_pylist(rows, schema=_SCHEMA)
+            with _replacing(self._rows / f"{time.time_ns()}-{os.getpid()}.parquet") as file:
+                pq.write_table(table, file)
+
+    def rows(self) -> pa.Table:
+        """All rows, each case's once: the first that was written, or one that was not lost."""
+        files = sorted(self._rows.glob("*.parquet"))
+        if not files:
+            return _SCHEMA.empty_table()
+        table = pa.concat_tables([pq.read_table(file) for file in files])
+        lost = pc.equal(table["status"], LOST)
+        table = pa.concat_tables([table.filter(pc.invert(lost)), table.filter(lost)])
+        seen: dict[str, set[str]] = {}
+        kept = []
+        for case, run in zip(table["case"].to_pylist(), table["run"].to_pylist(), strict=True):
+            runs = seen.setdefault(case, set())
+            kept.append(run not in runs and (run != "" or not runs))
+            runs.add(run)
+        return table.filter(pa.array(kept, pa.bool_()))
+
+    def done(self) -> set[str]:
+        """Names of the cases that need not be computed again."""
+        table = self.rows()
+        return set(table.filter(pc.not_equal(table["status"], LOST))["case"].to_pylist())
+
+    def gather(self) -> None:
+        """Put all parts together in one."""
+        parts = sorted(self._rows.glob("*.parquet"))
+        if len(parts) > 1:
+            with _replacing(self._rows / f"{time.time_ns()}-{os.getpid()}.parquet") as file:
+                pq.write_table(self.rows(), file)
+            for part in parts:
+                part.unlink()
+
+    def write_json(self, name: str, content: Any) -> None:
+        """Write a file of figures."""
+        with _replacing(self.folder / name) as file:
+            file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """A campaign as read from its folder.
+
+    Attributes
+    ----------
+    about : dict
+        Where it comes from; ``configuration`` is the study.
+    keys : tuple of str
+        Keys that make groups.
+    cases : list of dict
+        Index, name, waves and parameters of every case.
+    rows : dict
+        Rows of each case that has any, by its name.
+    """
+
+    about: dict[str, Any]
+    keys: tuple[str, ...]
+    cases: list[dict[str, Any]]
+    rows: dict[str, list[dict[str, Any]]]
+
+
+def is_campaign(folder: Path) -> bool:
+    """Whether a folder holds a campaign."""
+    return (folder / CASES).is_file() and (folder / ABOUT).is_file()
+
+
+def read_results(folder: Path) -> Results:
+    """Read a campaign, complete or not."""
+    about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for row in Store(folder).rows().to_pylist():
+        rows.setdefault(row["case"], []).append(row)
+    cases = pq.read_table(folder / CASES).to_pylist()
+    return Results(about, tuple(about["keys"]), cases, rows)
+
+
+def _column(values: Iterable[Any]) -> pa.Array:
+    """Values of one key: numbers as numbers, mixed ones as text."""
+    values = list(values)
+    try:
+        return pa.array(values)
+    except (pa.ArrowInvalid, pa.ArrowTypeError):
+        return pa.array([None if value is None else str(value) for value in values])
+
+
+@contextmanager
+def _replacing(file: Path) -> Iterator[Path]:
+    """A name to write a file under, which then takes its place at once."""
+    temporary = file.with_name(file.name + ".part")
+    yield temporary
+    temporary.replace(file)

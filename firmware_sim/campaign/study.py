@@ -1,0 +1,295 @@
+"""Studies, ``configs/studies``: which cases of a scenario a campaign computes."""
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from firmware_sim.campaign.axes import MOST_CASES, Axis, Draws
+from firmware_sim.campaign.case_name import as_text, case_name, waves_name
+from firmware_sim.campaign.metrics import METRICS
+from firmware_sim.campaign.overrides import WHOLE, Content, OverrideError, changed
+from firmware_sim.scenario import Scenario
+from utank_hil.configuration import Section
+from utank_hil.configuration.files import (
+    ConfigError,
+    ConfigProblem,
+    files_named,
+    load_config,
+    located,
+    problems_in_words,
+)
+from utank_hil.configuration.yaml_text import Key
+from utank_hil.parameters import ParameterError, Positive, Range, refuse
+
+Scalar = str | float | int | bool
+SEED: Final = "seed"
+
+
+class Stop(Section):
+    """When a group of cases is known well enough.
+
+    The interval is of the first cases of the group, in their order: which of them come back first
+    changes nothing.
+    """
+
+    metric: str
+    """The figure: a column of the results."""
+    half_width: Positive | None = None
+    """Of the 95 % interval, in the metric's unit."""
+    relative: Positive | None = None
+    """Half width as a share of the mean, instead."""
+    least: Annotated[int, Range(least=3)] = 10
+    """Cases that are computed in any case."""
+
+    @model_validator(mode="after")
+    def _one_measure(self) -> "Stop":
+        problems = []
+        if self.metric not in METRICS:
+            problems.append(("metric", f"must be one of {', '.join(METRICS)}"))
+        if (self.half_width is None) == (self.relative is None):
+            problems.append(("half_width", "or relative: give one of the two"))
+        refuse("stop", problems)
+        return self
+
+
+class Study(Section):
+    """A scenario, and what is varied of it."""
+
+    name: str
+    scenario: Content
+    """What is varied: the file of a scenario."""
+    simulation: Literal["bus", "linear", "nonlinear"]
+    """How a case is computed, and what is left out of it."""
+    set: Content = Field(default_factory=dict)
+    """Values by dotted key that hold for every case."""
+    cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)
+    """Sets of values by dotted key, each for a case; every one of them with all of `grid`."""
+    grid: dict[str, Axis] = Field(default_factory=dict)
+    """Values by dotted key, every one with every other."""
+    random: Draws | None = None
+    """Samples that are drawn, every one with all of `cases` and `grid`."""
+    average_over: tuple[str, ...] = (SEED,)
+    """Keys whose values make no group of their own; all that is drawn belongs to them."""
+    stop: Stop | None = None
+    """When a group needs no more cases."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Study":
+        count = len(self.cases) * (self.random.samples if self.random else 1)
+        for values in self.grid.values():
+            count *= len(values)
+        problems = []
+        if count > MOST_CASES:
+            problems.append(("grid", f"makes {count} cases; {MOST_CASES} at most"))
+        drawn = self.random.samples_drawn()[0] if self.random else {}
+        sources = {"set": self.set, "grid": self.grid, "random.keys": drawn}
+        sources |= {f"cases.{index}": each for index, each in enumerate(self.cases)}
+        for (name, keys), (other, others) in itertools.combinations(sources.items(), 2):
+            if name.startswith("cases") and other.startswith("cases"):
+                continue
+            problems += [
+                (f"{other}.{key}", f"is in {name}, too: remove one")
+                for key in sorted(set(keys) & set(others))
+            ]
+        refuse("", problems)
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One case of a study.
+
+    Attributes
+    ----------
+    index : int
+        Place in the study.
+    name : str
+        Hash of configuration, seed and code.
+    waves : str
+        Hash of what makes the waves.
+    seed : int
+    group : tuple
+        Values of the keys that make groups.
+    parameters : dict
+        What is varied, by key: values, or names of the files that stand for them.
+    values : dict
+        What differs from the study's scenario, by dotted key.
+    """
+
+    index: int
+    name: str
+    waves: str
+    seed: int
+    group: tuple[Scalar, ...]
+    parameters: dict[str, Scalar]
+    values: Content
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedStudy:
+    """A study with its cases.
+
+    Attributes
+    ----------
+    path : Path
+    study : Study
+    cases : list of Case
+    keys : tuple of str
+        Keys that make groups.
+    """
+
+    path: Path
+    study: Study
+    cases: list[Case]
+    keys: tuple[str, ...]
+
+
+def load_study(path: Path) -> LoadedStudy:
+    """Read a study and lay out its cases.
+
+    The first case with each set of keys is checked whole; a later one that is wrong fails alone.
+
+    Raises
+    ------
+    ConfigError
+        If the study, its scenario or a key of it is wrong.
+    """
+    study = load_config(path, Study)
+    files = files_named(path)
+    axes = _axes(study, files)
+    averaged = {*study.average_over, *(study.random.samples_drawn()[0] if study.random else ())}
+    varied = list(dict.fromkeys(key for axis in axes for each in axis for key in each))
+    for key in study.average_over:
+        if key != SEED and key not in varied:
+            problem = f"names {key}, which is not varied"
+            raise ConfigError([ConfigProblem(path, "average_over", problem)])
+    # what is averaged over varies slowest: every group has its first cases early
+    axes.sort(key=lambda axis: any(key not in averaged for each in axis for key in each))
+    keys = tuple(key for key in varied if key not in averaged)
+    cases = []
+    checked = set()
+    for index, parts in enumerate(itertools.product(*axes)):
+        given = {key: each for part in parts for key, each in part.items()}
+        values = {**study.set, **{key: value for key, (value, _) in given.items()}}
+        parameters = {key: label for key, (_, label) in given.items()}
+        try:
+            content = changed(study.scenario, values)
+        except OverrideError as error:
+            raise ConfigError([_at_override(path, study, values, str(error))]) from error
+        cases.append(
+            Case(
+                index,
+                case_name(study.simulation, content),
+                waves_name(content),
+                content.get(SEED, 1),
+                tuple(parameters.get(key, "") for key in keys),
+                parameters,
+                values,
+            )
+        )
+        kind = (parameters.get(WHOLE), frozenset(values))
+        if kind not in checked:
+            checked.add(kind)
+            _check(path, study, values, content)
+    return LoadedStudy(path, study, cases, keys)
+
+
+def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[Any, Scalar]]]]:
+    """What varies, each as the list of its alternatives: values and their labels by key."""
+
+    def labelled(value: Any, at: Key) -> tuple[Any, Scalar]:
+        if at in files:
+            return value, files[at].stem
+        if isinstance(value, str | float | int):
+            return value, value
+        return value, value.isoformat() if isinstance(value, date) else as_text(value)
+
+    axes = [
+        [
+            {key: labelled(value, ("cases", index, key)) for key, value in each.items()}
+            for index, each in enumerate(study.cases)
+        ]
+    ]
+    if study.random is not None:
+        samples = study.random.samples_drawn()
+        axes.append([{key: labelled(each[key], ()) for key in each} for each in samples])
+    axes += [
+        [{key: labelled(value, ("grid", key, place))} for place, value in enumerate(values)]
+        for key, values in study.grid.items()
+    ]
+    return [axis for axis in axes if any(axis)]
+
+
+def _check(path: Path, study: Study, values: Content, content: Content) -> None:
+    """Refuse a case that is no scenario, at the places where what is wrong was written."""
+    try:
+        Scenario.model_validate(content)
+        return
+    except ValidationError as error:
+        found = problems_in_words(error, content, Scenario)
+    problems: list[ConfigProblem] = []
+    for key, reason in found:
+        dotted = ".".join(map(str, key))
+        if (written := _override_of(values, dotted)) is not None:
+            place = _place(study, written)
+            inner = "" if dotted == written else f"{dotted}: "
+            problems.append(ConfigProblem(path, place, inner + reason))
+        elif WHOLE in values:
+            problems.append(ConfigProblem(path, _place(study, WHOLE), f"{dotted}: {reason}"))
+        else:
+            there = f"{WHOLE}.{dotted}".rstrip(".")
+            problems += located(ParameterError("", [(there, reason)]), path).problems
+    raise ConfigError(list(dict.fromkeys(problems)))
+
+
+def _override_of(values: Iterable[str], dotted: str) -> str | None:
+    """The override that a key of the scenario was set by, or that set a part of it."""
+
+    def matches(written: str) -> bool:
+        shorter = min(len(written.split(".")), len(dotted.split(".")))
+        pairs = itertools.islice(zip(written.split("."), dotted.split("."), strict=False), shorter)
+        return bool(dotted) and all(one in (other, "*") for one, other in pairs)
+
+    inner = dotted.split(".vessel.", 1)
+    controllers = dotted.startswith("controllers.") and len(inner) == 2
+    others = (f"vessel.{inner[1]}",) if controllers else ()
+    for key in values:
+        if matches(key) or any(other.startswith(key) for other in others):
+            return key
+    return None
+
+
+def _place(study: Study, key: str) -> str:
+    """Where in a study's file the value of a key is written."""
+    for name, keys in _sections(study):
+        if key in keys:
+            return f"{name}.{key}"
+    return key
+
+
+def _sections(study: Study) -> Iterator[tuple[str, Iterable[str]]]:
+    yield "set", study.set
+    yield "grid", study.grid
+    if study.random is not None:
+        yield "random.keys", study.random.keys
+        if study.random.table is not None:
+            yield "random.table", study.random.samples_drawn()[0]
+    for index, each in enumerate(study.cases):
+        yield f"cases.{index}", each
+
+
+def _at_override(path: Path, study: Study, values: Content, reason: str) -> ConfigProblem:
+    """A key that can't be set, found by setting the keys one after the other."""
+    so_far = {}
+    for key, value in values.items():
+        so_far[key] = value
+        try:
+            changed(study.scenario, so_far)
+        except OverrideError as error:
+            return ConfigProblem(path, _place(study, key), str(error))
+    return ConfigProblem(path, "", reason)

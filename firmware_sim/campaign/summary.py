@@ -1,0 +1,170 @@
+"""What a campaign comes to: means with their intervals, and laws compared in the same waves."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from firmware_sim.campaign.metrics import METRICS
+from firmware_sim.campaign.stopping import Stopping
+from firmware_sim.campaign.store import Results
+from firmware_sim.campaign.study import Case, Scalar, Stop
+from firmware_sim.campaign.work import FAILED, OK
+from firmware_sim.report_tables import NO_TANK
+from utank_hil.analysis.motion.confidence import mean_interval
+
+ROLL: Final = "roll_rms_rad"
+Figure = dict[str, float | int | None]
+"""Mean, half width of its 95 % interval (None of a single case), and number of cases."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Cases that differ in what is averaged over alone.
+
+    Attributes
+    ----------
+    parameters : dict
+        What they have in common of the keys that are varied.
+    rows : list of list of dict
+        Rows of each case that counts and has any, without failed ones.
+    planned : int
+        Cases of the study.
+    failed, lost : int
+        Of those that count.
+    """
+
+    parameters: dict[str, Scalar]
+    rows: list[list[dict[str, Any]]]
+    planned: int
+    failed: int
+    lost: int
+
+    @property
+    def runs(self) -> list[str]:
+        """Names of the runs, in their order."""
+        return list(dict.fromkeys(str(row["run"]) for rows in self.rows for row in rows))
+
+    def of_run(self, run: str) -> list[dict[str, Any]]:
+        """Rows of one run."""
+        return [row for rows in self.rows for row in rows if row["run"] == run]
+
+
+def groups_of(results: Results) -> list[Group]:
+    """The groups of a campaign with the rows that count, see `Stopping`."""
+    cases = [
+        Case(each["index"], each["case"], each["waves"], 0,
+             tuple(each[key] for key in results.keys), {}, {})
+        for each in results.cases
+    ]  # fmt: skip
+    written = results.about["configuration"]["stop"]
+    stopping = Stopping(None if written is None else Stop.model_validate(written), cases)
+    stopping.add(row for rows in results.rows.values() for row in rows)
+    groups = []
+    for group in dict.fromkeys(case.group for case in cases):
+        names = dict.fromkeys(stopping.used(group))
+        found = [results.rows[name] for name in names if name in results.rows]
+        states = [rows[0]["status"] for rows in found]
+        groups.append(
+            Group(
+                dict(zip(results.keys, group, strict=True)),
+                [rows for rows in found if rows[0]["status"] == OK],
+                sum(case.group == group for case in cases),
+                states.count(FAILED),
+                len(states) - states.count(FAILED) - states.count(OK),
+            )
+        )
+    return groups
+
+
+def figure(values: Sequence[float]) -> Figure:
+    """Mean of values with its interval; those that are no number are left out."""
+    known = [value for value in values if not math.isnan(value)]
+    if not known:
+        return {"mean": None, "half_width": None, "cases": 0}
+    if len(known) == 1:
+        return {"mean": known[0], "half_width": None, "cases": 1}
+    found = mean_interval(known)
+    return {"mean": found.mean, "half_width": found.half_width, "cases": len(known)}
+
+
+def summary(results: Results) -> list[dict[str, Any]]:
+    """Figures of every group, ready for JSON."""
+    groups = groups_of(results)
+    cases = {case["case"]: case for case in results.cases}
+    waves = {name: case["waves"] for name, case in cases.items()}
+    return [
+        {
+            "parameters": group.parameters,
+            "planned": group.planned,
+            "counted": len(group.rows),
+            "failed": group.failed,
+            "lost": group.lost,
+            "runs": {run: _run(group, run, cases) for run in group.runs},
+            "paired": _paired(group),
+            "beside_first": [] if group is groups[0] else _beside(groups[0], group, waves),
+        }
+        for group in groups
+    ]
+
+
+def failures(results: Results) -> dict[str, int]:
+    """Reasons of cases without a result, and how many have each."""
+    reasons: dict[str, int] = {}
+    for rows in results.rows.values():
+        if rows[0]["status"] != OK:
+            reasons[rows[0]["reason"]] = reasons.get(rows[0]["reason"], 0) + 1
+    return reasons
+
+
+def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    rows = group.of_run(run)
+    counted = [row for row in rows if not row["mark"]]
+    marks = [row["mark"] for row in rows if row["mark"]]
+    made: dict[str, Any] = {name: figure([row[name] for row in counted]) for name in METRICS}
+    made["marked"] = {mark: marks.count(mark) for mark in dict.fromkeys(marks)}
+    # of all of them: a ship that capsized had the worst case
+    worst = max(rows, key=lambda row: row[ROLL])
+    made["worst"] = {name: worst[name] for name in ("mark", ROLL, "roll_max_rad")}
+    made["worst"] |= cases[worst["case"]]
+    return made
+
+
+def _paired(group: Group) -> list[dict[str, Any]]:
+    """Roll RMS of each run against those before it, case by case, which is wave by wave."""
+    runs = [run for run in group.runs if run != NO_TANK]
+    pairs = []
+    for against, run in itertools.combinations(runs, 2):
+        both = [(rows[against][ROLL], rows[run][ROLL]) for rows in _counted(group, against, run)]
+        if both:
+            pairs.append({"run": run, "against": against, **_pair(both)})
+    return pairs
+
+
+def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Roll RMS of each run against the same run of the study's first group, in the same waves."""
+    pairs = []
+    for run in group.runs:
+        there, here = (
+            {waves[row["case"]]: row[ROLL] for row in each.of_run(run) if not row["mark"]}
+            for each in (first, group)
+        )
+        both = [(there[name], roll) for name, roll in here.items() if name in there]
+        if both:
+            pairs.append({"run": run, **_pair(both)})
+    return pairs
+
+
+def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
+    """Rolls of one, and of another in the same waves."""
+    return {
+        "roll_rms_difference_rad": figure([one - other for other, one in both]),
+        "share_below": figure([1 - one / other for other, one in both if other > 0]),
+    }
+
+
+def _counted(group: Group, *runs: str) -> list[Mapping[str, Mapping[str, float]]]:
+    """The rows of cases in which some runs count, by run."""
+    by_run = ({row["run"]: row for row in rows if not row["mark"]} for rows in group.rows)
+    return [rows for rows in by_run if all(run in rows for run in runs)]

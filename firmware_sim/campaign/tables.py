@@ -1,0 +1,111 @@
+"""A campaign's figures for a terminal."""
+
+import math
+from typing import Any
+
+from rich.table import Table
+
+from firmware_sim.report_tables import NO_TANK
+
+Figure = dict[str, Any]
+
+
+def interval(figure: Figure, scale: float, digits: int) -> str:
+    """A mean with the half width of its interval."""
+    if figure["mean"] is None:
+        return ""
+    mean = f"{scale * figure['mean'] + 0.0:.{digits}f}"
+    width = figure["half_width"]
+    return mean if width is None else f"{mean} ± {scale * width:.{digits}f}"
+
+
+def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
+    """A row for each run of each group."""
+    power = _power(groups)
+    table = Table(title=title, caption="mean ± 95 % of the mean; rolls in degrees, RMS")
+    table.add_column("run", no_wrap=True)
+    for key in _short_keys(groups):
+        table.add_column(key, no_wrap=True)
+    marked = any(run["marked"] for group in groups for run in group["runs"].values())
+    for heading in (
+        "cases", "roll", "below\npassive %", "greatest\nroll °", "level\npeak m",
+        f"power\n{power[1]}", *(["not\ncounted"] if marked else []),
+    ):  # fmt: skip
+        table.add_column(heading, justify="right", no_wrap=True)
+    for group in groups:
+        for run, found in group["runs"].items():
+            marks = [f"{count} {mark}" for mark, count in found["marked"].items()]
+            worst = found["worst"]["roll_max_rad"]
+            passive = "" if run == "passive" else interval(found["roll_below_passive"], 100, 1)
+            table.add_row(
+                run,
+                *(_short(value) for value in group["parameters"].values()),
+                str(found["roll_rms_rad"]["cases"]),
+                interval(found["roll_rms_rad"], 180 / math.pi, 3),
+                passive,
+                f"{math.degrees(worst):.1f}",
+                _mean(found["level_peak_m"], 1, 2),
+                _mean(found["power_mean_w"], power[0], 1),
+                *([", ".join(marks)] if marked else []),
+            )
+    return table
+
+
+def pairs_table(groups: list[dict[str, Any]]) -> Table:
+    """What each law is worth beside the others, in the same waves."""
+    table = Table(title="In the same waves, pair by pair", caption="mean ± 95 % of the mean")
+    for heading in ("run", "against", *_short_keys(groups)):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("pairs", "roll RMS below it %", "difference °"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for group in groups:
+        for pair in group["paired"]:
+            table.add_row(
+                pair["run"],
+                pair["against"],
+                *(_short(value) for value in group["parameters"].values()),
+                str(pair["share_below"]["cases"]),
+                interval(pair["share_below"], 100, 1),
+                interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
+            )
+        for pair in group["beside_first"]:
+            table.add_row(
+                pair["run"],
+                "first row's",
+                *(_short(value) for value in group["parameters"].values()),
+                str(pair["share_below"]["cases"]),
+                interval(pair["share_below"], 100, 1),
+                interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
+            )
+    return table
+
+
+def _mean(figure: Figure, scale: float, digits: int) -> str:
+    return interval({**figure, "half_width": None}, scale, digits)
+
+
+def _power(groups: list[dict[str, Any]]) -> tuple[float, str]:
+    """Unit of power in which the greatest mean has no more than three digits."""
+    means = [
+        found["power_mean_w"]["mean"] or 0.0
+        for group in groups
+        for run, found in group["runs"].items()
+        if run != NO_TANK
+    ]
+    return (1e-6, "mean MW") if max(means, default=0.0) >= 1e6 else (1e-3, "mean kW")
+
+
+def _short_keys(groups: list[dict[str, Any]]) -> list[str]:
+    """The keys that make groups, each by its end as far as that says which it is."""
+    keys = list(groups[0]["parameters"]) if groups else []
+    short = []
+    for key in keys:
+        parts = key.split(".")
+        ends = (".".join(parts[-count:]) for count in range(1, len(parts)))
+        others = [other for other in keys if other != key]
+        short.append(next((e for e in ends if not any(o.endswith(e) for o in others)), key))
+    return short
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

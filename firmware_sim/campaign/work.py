@@ -1,0 +1,124 @@
+"""What a worker does: a few cases, one after the other, each failing for itself."""
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+from pydantic import ValidationError
+
+from firmware_sim.campaign.case_name import as_text, code_digest
+from firmware_sim.campaign.overrides import Content, changed
+from firmware_sim.campaign.simulations import Row, rows_of
+from firmware_sim.scenario import Scenario
+from utank_hil.assembly import build_law
+from utank_hil.configuration import ControllerConfig
+from utank_hil.configuration.files import problems_in_words
+from utank_hil.control import BuiltLaw
+from utank_hil.parameters import ParameterError
+
+OK: Final = "ok"
+FAILED: Final = "failed"
+"""The case can't be computed; it would fail again."""
+LOST: Final = "lost"
+"""The case was ended from outside: `--resume` tries it again."""
+
+
+class OtherCodeError(Exception):
+    """A worker has other code than the campaign."""
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Cases that a worker is given together.
+
+    Attributes
+    ----------
+    simulation : str
+    scenario : str
+        Content of the study's scenario, as text.
+    code : str
+        What `code_digest` must be.
+    cases : tuple of tuple
+        Name, seed, and what differs from the scenario, as text.
+    """
+
+    simulation: str
+    scenario: str
+    code: str
+    cases: tuple[tuple[str, int, str], ...]
+
+
+def run_batch(batch: Batch) -> list[Row]:
+    """Rows of all cases; of one that failed a single row with the reason.
+
+    Raises
+    ------
+    OtherCodeError
+        If the worker's code is not that of the campaign.
+    """
+    if code_digest() != batch.code:
+        raise OtherCodeError(
+            "a worker has other code than the campaign: install the same version of utank-hil, "
+            "numpy, scipy and numba there"
+        )
+    return [
+        row
+        for name, seed, values in batch.cases
+        for row in _case(batch.simulation, batch.scenario, name, seed, values)
+    ]
+
+
+def failed_row(name: str, status: str, reason: str) -> Row:
+    """What is kept of a case without a result."""
+    return {"case": name, "run": "", "status": status, "reason": reason, "mark": "", "wall_s": 0.0}
+
+
+def _case(simulation: str, base: str, name: str, seed: int, values: str) -> Sequence[Row]:
+    started = time.perf_counter()
+    try:
+        content = changed(_content(base), json.loads(values))
+        # the seed is given apart, so that one check serves all
+        content = {key: value for key, value in content.items() if key != "seed"}
+        scenario = _scenario(as_text(content))
+        laws = {
+            each: _law(as_text(content["controllers"][each]), each) for each in scenario.controllers
+        }
+        rows = rows_of(simulation, scenario, seed, laws)
+    except MemoryError:
+        return [failed_row(name, LOST, "the worker's memory did not suffice")]
+    except ValidationError as error:
+        found = problems_in_words(error, content, Scenario)
+        reason = "; ".join(f"{'.'.join(map(str, key))}: {why}" for key, why in found)
+        return [failed_row(name, FAILED, reason)]
+    except ParameterError as error:
+        reason = "; ".join(f"{key}: {why}" for key, why in error.problems)
+        return [failed_row(name, FAILED, reason)]
+    except Exception as error:  # a law may be anybody's, and no case may end the campaign
+        return [failed_row(name, FAILED, f"{type(error).__name__}: {error}")]
+    wall_s = time.perf_counter() - started
+    ended: Row = {"case": name, "status": OK, "reason": "", "wall_s": wall_s}
+    return [{**ended, **row} for row in rows]
+
+
+@lru_cache(maxsize=2)
+def _content(text: str) -> Content:
+    content: Content = json.loads(text)
+    return content
+
+
+@lru_cache(maxsize=16)
+def _scenario(text: str) -> Scenario:
+    return Scenario.model_validate(json.loads(text))
+
+
+@lru_cache(maxsize=64)
+def _law(text: str, name: str) -> BuiltLaw:
+    """The law of a controller; its controllers are made anew for every run."""
+    try:
+        return build_law(ControllerConfig.model_validate(json.loads(text)))
+    except ParameterError as error:
+        problems = [(f"controllers.{name}.{key}", why) for key, why in error.problems]
+        raise ParameterError("", problems) from error

@@ -1,0 +1,154 @@
+"""``utank-hil campaign``: many cases of a scenario, on all cores or a cluster."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from utank_hil.commands.common import OUT, Json, fail, fail_with, lead_on, notes, prepare_out, shown
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.tables import print_table
+from utank_hil.configuration import ConfigError
+from utank_hil.provenance import describe
+
+if TYPE_CHECKING:
+    from firmware_sim.campaign.study import LoadedStudy
+
+
+def campaign(
+    context: typer.Context,
+    study: Annotated[Path, typer.Argument(help="Study file, such as configs/studies/*.yaml.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the results.", show_default="out/NAME OF THE FILE"),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Compute only what the folder does not hold yet.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask scheduler, as tcp://10.0.0.5:8786, instead of this machine alone."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes on this machine.", show_default="one a core"),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Run the cases of a study, keep their figures as Parquet, and compare the laws.
+
+    [bold]Example:[/bold] utank-hil campaign configs/studies/storm_seeds.yaml --resume
+
+    After Ctrl-C, or if it was killed, the same command with [bold]--resume[/bold] goes on where it
+    was. A case that fails is recorded with its reason and ends nothing.
+    """
+    # loaded when it runs: `--help` needs none of it
+    from firmware_sim.campaign.picture import draw
+    from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
+    from firmware_sim.campaign.study import load_study
+    from firmware_sim.campaign.summary import failures, summary
+
+    if scheduler is not None and workers is not None:
+        fail("--workers is for this machine: leave it out, or --scheduler")
+    try:
+        loaded = load_study(study)
+    except ConfigError as error:
+        fail_with(error)
+    folder = OUT / study.stem if out is None else out
+    prepare_out(folder, FILES)
+    store = Store(folder)
+    try:
+        store.begin(loaded, _about(loaded, folder, context.params), resume=resume)
+    except StoreError as error:
+        fail(error)
+    interrupted = _run(loaded, store, scheduler, workers)
+    results = read_results(folder)
+    groups = summary(results)
+    failed = failures(results)
+    content = {**results.about, "interrupted": interrupted, "groups": groups, "failures": failed}
+    store.write_json(SUMMARY, content)
+    draw(results, groups, folder / PICTURE)
+    if json_:
+        sys.stdout.write(json.dumps(content) + "\n")
+    else:
+        _print(loaded, groups, failed)
+        console = Console()
+        console.print(f"results: {shown(folder)}", soft_wrap=True)
+        lead_on(console, f"campaign {shown(study)} --resume", f"compare {shown(folder)} OTHER")
+    if interrupted:
+        notes.print("interrupted: the same command with --resume goes on from here")
+        raise typer.Exit(ExitCode.INTERRUPTED)
+
+
+def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[str, Any]:
+    """Where the results come from."""
+    from firmware_sim.campaign.case_name import code_digest
+    from firmware_sim.campaign.metrics import LEAVES_OUT, METRICS
+    from firmware_sim.campaign.overrides import changed
+    from firmware_sim.scenario import Scenario
+
+    first = Scenario.model_validate(changed(loaded.study.scenario, loaded.cases[0].values))
+    return {
+        **describe("campaign", loaded.study, folder, options=given, scenario=first),
+        "code": code_digest(),
+        "cases": len(loaded.cases),
+        "keys": loaded.keys,
+        "leaves_out": LEAVES_OUT[loaded.study.simulation],
+        "metrics": METRICS,
+    }
+
+
+def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | None) -> bool:
+    """Compute what is missing, with a bar; whether it was interrupted."""
+    from firmware_sim.campaign.cluster import workers
+    from firmware_sim.campaign.driver import Count, Driver
+    from firmware_sim.campaign.work import OtherCodeError
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[failed]}"),
+        TimeRemainingColumn(),
+        console=notes,
+        disable=not notes.is_terminal,
+    )
+    task = bar.add_task("cases", total=None, failed="")
+
+    def progress(state: Count) -> None:
+        failed = f"{state.failed} failed" if state.failed else ""
+        bar.update(task, total=state.needed, completed=state.done, failed=failed)
+
+    driver = Driver(loaded, store, progress)
+    if not driver.count.needed:
+        return False
+    try:
+        with workers(scheduler, count) as client, bar:
+            driver.run(client)
+    except KeyboardInterrupt:
+        return True
+    except OtherCodeError as error:
+        fail(error)
+    except OSError as error:
+        fail(f"--scheduler {scheduler}: {error}" if scheduler else error)
+    return False
+
+
+def _print(loaded: "LoadedStudy", groups: list[dict[str, Any]], failed: dict[str, int]) -> None:
+    from firmware_sim.campaign.metrics import LEAVES_OUT
+    from firmware_sim.campaign.tables import pairs_table, runs_table
+
+    console, study = Console(), loaded.study
+    print_table(console, runs_table(groups, f"{study.name}, simulation: {study.simulation}"))
+    if any(group["paired"] for group in groups):
+        print_table(console, pairs_table(groups))
+    for reason, number in failed.items():
+        console.print(f"[red]{number} cases without a result: {escape(reason)}[/red]",
+                      soft_wrap=True)  # fmt: skip
+    if left_out := LEAVES_OUT[study.simulation]:
+        console.print(f"Not computed: {'; '.join(left_out)}.", soft_wrap=True)

@@ -1,0 +1,117 @@
+"""``utank-hil compare``: what differs between runs, recordings or campaigns."""
+
+import json
+import math
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from utank_hil.commands.common import Json, fail, shown
+from utank_hil.commands.tables import print_table
+
+if TYPE_CHECKING:
+    from firmware_sim.comparison.difference import Comparison, Difference
+
+_SCALES: Final = {
+    "rad": (180 / math.pi, "°"),
+    "pa": (1e-3, "kPa"),
+    "w": (1e-3, "kW"),
+    "m": (1, "m"),
+}
+_SHARES: Final = ("roll_below_no_tank", "roll_below_passive", "active_share")
+
+
+def compare(
+    reference: Annotated[Path, typer.Argument(help="Campaign or bench folder, or recording.")],
+    others: Annotated[list[Path], typer.Argument(help="One or more of the same kind.")],
+    json_: Json = False,
+) -> None:
+    """Compare runs, recordings or campaigns with the first: differences with 95 % intervals.
+
+    [bold]Example:[/bold] utank-hil compare out/before out/after
+
+    Where the waves are the same, values are compared pair by pair: cases of campaigns, and pieces
+    of recordings of the same seed and sea.
+    """
+    from firmware_sim.campaign.store import is_campaign
+    from firmware_sim.comparison.campaigns import compare_campaigns
+    from firmware_sim.comparison.difference import CompareError
+    from firmware_sim.comparison.records import compare_records
+
+    places = [reference, *others]
+    kinds = {is_campaign(place) for place in places}
+    if len(kinds) > 1:
+        fail("a campaign and a recording can't be compared: name things of one kind")
+    try:
+        if kinds == {True}:
+            found = compare_campaigns(reference, others)
+        else:
+            first, *rest = (_recording(place) for place in places)
+            found = compare_records(first, rest)
+    except (CompareError, ValueError) as error:
+        fail(error)
+    if json_:
+        content = {"reference": str(reference), "comparisons": [asdict(each) for each in found]}
+        sys.stdout.write(json.dumps(content) + "\n")
+        return
+    console = Console()
+    for source in dict.fromkeys(each.source for each in found):
+        of_source = [each for each in found if each.source == source]
+        print_table(console, _table(reference, of_source))
+        for remark in dict.fromkeys(remark for each in of_source for remark in each.remarks):
+            console.print(f"[yellow]{escape(remark)}[/yellow]", soft_wrap=True)
+
+
+def _recording(place: Path) -> Path:
+    """The recording that a path stands for."""
+    from firmware_sim.report import RECORDING
+
+    file = place / RECORDING if place.is_dir() else place
+    if not file.is_file():
+        wanted = f"{RECORDING} or a campaign" if place.is_dir() else "such file"
+        fail(f"{place}: there is no {wanted}; name a folder of `bench` or `campaign`, or a .rrd")
+    return file
+
+
+def _table(reference: Path, found: list["Comparison"]) -> Table:
+    table = Table(
+        title=f"{shown(Path(found[0].source))} against {shown(reference)}",
+        caption="difference ± half width of its 95 % interval",
+    )
+    for heading in ("run", *found[0].parameters, "figure"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("reference", "this", "difference", "%", "pairs"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for each in found:
+        for name, figure in each.figures.items():
+            values = [str(value) for value in each.parameters.values()]
+            table.add_row(each.run, *values, *_cells(name, figure))
+    return table
+
+
+def _cells(name: str, figure: "Difference") -> list[str]:
+    scale, unit = _unit(name)
+    width = "" if figure.half_width is None else f" ± {scale * figure.half_width:.3g}"
+    share = f"{figure.difference / figure.reference:+.1%}" if figure.reference else ""
+    count = str(figure.count) if figure.paired else f"{figure.count}, not paired"
+    return [
+        f"{name.rsplit('_', 1)[0] if unit not in ('', '%') else name} {unit}".strip(),
+        f"{scale * figure.reference:.4g}",
+        f"{scale * figure.value:.4g}",
+        f"{scale * figure.difference:+.3g}{width}",
+        "" if name in _SHARES else share,
+        count,
+    ]
+
+
+def _unit(name: str) -> tuple[float, str]:
+    """Scale and unit in which a figure is shown."""
+    if name in _SHARES:
+        return 100.0, "%"
+    return _SCALES.get(name.rsplit("_", 1)[-1], (1.0, ""))

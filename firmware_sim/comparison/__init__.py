@@ -1,0 +1,1 @@
+"""What differs between campaigns, or between recorded runs, with confidence intervals."""

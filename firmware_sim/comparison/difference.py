@@ -1,0 +1,122 @@
+"""The difference of two means, paired or not."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.arrays import FloatArray
+
+
+class CompareError(ValueError):
+    """What can't be compared; the message says why, and the remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A figure of one run beside that of another.
+
+    Attributes
+    ----------
+    reference, value : float
+        Means.
+    difference : float
+        `value` less `reference`.
+    half_width : float or None
+        Of the difference's 95 % confidence interval; None of too little for one.
+    count : int
+        Pairs, or values of the smaller side.
+    paired : bool
+        Whether both are of the same waves.
+    """
+
+    reference: float
+    value: float
+    difference: float
+    half_width: float | None
+    count: int
+    paired: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One run beside the reference's run of the same name.
+
+    Attributes
+    ----------
+    source : str
+        Where the run is from.
+    run : str
+    parameters : dict
+        What both have in common of the keys that are varied.
+    figures : dict of str to Difference
+    remarks : tuple of str
+        What is to be known of it.
+    """
+
+    source: str
+    run: str
+    parameters: dict[str, Any]
+    figures: dict[str, Difference]
+    remarks: tuple[str, ...] = ()
+
+
+def paired(reference: FloatArray, values: FloatArray) -> Difference:
+    """Difference of values that belong together one by one, shape (n,)."""
+    width = mean_interval(values - reference).half_width if len(values) > 1 else None
+    return _difference(reference, values, width, paired=True)
+
+
+def independent(reference: FloatArray, values: FloatArray) -> Difference:
+    """Difference of the means of independent values, shapes (n,) and (m,): Welch's interval."""
+    count = min(len(reference), len(values))
+    if count < 2:
+        return _difference(reference, values, None, paired=False)
+    from scipy.stats import t as student
+
+    parts = [float(each.var(ddof=1)) / len(each) for each in (reference, values)]
+    spread = math.fsum(parts)
+    if spread == 0:
+        return _difference(reference, values, 0.0, paired=False)
+    freedoms = [
+        part**2 / (len(each) - 1) for part, each in zip(parts, (reference, values), strict=True)
+    ]
+    width = float(student.ppf(0.975, spread**2 / math.fsum(freedoms))) * math.sqrt(spread)
+    return _difference(reference, values, width, paired=False)
+
+
+def _difference(
+    reference: FloatArray, values: FloatArray, half_width: float | None, *, paired: bool
+) -> Difference:
+    first, second = float(np.mean(reference)), float(np.mean(values))
+    count = min(len(reference), len(values))
+    return Difference(first, second, second - first, half_width, count, paired)
+
+
+def same_runs(reference: Sequence[str], other: Sequence[str], source: str) -> list[str]:
+    """Names that both have.
+
+    Raises
+    ------
+    CompareError
+        If there are none.
+    """
+    common = [name for name in reference if name in other]
+    if not common:
+        raise CompareError(
+            f"{source}: has the runs {', '.join(other)}; the reference has {', '.join(reference)}: "
+            "none of one name"
+        )
+    return common
+
+
+def differing(reference: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[str, ...]:
+    """What else than the question differs: of code and simulation."""
+    remarks = []
+    for key, words in (("simulation", "kinds of simulation"), ("code", "versions of the program")):
+        if reference.get(key) != other.get(key):
+            remarks.append(f"different {words}: {reference.get(key)} and {other.get(key)}")
+    return tuple(remarks)

@@ -1,0 +1,164 @@
+"""Comparisons: intervals that hold what they promise, and pairs only of the same waves."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_ind
+from typer.testing import CliRunner
+
+from firmware_sim.campaign.driver import batch_of
+from firmware_sim.campaign.store import Store
+from firmware_sim.campaign.study import load_study
+from firmware_sim.campaign.work import run_batch
+from firmware_sim.commands.compare import compare
+from firmware_sim.comparison.difference import independent, paired
+from firmware_sim.comparison.records import BATCH_PERIODS, MOST_BATCHES
+from utank_hil.analysis.motion.confidence import batch_means, rms_batches
+from utank_hil.commands.common import new_app
+from utank_hil.telemetry import write_recording
+
+APP = new_app()
+APP.command()(compare)
+CONFIGS = Path("configs").resolve()
+COLUMNS = ("time_s", "roll_rad", "starboard_level_m", "port_level_m", "pressure_actual_pa",
+           "pump_power_w")  # fmt: skip
+STUDY = """
+name: {name}
+scenario: {configs}/scenarios/storm.yaml
+simulation: linear
+set:
+  controllers: {{gpc: {configs}/controllers/gpc.yaml}}
+  controllers.gpc.limits.pressure_pa: {pressure_pa}
+  duration_s: 30
+  settle_s: 10
+grid: {{seed: {{first: {first}, count: 4}}}}
+"""
+
+
+def ran(folder: Path, name: str, *, pressure_pa: float = 5e4, first: int = 1) -> Path:
+    """A campaign's folder."""
+    path = folder / f"{name}.yaml"
+    path.write_text(STUDY.format(name=name, configs=CONFIGS, pressure_pa=pressure_pa, first=first))
+    loaded, store = load_study(path), Store(folder / name)
+    about = {"keys": loaded.keys, "code": "same"}
+    configuration = {"stop": None, "simulation": "linear"}
+    store.begin(loaded, {**about, "configuration": configuration}, resume=False)
+    store.write(run_batch(batch_of(loaded, loaded.cases)))
+    return folder / name
+
+
+def found(*arguments: object) -> dict[str, object]:
+    done = CliRunner().invoke(APP, [*map(str, arguments), "--json"])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def waves(seed: int, seconds: float = 3600.0, rate_hz: int = 20) -> np.ndarray:
+    """Roll of a lightly damped ship (5 %, 12.6 s) under white noise, stationary."""
+    count = round(rate_hz * (seconds + 1200))
+    omega = np.fft.rfftfreq(count, 1 / rate_hz) * 2 * np.pi
+    gain = 1 / (0.25 - omega**2 + 1j * 2 * 0.05 * 0.5 * omega)
+    noise = np.fft.rfft(np.random.default_rng(seed).standard_normal(count))
+    return np.fft.irfft(noise * gain)[600 * rate_hz : -600 * rate_hz] * 1e-2
+
+
+def recorded(path: Path, roll: np.ndarray, **about: object) -> Path:
+    time_s = np.arange(len(roll)) / 20
+    other = np.zeros((len(roll), len(COLUMNS) - 2))
+    write_recording(path, COLUMNS, {"run": np.column_stack([time_s, roll, other])}, about=about)
+    return path
+
+
+def test_root_mean_square_is_the_mean_of_its_batches_and_differences_add_up():
+    one, two = waves(1, 600.0), waves(2, 600.0)
+    batches = [rms_batches(each, 8) for each in (one, two)]
+    for values, each in zip(batches, (one, two), strict=True):
+        assert values.mean() == pytest.approx(math.sqrt(np.mean(each**2)), rel=1e-12)
+    assert batch_means(np.arange(7.0), 3).tolist() == [0.5, 2.5, 4.5]
+    assert not rms_batches(np.zeros(10), 2).any()
+    with pytest.raises(ValueError, match="3 values make no 4 batches"):
+        batch_means(np.ones(3), 4)
+
+
+@pytest.mark.slow
+def test_interval_of_an_hour_holds_the_true_difference_as_often_as_it_says():
+    held, count = 0, 150
+    batches = min(int(3600 / 12.6 / BATCH_PERIODS), MOST_BATCHES)
+    for seed in range(count):
+        common, own = waves(seed, rate_hz=4), waves(1000 + seed, rate_hz=4)
+        # two ships in the same waves, whose true root mean squares are equal
+        one, two = common + 0.3 * own, common - 0.3 * own
+        difference = paired(rms_batches(one, batches), rms_batches(two, batches))
+        held += abs(difference.difference) <= difference.half_width
+    assert held / count == pytest.approx(0.95, abs=0.054)  # three standard deviations
+
+
+def test_independent_means_have_welch_s_interval():
+    one, two = np.array([1.0, 2.0, 4.0]), np.array([2.0, 3.0, 3.0, 6.0])
+    difference = independent(one, two)
+    expected = ttest_ind(two, one, equal_var=False).confidence_interval(0.95)
+    assert difference.difference == pytest.approx((expected.low + expected.high) / 2)
+    assert difference.half_width == pytest.approx((expected.high - expected.low) / 2)
+    assert not difference.paired
+
+
+@pytest.mark.slow
+def test_campaigns_in_the_same_waves_are_paired_and_their_passive_tank_is_the_same(tmp_path: Path):
+    strong, weak = ran(tmp_path, "strong"), ran(tmp_path, "weak", pressure_pa=1.5e4)
+    by_run = {each["run"]: each for each in found(strong, weak)["comparisons"]}
+    roll = by_run["gpc"]["figures"]["roll_rms_rad"]
+    assert (roll["paired"], roll["count"]) == (True, 4)
+    assert roll["difference"] == pytest.approx(roll["value"] - roll["reference"])
+    peak = by_run["gpc"]["figures"]["pressure_peak_pa"]
+    assert (peak["reference"], peak["value"]) == pytest.approx((5e4, 1.5e4), rel=0.02)
+    passive = by_run["passive"]["figures"]["roll_rms_rad"]
+    assert (passive["difference"], passive["half_width"]) == (0, 0)
+    other = ran(tmp_path, "other", first=50)
+    unpaired = found(strong, other)["comparisons"][0]["figures"]["roll_rms_rad"]
+    assert not unpaired["paired"]
+    done = CliRunner().invoke(APP, [str(strong), str(weak)])
+    assert "pressure_peak kPa" in done.stdout
+
+
+def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
+    about = {"configuration": {"sea": {"file": "./a"}}, "seed": 1, "data": {"./a": "1234"}}
+    moved = {"configuration": {"sea": {"file": "../a"}}, "seed": 1, "data": {"../a": "1234"}}
+    roll = waves(3, 2400.0)
+    first = recorded(tmp_path / "a.rrd", roll, **about)
+    small = recorded(tmp_path / "b.rrd", 0.8 * roll, **moved)
+    other = recorded(tmp_path / "c.rrd", waves(4, 2400.0), **{**about, "seed": 2})
+    together, apart = found(first, small, other)["comparisons"]
+    figure = together["figures"]["roll_rms_rad"]
+    assert figure["paired"]
+    rms = math.sqrt(np.mean(roll**2))
+    assert figure["reference"] == pytest.approx(rms, rel=0.05)  # a rest of a batch is left out
+    assert figure["difference"] == pytest.approx(-0.2 * figure["reference"], rel=1e-3)
+    single = paired(*(rms_batches(each, figure["count"]) for each in (0 * roll, roll)))
+    assert figure["half_width"] == pytest.approx(0.2 * single.half_width, rel=1e-2)
+    assert not apart["figures"]["roll_rms_rad"]["paired"]
+    assert apart["figures"]["roll_rms_rad"]["half_width"] > figure["half_width"]
+    assert "not the same waves" in apart["remarks"][0]
+
+
+def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
+    short = [recorded(tmp_path / f"{n}.rrd", waves(n, 300.0)) for n in (1, 2)]
+    (each,) = found(*short)["comparisons"]
+    assert each["figures"]["roll_rms_rad"]["half_width"] is None
+    assert "no interval: shorter than 120 rolls" in each["remarks"][-1]
+    done = CliRunner().invoke(APP, list(map(str, short)))
+    assert "no interval" in done.stdout
+
+
+def test_what_can_not_be_compared_is_said(tmp_path: Path):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    (tmp_path / "no.rrd").write_text("nothing")
+    first = recorded(tmp_path / "a.rrd", waves(1, 60.0))
+    for other, said in ((empty, "there is no bench.rrd"), (tmp_path / "gone", "there is no such"),
+                        (tmp_path / "no.rrd", "no.rrd")):  # fmt: skip
+        done = CliRunner().invoke(APP, [str(first), str(other)])
+        assert done.exit_code == 2
+        assert said in done.stderr

@@ -1,0 +1,114 @@
+"""Figure of a campaign: means with their intervals, and how often a roll is passed."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from utank_hil.pictures.style import COLORS, picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_GROUPS: Final = 40
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignRun:
+    """One run of a campaign's groups.
+
+    Attributes
+    ----------
+    name : str
+    mean_rad, half_width_rad : sequence of float
+        Roll RMS of each group; not a number where there is none.
+    rolls_rad : sequence of float
+        Roll RMS of each case.
+    """
+
+    name: str
+    mean_rad: Sequence[float]
+    half_width_rad: Sequence[float]
+    rolls_rad: Sequence[float]
+
+
+def draw_campaign(
+    groups: Sequence[str | float],
+    axis: str,
+    runs: Sequence[CampaignRun],
+    path: Path,
+    title: str,
+    about: Mapping[str, Any] | None = None,
+) -> Path:
+    """Draw the roll RMS of groups of cases, and the share of cases above a roll.
+
+    Parameters
+    ----------
+    groups : sequence
+        What each group is: numbers along an axis, or names one below the other, of which the
+        first `MOST_GROUPS` are drawn.
+    axis : str
+        What the numbers are.
+    runs : sequence of CampaignRun
+    path : Path
+        The `.png` file; overwritten.
+    title : str
+    about : mapping, optional
+        As in `picture`.
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
+    height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)
+    with picture(path, title, (12.0, max(height, 4.5)), about) as figure:
+        left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
+        for number, run in enumerate(runs):
+            color = COLORS[number % len(COLORS)]
+            if along:
+                _curve(left, np.array(groups, dtype=float), run, color)
+            else:
+                _bars(left, number / max(len(runs), 1), run, color)
+            _exceedance(right, run, color)
+        if along:
+            left.set_xlabel(axis)
+            left.set_ylabel("Roll RMS (°), 95 % interval of the mean")
+            left.set_ylim(bottom=0)
+        else:
+            shown = [str(group) for group in groups[:MOST_GROUPS]]
+            left.set_yticks(-np.arange(len(shown)) - 0.4, shown)
+            left.set_xlabel("Roll RMS (°), 95 % interval of the mean")
+        right.set_xlabel("Roll RMS of a case (°)")
+        right.set_ylabel("Share of the cases above it")
+        right.set_yscale("log")
+        left.legend(frameon=False)
+    return path
+
+
+def _curve(axes: "Axes", at: "np.ndarray[Any, Any]", run: CampaignRun, color: str) -> None:
+    order = np.argsort(at)
+    mean, width = (np.degrees(np.array(each))[order] for each in (run.mean_rad, run.half_width_rad))
+    axes.plot(at[order], mean, color=color, marker="o", markersize=4, label=run.name)
+    axes.fill_between(at[order], mean - width, mean + width, color=color, alpha=0.12, linewidth=0)
+
+
+def _bars(axes: "Axes", shift: float, run: CampaignRun, color: str) -> None:
+    mean, width = (
+        np.degrees(np.array(each[:MOST_GROUPS])) for each in (run.mean_rad, run.half_width_rad)
+    )
+    axes.errorbar(
+        mean, -np.arange(len(mean)) - 0.8 * shift, xerr=np.nan_to_num(width), fmt="o", color=color,
+        markersize=4, capsize=3, label=run.name,
+    )  # fmt: skip
+
+
+def _exceedance(axes: "Axes", run: CampaignRun, color: str) -> None:
+    rolls = np.sort([math.degrees(roll) for roll in run.rolls_rad])
+    if len(rolls):
+        above = 1.0 - np.arange(len(rolls)) / len(rolls)
+        axes.step(rolls, above, where="pre", color=color, label=run.name)
