@@ -33,7 +33,7 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
                 chosen,
                 law,
                 retuner=log.head["retuner"],
-                estimating=log.head["estimating"],
+                estimating=log.head.get("estimating", False),
             )
     except ReplayHeadError as error:
         return str(error)
