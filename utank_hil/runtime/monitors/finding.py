@@ -26,3 +26,4 @@ class Finding(IntFlag):
     NODE_SILENT = auto()
     FLOOD = auto()
     ROLL_AMPLIFIED = auto()
+    DAMAGED = auto()

@@ -24,8 +24,8 @@ SMOOTH_S: Final = 0.25
 LONG_STEP_S: Final = 0.2
 """Steps of the sign's sums: in a longer one a sensor's noise is a smaller share."""
 SIGN_S: Final = 0.5
-NOISE_SHARE: Final = 3.0
-"""Standard deviations by which noise may shift the sums."""
+NOISE_SHARE: Final = 5.0
+"""Standard deviations by which the noise does not shift the sum of a sound sensor."""
 SIGN_GAIN: Final = -0.25
 STUCK_S: Final = 0.7
 LEARN: Final = 3.0
@@ -160,8 +160,9 @@ class RollAgainstRate:
         found |= _DRIFT
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
-        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * self._turned_turned)
-        if self._moved_turned < SIGN_GAIN * self._turned_turned - beside:
+        turned = self._turned_turned
+        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * turned)
+        if self._moved_turned < min(SIGN_GAIN * turned, turned - beside):
             found |= _SIGN
         if roll_stuck:
             found |= _ROLL_STUCK

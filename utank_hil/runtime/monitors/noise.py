@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 NOISE_S: Final = 0.7
-MOST: Final = 1.5
+MOST: Final = 2.0
 """A residual counts as so many limits at most: one jump is no noise."""
 
 
