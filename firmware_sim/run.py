@@ -8,7 +8,8 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from firmware_sim.scenario import Scenario
+from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.arrays import FloatArray
@@ -189,16 +190,32 @@ class ControllerRun:
 
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
-    """Run in simulated time; the same job gives the same rows, bit for bit."""
-    ship, truth, truth_log = _ship(job)
+    """Run in simulated time; the same job gives the same rows, bit for bit.
+
+    The scenario's faults are in it, but for the passive run.
+    """
     retuner, estimating = (
         work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
         for work in works_of(job.controller)
     )
-    controller, log = _controller(job, retuner, estimating)
-    lockstep = Lockstep(
-        [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
-    )
+    if job.scenario.faults and job.name != PASSIVE:
+        log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+        bench = FaultyBench(
+            job.scenario, job.controller, job.law, seed=job.seed, script=job.script,
+            sink=log.write, sink_every=RECORD_TICKS, retuner=retuner, estimating=estimating,
+        )  # fmt: skip
+        ship, controller = bench.ship, bench.node
+        truth_log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+        truth = TruthRecorder(ship.plant, truth_log, RECORD_NS)
+        bench.place(job.scenario.faults)
+        bench.join([truth])
+        lockstep = bench.lockstep
+    else:
+        ship, truth, truth_log = _ship(job)
+        controller, log = _controller(job, retuner, estimating)
+        lockstep = Lockstep(
+            [*ship.nodes, controller, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
+        )
     end_ns = job.ticks * TICK_NS
     while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
         lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))

@@ -82,6 +82,8 @@ def bench(
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
     loaded = load(scenario, Scenario)
+    if real_time and loaded.faults:
+        fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
     laws = {
         name: admit(controller, scenario, f"controllers.{name}")
         for name, controller in loaded.controllers.items()
