@@ -9,11 +9,15 @@ from pathlib import Path
 import pytest
 from pydantic import TypeAdapter
 
+from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.run import run_lockstep
 from firmware_sim.scenario import Scenario
-from utank_hil.assembly import build_law
+from firmware_sim.ship_side import build_ship_side
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import (
+    Fault,
     Frame,
     Mode,
     OperatorCommand,
@@ -23,6 +27,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.codec import Codec
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.runtime import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
 
 pytestmark = pytest.mark.slow
@@ -189,6 +194,39 @@ def test_broken_transceiver_is_passive_then_off_and_comes_back() -> None:
     assert set(told[1:]) == {"bus-off"}
     sent = [t for t, sender, _ in bus.heard if sender == "controller" and t > END_S * SECOND]
     assert min(sent) >= (END_S + 0.5) * SECOND
+
+
+class Watch:
+    def stopped(self, done_s: float) -> bool:
+        return False
+
+
+def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
+    lost = TypeAdapter(AnyFault).validate_python(
+        {"kind": "lost", "message": "SENSOR_MOTION", "at_s": 7.0}
+    )
+    scenario = storm().model_copy(
+        update={"faults": (lost,), "controllers": {"gpc": storm().controllers["gpc"]}}
+    )
+    ended = {}
+    for job in jobs_of(scenario, 1, 8.0, {"gpc": law()}):
+        run = run_lockstep(job, Watch())
+        ended[run.name] = (Mode(int(run.column("mode")[-1])), Fault(int(run.column("fault")[-1])))
+        assert run.end_s == pytest.approx(8.0)
+    assert ended == {
+        "passive": (Mode.PASSIVE, Fault.NONE),
+        "gpc": (Mode.FAULT, Fault.MOTION_SILENT),
+    }
+
+
+def test_a_bench_without_faults_has_the_frames_of_the_plain_one() -> None:
+    heard: list[tuple[int, str, Frame]] = []
+    ship = build_ship_side(storm(), 1, (TimedAction(1.0, Action.ARM),))
+    node = build_controller_node(storm().controllers["gpc"], law())
+    Lockstep([*ship.nodes, node], trace=lambda *each: heard.append(each)).run_until(
+        round(END_S * SECOND)
+    )
+    assert heard == sound().heard
 
 
 @pytest.mark.parametrize("form", ["extended", "standard", "remote"])

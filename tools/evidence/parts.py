@@ -83,6 +83,12 @@ PARTS = (
         3,
     ),
     Part(
+        "fault_campaign",
+        "python -m firmware_sim.commands.faults --seeds 100 --json",
+        "every fault of the table in a hundred seas: found in time, zero in time, roll",
+        60,
+    ),
+    Part(
         "monitor_margins",
         "python -m tools.studies.monitor_margins configs/scenarios/storm.yaml --hours 50 --json",
         "how near the monitors come to a false alarm",

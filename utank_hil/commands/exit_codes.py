@@ -26,9 +26,10 @@ class ExitCode(IntEnum):
     OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
     REFUSED = (
         1,
-        "`check`, `identify`, `init`, `replay`",
-        "A law misses its margins, a model or its law is refused, no tank can be for a ship, or a "
-        "replay differs. Of any command, with a traceback: an error in the program.",
+        "`check`, `identify`, `init`, `faults`, `replay`",
+        "A law misses its margins, a model or its law is refused, no tank can be for a ship, a row "
+        "of the fault campaign failed, or a replay differs. Of any command, with a traceback: an "
+        "error in the program.",
     )
     USAGE = (
         2,
@@ -55,7 +56,7 @@ class ExitCode(IntEnum):
     )
     INTERRUPTED = (
         130,
-        "`bench`, `firmware-sim`",
-        "`bench`: Ctrl-C before the end; results hold what there is. `firmware-sim`: Ctrl-C before "
-        "the first sample.",
+        "`bench`, `faults`, `firmware-sim`",
+        "`bench`, `faults`: Ctrl-C before the end; results hold what there is. `firmware-sim`: "
+        "Ctrl-C before the first sample.",
     )
