@@ -136,10 +136,10 @@ class RollAgainstRate:
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
             self._bias_rad_s += slow_rad / self._learned_s
         most_rad = MOST_DRIFT * limit_rad
-        keep = 1 - elapsed_s / LEAK_S
+        keep = max(1 - elapsed_s / LEAK_S, 0.0)  # a late tick may span more than that
         summed_rad = keep * (self.unexplained_rad + left_rad)
         self.unexplained_rad = summed_rad = min(max(summed_rad, -most_rad), most_rad)
-        self._smooth_rad += (summed_rad - self._smooth_rad) * (elapsed_s / SMOOTH_S)
+        self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
         roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
         rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
         most_move_rad = abs(turned_rad) + limit_rad  # nor is a jump a wrong sign
@@ -147,7 +147,7 @@ class RollAgainstRate:
         self._turned_rad += turned_rad
         self._long_s += elapsed_s
         if self._long_s >= LONG_STEP_S:
-            keep = 1 - self._long_s / SIGN_S
+            keep = max(1 - self._long_s / SIGN_S, 0.0)
             self._moved_turned = keep * self._moved_turned + self._moved_rad * self._turned_rad
             self._turned_turned = keep * self._turned_turned + self._turned_rad**2
             self._moved_rad = self._turned_rad = self._long_s = 0.0

@@ -37,7 +37,7 @@ class Noise:
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
         residual = min(max(residual, -self._most), self._most)
-        self.power += (residual * residual - self.power) * (elapsed_s / NOISE_S)
+        self.power += (residual * residual - self.power) * min(elapsed_s / NOISE_S, 1.0)
         self.found = self.power > self._limit_power
         return self.found
 
