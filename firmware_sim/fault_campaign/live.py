@@ -116,6 +116,8 @@ class LiveBench:
                 mode = "silent" if self.mode is None else self.mode.name
                 raise LiveError(f"not in charge on {self.bus}: {mode}, fault {self.fault}")
             self.look()
+        if self.state is not DriveState.OPERATION_ENABLED:
+            raise LiveError(f"the drive went off by itself: {self.state!r}, fault {self.fault}")
 
     def watch(self) -> tuple[float | None, float | None]:
         """Look on; ms until the controller faults, and until the drive no longer is enabled."""
