@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.commands.faults import faults
 from firmware_sim.fault_campaign.campaign import Campaign, Row
+from firmware_sim.fault_campaign.live import ACTIONS
 from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy
 from firmware_sim.fault_campaign.verdict import Result, judged
@@ -38,6 +39,13 @@ def test_every_requirement_has_rows_or_says_what_shows_it_and_stands_in_the_docu
             assert not place or Path(place.strip("`")).exists()
     for row in CAMPAIGN.rows:
         assert f"`{row.id}`" in page
+
+
+def test_every_live_row_has_what_it_does_or_what_shows_it() -> None:
+    for row in CAMPAIGN.live:
+        assert (row.does in ACTIONS) is not bool(row.elsewhere)
+        if row.elsewhere.startswith("tests/"):
+            assert Path(row.elsewhere).is_file()
 
 
 @pytest.mark.parametrize(
