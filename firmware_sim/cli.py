@@ -82,6 +82,8 @@ def firmware_sim(
     [bold]Example:[/bold] firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
     loaded = load(scenario, Scenario)
+    if loaded.faults:
+        fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration
     ship = build_ship_side(loaded, loaded.seed if seed is None else seed, loaded.operator)
     log = MemoryLog(len(TRUTH), -(-round(length_s * SECOND_NS) // RECORD_NS))

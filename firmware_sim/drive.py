@@ -37,6 +37,8 @@ _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ENABLED = DriveState.OPERATION_ENABLED
 _NO_FAULT = DriveFault.NONE
+_FOLLOWS = (_ENABLED, DriveState.SWITCHED_ON)
+"""States in which a command's set-point may act at once."""
 # half a step of the set-point on the bus: a command at the limit may have been rounded up by it
 ROUNDING_PA = 4.0
 
@@ -132,6 +134,8 @@ class PumpDrive:
             return False
         if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
             return False
+        if self._states.state not in _FOLLOWS:
+            return True  # whatever it is, the set-point stays zero
         step_pa = self._step_away_pa(pressure_pa)
         # both ends of a step may have been rounded away from where they were
         return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA
@@ -173,6 +177,23 @@ class PumpDrive:
         frames.extend(self._housekeeping.frames(now_ns, faulted=states.fault is not _NO_FAULT))
         self._ticks += 1
         return frames
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it drives the pump, be it with no pressure."""
+        return self._states.state is _ENABLED
+
+    @property
+    def setpoint_pa(self) -> float:
+        """Pressure that it has the pump make."""
+        return self._setpoint_pa
+
+    def fail(self, fault: DriveFault) -> None:
+        """Fault to be tried out: trip, or switch off where it is `DriveFault.NONE`."""
+        if fault is _NO_FAULT:
+            self._states.command(ControlWord.DISABLE_VOLTAGE)
+        else:
+            self._states.trip(fault)
 
     def _stopped(self, now_ns: int) -> bool:
         """Say whether a stop has taken the pressure away, or had its time."""

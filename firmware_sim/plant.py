@@ -42,6 +42,11 @@ class Plant:
     linear : bool
         Integrate the small-angle limit instead: no quadratic loss, no limit of the level, no
         capsizing.
+
+    Attributes
+    ----------
+    broken_pump : callable or None
+        Fault to be tried out: the pressure that an enabled pump gives instead of a set-point.
     """
 
     def __init__(
@@ -73,6 +78,7 @@ class Plant:
             self._state[kernel.MOMENTS][index] = kernel.turned_sum(phasors, rotations)
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
+        self.broken_pump: Callable[[float], float] | None = None
 
     def _load(self, ship: RollShip) -> None:
         """Take the ship's parameters."""
@@ -128,7 +134,9 @@ class Plant:
         enabled : bool
             Whether the motor is on; if not, the rotor turns freely.
         """
-        if self._has_pump:
+        if enabled and self.broken_pump is not None:
+            self.impose_pressure(self.broken_pump(setpoint_pa))
+        elif self._has_pump:
             self._state[kernel.SETPOINT] = setpoint_pa
             self._state[kernel.MODE] = kernel.DRIVEN if enabled else kernel.FREE
 

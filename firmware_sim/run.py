@@ -10,7 +10,8 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from firmware_sim.scenario import Scenario
+from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.arrays import FloatArray
@@ -199,21 +200,58 @@ class ControllerRun:
 
 
 def run_lockstep(job: Job, watch: Watch) -> Run:
-    """Run in simulated time; the same job gives the same rows, bit for bit."""
-    ship, truth, truth_log = _ship(job)
+    """Run in simulated time; the same job gives the same rows, bit for bit.
+
+    The scenario's faults are in it, but for the passive run.
+    """
     retuner, estimating = (
         work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
         for work in works_of(job.controller)
     )
+    if job.scenario.faults and job.name != PASSIVE:
+        return _run_with_faults(job, watch, retuner, estimating)
+    ship, truth, truth_log = _ship(job)
     desks = Tapped(retuner, estimating, wanted=job.frames is not None)
     controller, log = _controller(job, desks.retuner, desks.estimating)
     with _frame_log(job, controller, desks) as node:
-        lockstep = Lockstep(
-            [*ship.nodes, node, truth], SimulatedBus(bit_rate=job.controller.bit_rate)
-        )
-        end_ns = job.ticks * TICK_NS
-        while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
-            lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+        bus = SimulatedBus(bit_rate=job.controller.bit_rate)
+        lockstep = Lockstep([*ship.nodes, node, truth], bus)
+        _run_to_the_end(job, lockstep, watch)
+    return _lockstep_run(job, lockstep, controller, log, ship, truth, truth_log)
+
+
+def _run_with_faults(
+    job: Job, watch: Watch, retuner: Retuner | None, estimating: Retuner | None
+) -> Run:
+    """A run in which the scenario's faults happen; it keeps no log of frames."""
+    log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+    bench = FaultyBench(
+        job.scenario, job.controller, job.law, seed=job.seed, script=job.script,
+        sink=log.write, sink_every=RECORD_TICKS, retuner=retuner, estimating=estimating,
+    )  # fmt: skip
+    truth_log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    truth = TruthRecorder(bench.ship.plant, truth_log, RECORD_NS)
+    bench.place(job.scenario.faults)
+    bench.join([truth])
+    _run_to_the_end(job, bench.lockstep, watch)
+    return _lockstep_run(job, bench.lockstep, bench.node, log, bench.ship, truth, truth_log)
+
+
+def _run_to_the_end(job: Job, lockstep: Lockstep, watch: Watch) -> None:
+    end_ns = job.ticks * TICK_NS
+    while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
+        lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+
+
+def _lockstep_run(
+    job: Job,
+    lockstep: Lockstep,
+    controller: ControllerNode,
+    log: MemoryLog,
+    ship: ShipSide,
+    truth: TruthRecorder,
+    truth_log: MemoryLog,
+) -> Run:
     return Run(
         job.name,
         _side_by_side(log.rows, truth_log.rows),

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from firmware_sim.drive_limits import DriveLimits
+from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.place import Place
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.sensor_errors import SensorErrors
@@ -91,6 +92,8 @@ class Scenario(Section):
     """When the difference comes about: cargo moved, fuel burnt."""
     voyage: tuple[Waypoint, ...] = ()
     """How course, speed, loading and sea change under way."""
+    faults: tuple[AnyFault, ...] = ()
+    """What fails in the runs with a controller, and when; the passive run is sound."""
     retuner_latency_s: NotNegative = 5.0
     """Time that identification and design take in simulated time."""
 
@@ -148,6 +151,7 @@ class Scenario(Section):
                 *self._ship_problems(),
                 *self._sea_problems(),
                 *self._voyage_problems(),
+                *self._fault_problems(),
             ],
         )
         return self
@@ -246,6 +250,23 @@ class Scenario(Section):
                         "lower that, or raise this",
                     )
                 )
+        return problems
+
+    def _fault_problems(self) -> list[Problem]:
+        """Faults of nodes that there are not."""
+        missing = {"drive": self.vessel.pump is None, "valve": self.vessel.valve is None}
+        problems = [
+            (f"faults.{place}", f"can't be: the vessel has no {name}")
+            for place, fault in enumerate(self.faults)
+            for name in fault.node_names()
+            if missing.get(name)
+        ]
+        if any(controller.retuning is not None for controller in self.controllers.values()):
+            problems += [
+                (f"faults.{place}", "can't be: a controller here retunes itself, its law changes")
+                for place, fault in enumerate(self.faults)
+                if fault.kind == "law"
+            ]
         return problems
 
     def _ship_problems(self) -> list[Problem]:

@@ -149,6 +149,11 @@ class ValveNode:
             self._state = ValveState.FOLLOWING
             self._asked = command.opening
 
+    @property
+    def following(self) -> bool:
+        """Whether it follows the commands, and is not on its way to the fail position."""
+        return self._state is ValveState.FOLLOWING
+
     def _go_to_fail_position(self) -> None:
         if self._state is not ValveState.FAULT:
             self._state = ValveState.FAIL_POSITION

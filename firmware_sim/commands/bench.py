@@ -88,10 +88,14 @@ def bench(
     if frames and real_time:
         fail("--frames is for lockstep: in real time `utank-hil run --out` keeps the frame log")
     loaded = load(scenario, Scenario)
+    if real_time and loaded.faults:
+        fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
     laws = {
         name: admit(controller, scenario, f"controllers.{name}")
         for name, controller in loaded.controllers.items()
     }
+    if frames and loaded.faults:
+        fail("--frames is for scenarios without faults: a log of frames has no word for them")
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     prepare_out(out, (*REPORT_FILES, *logs))
     if real_time and duration is None:

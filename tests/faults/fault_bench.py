@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -132,20 +131,6 @@ def frozen(*messages: type) -> Fault:
     return freeze
 
 
-def altered(kind: type[Any], change: Callable[[Any], Any], counter_step: int = 1) -> Fault:
-    """Changes what messages of a kind say, rightly protected; their counter runs in steps."""
-    receiver, transmitter = CATALOGUE.receiver(kind), CATALOGUE.transmitter(kind)
-
-    def alter(frame: Frame) -> Iterable[Frame]:
-        if frame.can_id != receiver.can_id:
-            return (frame,)
-        message = receiver.accept(frame)
-        transmitter.counter = counter_step * frame.data[1] - 1
-        return (transmitter.frame(change(message)),)
-
-    return alter
-
-
 def doubled(frame: Frame) -> Iterable[Frame]:
     """Sends every frame twice."""
     return (frame, frame)
@@ -169,29 +154,6 @@ class Babbler:
         if self.begin_ns <= now_ns < self.end_ns:
             return [Frame(self.can_id, bytes(8))] * self.per_tick
         return ()
-
-
-@dataclass
-class Impostor:
-    """Sends messages of another node's kind in their cycle, from a time on."""
-
-    message: Any
-    begin_ns: int
-    counter: int = 0
-    name: str = "impostor"
-    period_ns: int = 10 * MS
-
-    def __post_init__(self) -> None:
-        self._transmitter = CATALOGUE.transmitter(type(self.message))
-        self._transmitter.counter = self.counter
-        self.period_ns = self._transmitter.cycle_ns
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        pass
-
-    def tick(self, now_ns: int) -> Iterable[Frame]:
-        frame = self._transmitter.frame(self.message)
-        return (frame,) if now_ns >= self.begin_ns else ()
 
 
 class Listener:

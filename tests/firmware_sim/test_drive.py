@@ -232,14 +232,27 @@ def test_many_frames_in_a_moment_have_one_tick_of_grace_together() -> None:
     bench.command(0.0)
     for pressure_pa in range(0, 48_000, 2400):
         bench.command(pressure_pa)
-    assert bench.drive.refused > 0
-    bench.tick()
-    bench.tick()
+    assert bench.drive.refused == MISCODED_COMMANDS_TO_TRIP
+    bench = DriveBench()
+    bench.enable()
     bench.command(0.0)
     for step in range(1, 20):
         bench.now_ns += MS
         bench.command(2400.0 * step)
-    assert bench.drive.refused > 15
+    assert bench.drive.refused == MISCODED_COMMANDS_TO_TRIP
+
+
+def test_command_that_can_not_be_followed_is_not_judged_by_its_rate() -> None:
+    bench = DriveBench()
+    bench.enable()
+    for step in range(5):
+        bench.now_ns += 20 * MS
+        bench.command(4e3 * step)
+    bench.drive.fail(DriveFault.OVERCURRENT)
+    bench.now_ns += 20 * MS
+    bench.command(20e3)
+    assert bench.drive.refused == 0
+    assert bench.drive.setpoint_pa == 0.0
 
 
 @given(st.lists(st.integers(0, 10), min_size=20, max_size=80), st.integers(0, 20))

@@ -13,6 +13,7 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import measure_of
 from utank_hil.canbus import (
     Address,
+    AddressClaim,
     DriveFault,
     DriveState,
     DriveStatus1,
@@ -262,6 +263,16 @@ def test_versions_match_only_when_drive_and_sensors_both_say_so() -> None:
     line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
     line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
     assert line.inbox.versions_match
+
+
+@pytest.mark.parametrize("address", [Address.SENSORS, Address.DRIVE, Address.OPERATOR])
+def test_an_address_that_is_claimed_under_another_name_has_two_holders(address: Address) -> None:
+    line, claims = Line(), CATALOGUE.transmitter(AddressClaim, address)
+    for name, second in ((5, False), (5, False), (6, True)):
+        line.hear(claims.frame(AddressClaim(name)))
+        assert (line.inbox.claimed_twice_ns == line.now_ns) is second
+    line.hear(claims.frame(AddressClaim(6)))  # replaced: it is the one there is
+    assert line.inbox.claimed_twice_ns < line.now_ns
 
 
 def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None:

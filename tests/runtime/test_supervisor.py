@@ -50,10 +50,12 @@ ACTIVE = {"requested_mode": Mode.ACTIVE, "armed": True, "drive_enabled": True}
 ARMING = {**ACTIVE, "arm_edge": True, "drive_enabled": False}
 # what each fault looks like, all else being well
 SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
-    (Fault.MOTION_SILENT, Reaction.RAMP, {"motion_age_ms": 40}),
+    (Fault.MOTION_SILENT, Reaction.RAMP, {"motion_age_ms": 50}),
     (Fault.TANK_SILENT, Reaction.RAMP, {"tank_age_ms": 1100}),
     (Fault.PUMP_SENSOR_SILENT, Reaction.RAMP, {"pump_age_ms": 1100}),
     (Fault.PROTECTION, Reaction.RAMP, {"protection_valid": False}),
+    (Fault.PROTECTION, Reaction.RAMP, {"found": Finding.DAMAGED}),
+    (Fault.FOREIGN_SENDER, Reaction.STOP, {"claimed_twice": True}),
     (Fault.DRIVE_SILENT, Reaction.STOP, {"drive_age_ms": 70}),
     (Fault.DRIVE_SILENT, Reaction.STOP, {"echo_age_ms": 110}),
     (Fault.DRIVE_FAULT, Reaction.STOP, {"drive_fault": True}),
@@ -142,7 +144,7 @@ def test_faults_that_cut_the_pressure_are_named_before_those_that_ramp() -> None
 INIT_SIGNS = [
     (Fault.BUS_LOST, {"link_lost": True}),
     (Fault.ADDRESS_CONFLICT, {"address_conflict": True}),
-    (Fault.MOTION_SILENT, {"motion_age_ms": 40}),
+    (Fault.MOTION_SILENT, {"motion_age_ms": 50}),
     (Fault.TANK_SILENT, {"tank_age_ms": 110}),
     (Fault.PUMP_SENSOR_SILENT, {"pump_age_ms": 1100}),
     (Fault.DRIVE_SILENT, {"drive_age_ms": 70}),
@@ -161,12 +163,12 @@ def test_start_waits_for_bus_sensors_drive_and_versions_and_names_them_in_this_o
     assert bench.tick(**missing).mode is Mode.STANDBY
 
 
-def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_last_sample() -> None:
+def test_motion_sensor_loss_is_at_zero_within_250_ms_of_the_first_sample_that_is_missing() -> None:
     bench = armed_bench()
     last_sample_ns = bench.now_ns
     while bench.supervisor.demand is not Demand.ZERO:
         bench.tick(**ACTIVE, motion_age_ms=(bench.now_ns - last_sample_ns) / MILLISECOND_NS)
-    assert bench.now_ns - last_sample_ns <= 250 * MILLISECOND_NS
+    assert bench.now_ns - last_sample_ns <= 260 * MILLISECOND_NS
 
 
 def test_stop_fault_during_a_ramp_cuts_it_short() -> None:
@@ -255,7 +257,7 @@ def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset() -> None:
 @pytest.mark.parametrize(("age_ms", "mode"), [(600, Mode.PASSIVE), (601, Mode.STANDBY)])
 def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> None:
     bench = Bench()
-    bench.tick(motion_age_ms=40)  # INIT
+    bench.tick(motion_age_ms=50)  # INIT
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     assert bench.supervisor.mode is mode
@@ -578,7 +580,7 @@ def test_reset_during_a_ramp_is_refused() -> None:
 
 
 READY = {
-    "motion_age_ms": 30, "tank_age_ms": 100, "pump_age_ms": 1000, "drive_age_ms": 60,
+    "motion_age_ms": 40, "tank_age_ms": 100, "pump_age_ms": 1000, "drive_age_ms": 60,
     "echo_age_ms": 100,
 }  # fmt: skip
 
@@ -589,9 +591,10 @@ def test_ready_up_to_every_threshold_and_not_beyond() -> None:
         assert Bench().tick(**{**READY, name: age_ms + 1}).mode is Mode.INIT, name
 
 
-def test_old_tank_levels_first_halve_the_pressure() -> None:
+@pytest.mark.parametrize("age", [{"tank_age_ms": 150}, {"pump_age_ms": 250}])
+def test_old_levels_and_pressures_first_halve_the_pressure(age: dict[str, float]) -> None:
     bench = armed_bench()
-    bench.tick(**ACTIVE, tank_age_ms=150)
+    bench.tick(**ACTIVE, **age)
     assert bench.supervisor.degraded
     assert bench.supervisor.mode is Mode.ACTIVE
 

@@ -17,7 +17,7 @@ def test_a_stale_table_is_found_and_written_anew(
 ) -> None:
     text = faults.PAGE.read_text(encoding="utf-8")
     page = tmp_path / "safety.md"
-    page.write_text(text.replace("older than 30 ms", "older than 40 ms"), encoding="utf-8")
+    page.write_text(text.replace("older than 40 ms", "older than 30 ms"), encoding="utf-8")
     monkeypatch.setattr(faults, "PAGE", page)
     assert write.main(["--check"]) == 1
     assert write.main([]) == 0

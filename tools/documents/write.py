@@ -8,13 +8,21 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from tools.documents import catalogue, configuration, exit_codes, faults, tables
+from tools.documents import (
+    catalogue,
+    configuration,
+    exit_codes,
+    fault_campaign,
+    faults,
+    tables,
+)
 
 
 def pages() -> Iterator[tuple[Path, str]]:
     """Each generated document and what it should hold."""
     yield catalogue.PAGE, catalogue.page()
     yield faults.PAGE, faults.page()
+    yield fault_campaign.PAGE, fault_campaign.page()
     yield exit_codes.PAGE, exit_codes.page()
     yield configuration.PAGE, configuration.page()
     yield from tables.pages()

@@ -101,6 +101,12 @@ PARTS = (
         1200,
     ),
     Part(
+        "fault_campaign",
+        "python -m firmware_sim.commands.faults --seeds 100 --json",
+        "every fault of the table in a hundred seas: found in time, zero in time, roll",
+        60,
+    ),
+    Part(
         "monitor_margins",
         "python -m tools.studies.monitor_margins configs/scenarios/storm_all.yaml --minutes 60"
         " --json",

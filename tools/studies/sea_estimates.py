@@ -224,7 +224,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--periods", type=float, nargs="+", default=[*PERIODS_S])
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
-    parts: list[Any] = []
+    parts: list[Part] = []
     for sea in chosen.seas:
         for period_s in chosen.periods:
             parts += parts_of(sea, period_s, chosen.hours, chosen.minutes)

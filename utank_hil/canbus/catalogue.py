@@ -6,7 +6,7 @@ from enum import IntEnum
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar, get_type_hints
 
 from utank_hil.canbus.codec import FRAME_BYTES, Codec, Signal, compile_codec, field_kind
 from utank_hil.canbus.endpoints import Receiver, Transmitter
@@ -27,6 +27,14 @@ _VERSIONS: Final = (1 << 12) - 1
 _PROTECTION: Final = {"crc": (0, 8), "counter": (8, 4)}
 
 
+class NamedMessage(NamedTuple):
+    """A message of the catalogue: its type, who sends it, how it is encoded."""
+
+    kind: type[tuple[Any, ...]]
+    source: Address
+    codec: Codec[Any]
+
+
 class Catalogue:
     """The compiled messages of one DBC; creates transmitters and receivers.
 
@@ -36,12 +44,27 @@ class Catalogue:
         Hash of the DBC, 0 to 4094, as HEARTBEAT and CTRL_STATUS carry it.
     can_ids : frozenset of int
         All identifiers of the catalogue.
+    messages : tuple of NamedMessage
     """
 
     def __init__(self, codecs: Mapping[tuple[type, Address], Codec[Any]], version: int) -> None:
         self.version = version
         self.can_ids = frozenset(codec.can_id for codec in codecs.values())
         self._codecs = dict(codecs)
+        self.messages = tuple(NamedMessage(*key, codec) for key, codec in codecs.items())
+
+    def named(self, name: str) -> NamedMessage:
+        """Return the message of a name in the DBC.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        """
+        for message in self.messages:
+            if message.codec.name == name:
+                return message
+        raise KeyError(name)
 
     @property
     def codecs(self) -> Mapping[tuple[type[Any], Address], Codec[Any]]:

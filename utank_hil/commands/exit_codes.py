@@ -26,9 +26,10 @@ class ExitCode(IntEnum):
     OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
     REFUSED = (
         1,
-        "`check`, `commission`, `identify`, `init`, `replay`",
+        "`check`, `commission`, `identify`, `init`, `faults`, `replay`",
         "A law misses its margins, a commissioning is not passed, a model or its law is refused, "
-        "no tank can be for a ship, or a replay differs. Of any command, with a traceback: an "
+        "no tank can be for a ship, a row of the fault campaign failed, or a replay differs. Of "
+        "any command, with a traceback: an "
         "error in the program.",
     )
     USAGE = (
@@ -56,7 +57,7 @@ class ExitCode(IntEnum):
     )
     INTERRUPTED = (
         130,
-        "`bench`, `commission`, `firmware-sim`",
-        "`bench`: Ctrl-C before the end; results hold what there is. `commission`: Ctrl-C before "
-        "all was checked. `firmware-sim`: Ctrl-C before the first sample.",
+        "`bench`, `commission`, `faults`, `firmware-sim`",
+        "`bench`, `faults`: Ctrl-C before the end; results hold what there is. `commission`: "
+        "Ctrl-C before all was checked. `firmware-sim`: Ctrl-C before the first sample.",
     )

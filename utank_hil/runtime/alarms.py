@@ -75,6 +75,11 @@ class AlarmList:
         self._new: list[AlarmEvent] = []
         self.unaccepted = False
 
+    @property
+    def codes(self) -> frozenset[Fault]:
+        """What is in the list."""
+        return frozenset(self._entries)
+
     def update(self, active: Collection[Fault], mode: Mode, now_ns: int) -> None:
         """Take the faults whose cause is there."""
         entries = self._entries

@@ -5,7 +5,8 @@ intermission. Every queued frame of every node takes part in every arbitration, 
 controller with one mailbox per message. Frames of equal identifier are sent in queueing order.
 Transmit queues are unbounded.
 
-Not modelled: errors, retransmission, and collisions of two nodes that send the same identifier.
+Not modelled: collisions of two nodes that send the same identifier. Errors and retransmission are
+those of `firmware_sim.fault_injection.faulty_bus`.
 """
 
 from array import array
@@ -82,15 +83,17 @@ class SimulatedBus:
         self._busy_before_ns = 0  # in all windows before this one
         self._window_loads = array("d")
 
-    def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
+    def queue(self, sender: int, frame: Frame, now_ns: int, more_bits: int = 0) -> None:
         """Queue a frame for transmission from `now_ns` on; calls must be in order of time.
+
+        It keeps the bus for `more_bits` longer than its own bits take.
 
         Raises
         ------
         ValueError
             If the identifier or the payload is too long for CAN.
         """
-        duration_ns = frame_bits(frame) * self._bit_ns
+        duration_ns = (frame_bits(frame) + more_bits) * self._bit_ns
         heappush(
             self._waiting, (frame.can_id, next(self._order), frame, sender, now_ns, duration_ns)
         )

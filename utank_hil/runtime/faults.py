@@ -300,6 +300,11 @@ FAULTS: Final = (
             "frames heard and lost by the counter over 1.25 a cycle, eight too many",
             Finding.SECOND_SENDER,
         ),
+        Condition(
+            Reaction.STOP,
+            "the address of another node was claimed under two names within 10 s",
+            lambda seen, _: seen.claimed_twice,
+        ),
     ),
     _row(
         Fault.UNKNOWN_IDENTIFIERS,
@@ -319,7 +324,7 @@ FAULTS: Final = (
             Reaction.RAMP,
             "last good sample older than {motion_age_ms:g} ms",
             lambda seen, limits: seen.motion_age_ms > limits.motion_age_ms,
-            zero_within_ms=200,  # 250 after the sample, whose first 30 ms of age are allowed
+            zero_within_ms=200,  # 250 after the sample, whose first 40 ms of age are allowed
             awaited=3,
         ),
         Condition(
@@ -364,6 +369,11 @@ FAULTS: Final = (
         "No usable measurement comes from the pump's pressure sensor.",
         "Check the sensor's supply and bus connection, and the quality that SENSOR_PUMP carries.",
         Condition(
+            Reaction.HALVE,
+            "last good sample older than {pump_degraded_age_ms:g} ms",
+            lambda seen, limits: seen.pump_age_ms > limits.pump_degraded_age_ms,
+        ),
+        Condition(
             Reaction.RAMP,
             "last good sample older than {pump_age_ms:g} ms",
             lambda seen, limits: seen.pump_age_ms > limits.pump_age_ms,
@@ -380,6 +390,7 @@ FAULTS: Final = (
             f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
             lambda seen, _: not seen.protection_valid,
         ),
+        _found(Reaction.RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED),
     ),
     _row(
         Fault.STUCK_SIGNAL,

@@ -11,6 +11,7 @@ from typing import Any, Final, TypeVar
 
 from utank_hil.canbus import (
     Address,
+    AddressClaim,
     Catalogue,
     DriveFault,
     DriveState,
@@ -106,6 +107,8 @@ class Inbox:
         Drive, sensors and valve run the controller's catalogue and configuration.
     conflict_ns : int
         When somebody else last sent with the controller's address.
+    claimed_twice_ns : int
+        When a node last claimed another one's address: by another name than it was claimed before.
     frames, foreign : int
         Frames heard so far, good and bad, of any kind, and those that are none of the catalogue's.
     watched : list of Receiver
@@ -178,6 +181,11 @@ class Inbox:
         for station, address in ADDRESSES.items():
             beats = catalogue.receiver(Heartbeat, address)
             self._subscribe(beats, partial(self._on_panel_heartbeat, station))
+        self._names: dict[int, int | None] = {}
+        for address in (*matched, *ADDRESSES.values()):
+            claims = catalogue.receiver(AddressClaim, address)
+            on_claim = partial(self._on_claim, claims.can_id)
+            self._subscriptions[claims.can_id] = claims.accept, on_claim
         self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
@@ -198,7 +206,7 @@ class Inbox:
         self._tank_frame_ns = NEVER_HEARD_NS
         # a longer gap than the counter bridges is told by the time
         self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
-        self.conflict_ns = NEVER_HEARD_NS
+        self.conflict_ns = self.claimed_twice_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
 
     @property
@@ -327,6 +335,11 @@ class Inbox:
         versions = (beat.catalogue_version, beat.configuration_version)
         self._matching[can_id] = versions == self._versions
         self.versions_match = all(self._matching.values())
+
+    def _on_claim(self, can_id: int, claim: AddressClaim, now_ns: int) -> None:
+        if self._names.setdefault(can_id, claim.name) != claim.name:
+            self.claimed_twice_ns = now_ns
+            self._names[can_id] = claim.name  # of a device that was replaced
 
     def _on_panel_heartbeat(
         self,

@@ -6,9 +6,10 @@ earliest, as on a real bus. No node waits for another: a silent node does not st
 """
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime.bus_model import SimulatedBus
+from utank_hil.runtime.bus_model import BusStatistics, SimulatedBus
 from utank_hil.runtime.group import NodeGroup
 from utank_hil.runtime.node import Node
 
@@ -16,23 +17,39 @@ Trace = Callable[[int, str, Frame], None]
 """Called as (time in ns, sender's name, frame) at the end of every frame."""
 
 
+class Bus(Protocol):
+    """The bus between the nodes, as `SimulatedBus` has it."""
+
+    def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
+        """Take a frame to be sent."""
+
+    def carry_until(self, before_ns: int) -> list[tuple[int, int, Frame]]:
+        """Advance, and return what has arrived: time, sender, frame."""
+
+    def statistics(self, now_ns: int) -> BusStatistics:
+        """Return the traffic since time 0."""
+
+
 class Lockstep:
-    """Runs nodes in simulated time, from 0.
+    """Runs nodes in simulated time.
 
     Parameters
     ----------
     nodes : sequence of Node
-        Names must differ. All tick at 0 and every `period_ns` after it.
-    bus : SimulatedBus, optional
+        Names must differ. All tick at the start and every `period_ns` after it.
+    bus : Bus, optional
         By default a new one of 250 kbit/s.
     trace : callable, optional
         Receives every frame before the nodes do, like a logger on the bus.
+    start_ns : int
+        Other than 0 to go on with a bus that is there already, and with more nodes. Those that were
+        there must come first, in their order, and be due now.
 
     Attributes
     ----------
     now_ns : int
         Simulated time; every event before it has happened.
-    bus : SimulatedBus
+    bus : Bus
         The bus between the nodes.
 
     Raises
@@ -42,12 +59,17 @@ class Lockstep:
     """
 
     def __init__(
-        self, nodes: Sequence[Node], bus: SimulatedBus | None = None, trace: Trace | None = None
+        self,
+        nodes: Sequence[Node],
+        bus: Bus | None = None,
+        trace: Trace | None = None,
+        start_ns: int = 0,
     ) -> None:
         self._group = NodeGroup(nodes)
+        self._group.start(start_ns)
         self._trace = trace
-        self.bus = SimulatedBus() if bus is None else bus
-        self.now_ns = 0
+        self.bus: Bus = SimulatedBus() if bus is None else bus
+        self.now_ns = start_ns
 
     def run_until(self, time_ns: int) -> None:
         """Run every event before `time_ns`.

@@ -64,6 +64,8 @@ class Observations:
         The bus could not be read or written in the last command cycle.
     address_conflict : bool
         Another node sends with the controller's address, or has within `CONFLICT_NS`.
+    claimed_twice : bool
+        Another node's address was claimed under two names within `CONFLICT_NS`.
     versions_match : bool
         Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
@@ -119,6 +121,7 @@ class Observations:
     valve_off_ms: float = 0.0
     link_lost: bool = False
     address_conflict: bool = False
+    claimed_twice: bool = False
     versions_match: bool = True
     panel_matches: bool = True
     commissioned: bool = True
@@ -209,6 +212,7 @@ class Observer:
             self._link_lost_ns is not None and now_ns - self._link_lost_ns <= self._command_cycle_ns
         )
         seen.address_conflict = now_ns - inbox.conflict_ns <= CONFLICT_NS
+        seen.claimed_twice = now_ns - inbox.claimed_twice_ns <= CONFLICT_NS
         seen.versions_match = inbox.versions_match
         seen.panel_matches = inbox.panel_matches
         seen.protection_valid = inbox.protection_valid

@@ -39,8 +39,8 @@ class SafetyLimits:
         from which half the pressure is allowed.
     hardwired_age_ms : float
         Longest age of the hard-wired inputs, where there are such.
-    tank_degraded_age_ms : float
-        Age of the tank's last good sample from which half the pressure is allowed.
+    tank_degraded_age_ms, pump_degraded_age_ms : float
+        Age of the sensor's last good sample from which half the pressure is allowed.
     drive_age_ms, echo_age_ms : float
         Longest age of the drive's status, and of its last new command echo.
     drive_enabled_within_ms : float
@@ -70,12 +70,13 @@ class SafetyLimits:
         If a threshold is out of its range.
     """
 
-    motion_age_ms: _Silence = 30.0
+    motion_age_ms: _Silence = 40.0
     motion_spare_age_ms: _Silence = 100.0
     hardwired_age_ms: _Silence = 150.0
     tank_age_ms: _Silence = 1000.0
     tank_degraded_age_ms: _Silence = 100.0
     pump_age_ms: _Silence = 1000.0
+    pump_degraded_age_ms: _Silence = 200.0
     drive_age_ms: _Silence = 60.0
     echo_age_ms: _Silence = 100.0
     drive_enabled_within_ms: _Silence = 40.0

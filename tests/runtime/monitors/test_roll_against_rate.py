@@ -105,3 +105,17 @@ def test_restart_takes_no_gap_for_a_move() -> None:
     monitor.restart()
     assert not monitor.update(0.3, 0.0, 0.0, STEP_S)
     assert not monitor.update(0.3, 0.0, 0.0, STEP_S)
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.6, 1.0, 5.0, 40.0])
+def test_a_tick_that_comes_late_is_no_error(late_s: float) -> None:
+    """It may be longer than the memory of the sums, whose weights must not get negative."""
+    monitor, time_s = RollAgainstRate(THRESHOLDS), 0.0
+    for k in range(200):
+        step_s = late_s if k % 20 == 19 else 0.05
+        roll_rad, before_rad = (0.05 * math.sin(0.6 * t) for t in (time_s + step_s, time_s))
+        time_s += step_s
+        monitor.update(
+            roll_rad, 0.03 * math.cos(0.6 * time_s), roll_rad - before_rad + 0.01, step_s
+        )
+        assert monitor.noise.power >= 0.0

@@ -1,7 +1,8 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 
+from utank_hil.canbus import Rejection
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.senders import Senders, Stream
 
@@ -14,6 +15,7 @@ class Counted:
     heard: int = 0
     lost: int = 0
     can_id: int = 1
+    rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
 
 
 def first_found(heard: int, lost: int, cycle_ms: int = 10, seconds: float = 5.0) -> float | None:
@@ -73,3 +75,16 @@ def test_frames_of_nobody_are_a_flood(share: float, expected: bool) -> None:
     for k in range(1, 13):
         found |= senders.update(int(share * 1700.0 * k * STEP_S), STEP_S)
     assert bool(found & Finding.FLOOD) is expected
+
+
+@pytest.mark.parametrize(("every_s", "found"), [(0.2, True), (0.3, True), (0.6, False)])
+def test_three_frames_a_second_with_a_wrong_crc_are_found(every_s: float, found: bool) -> None:
+    counted = Counted()
+    senders = Senders([Stream(counted)], 1700.0)
+    seen = 0
+    for k in range(1, 51):
+        counted.heard = 10 * k
+        counted.rejected[Rejection.CRC] = int(k * STEP_S / every_s)
+        counted.rejected[Rejection.REPEATED] = k  # others do not count
+        seen |= senders.update(0, STEP_S)
+    assert bool(seen & Finding.DAMAGED) is found

@@ -38,6 +38,16 @@ def test_water_that_obeys_its_equation_is_left_alone(
     assert not found_after(ship, lambda _, *sample: sample, 120.0)
 
 
+def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
+    """A heel pushes less than a roll of its amplitude: the water does not swing with it."""
+    stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
+    heel_rad, pressure_pa = 0.1, 20e3
+    level_m = (heel_rad * 9.80665 * TANK.width_m + pressure_pa / 1000) / (2 * 9.80665)
+    found = [stuck.update(heel_rad * min(k / 600, 1), 0.01 * k, 0.0) for k in range(600)]
+    found += [stuck.update(heel_rad, level_m, pressure_pa) for _ in range(600)]
+    assert not any(found)
+
+
 def test_gains_are_one_and_the_delay_is_the_delay() -> None:
     ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
     late_s = 0.4

@@ -6,10 +6,11 @@ from typing import Final
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
-LAGS_S: Final = 0.25
-LOST_S: Final = 0.45
+LAGS_S: Final = 0.2
+LOST_S: Final = 0.4
 REVERSED_S: Final = 0.15
-"""A step less than 300, 500 and 200 ms: what is found is told in the step after."""
+"""Up to two steps less than 300, 500 and 200 ms: the fault begins between two, and so does a tick.
+"""
 REVERSED_SHARE: Final = 1 / 3
 """Of the threshold: so much the other way is reversed."""
 ENABLED_S: Final = 0.5

@@ -28,3 +28,4 @@ class Finding(IntFlag):
     ROLL_AMPLIFIED = auto()
     SENSORS_DISAGREE = auto()
     SENSORS_UNCLEAR = auto()
+    DAMAGED = auto()

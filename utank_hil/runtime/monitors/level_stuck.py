@@ -9,6 +9,7 @@ stuck.
 import math
 from typing import Final
 
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.runtime.monitors.finding import Finding
@@ -35,7 +36,12 @@ class LevelStuck:
     def __init__(
         self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
     ) -> None:
-        self._push = roll_push_at_natural_frequency(ship, tank)
+        water_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
+        push = roll_push_at_natural_frequency(ship, tank)
+        stiffness = coupled_matrices(ship, tank)[2][1, 0]
+        self._push, self._steady_push = push, -stiffness / water_kg_m
+        self._mean_share = period_s * tank.natural_frequency_rad_s / (2 * math.pi)
+        self._mean_rad = 0.0
         self._density = tank.density_kg_m3
         self._band_m = thresholds.level_still_m
         self._period_s = period_s
@@ -50,12 +56,15 @@ class LevelStuck:
 
     def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
         """Take what is measured; return what was found."""
+        # a steady heel pushes otherwise than a roll does
+        self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
         if abs(level_m - self._level_m) > self._band_m:
             self._level_m = level_m
             self._moved_m = self._rate_m_s = 0.0
             return 0
         level_m = self._level_m + self._moved_m
-        pushed = self._push * roll_rad + pressure_pa / self._density
+        pushed = self._push * (roll_rad - self._mean_rad) + self._steady_push * self._mean_rad
+        pushed += pressure_pa / self._density
         pushed -= self._loss * self._rate_m_s + 2 * GRAVITY_M_S2 * level_m
         self._rate_m_s += pushed / self._inertia * self._period_s
         self._moved_m += self._rate_m_s * self._period_s

@@ -24,8 +24,8 @@ SMOOTH_S: Final = 0.25
 LONG_STEP_S: Final = 0.2
 """Steps of the sign's sums: in a longer one a sensor's noise is a smaller share."""
 SIGN_S: Final = 0.5
-NOISE_SHARE: Final = 3.0
-"""Standard deviations by which noise may shift the sums."""
+NOISE_SHARE: Final = 5.0
+"""Standard deviations by which the noise does not shift the sum of a sound sensor."""
 SIGN_GAIN: Final = -0.25
 STUCK_S: Final = 0.7
 LEARN: Final = 3.0
@@ -136,10 +136,10 @@ class RollAgainstRate:
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
             self._bias_rad_s += slow_rad / self._learned_s
         most_rad = MOST_DRIFT * limit_rad
-        keep = 1 - elapsed_s / LEAK_S
+        keep = max(1 - elapsed_s / LEAK_S, 0.0)  # a late tick may span more than that
         summed_rad = keep * (self.unexplained_rad + left_rad)
         self.unexplained_rad = summed_rad = min(max(summed_rad, -most_rad), most_rad)
-        self._smooth_rad += (summed_rad - self._smooth_rad) * (elapsed_s / SMOOTH_S)
+        self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
         roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
         rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
         most_move_rad = abs(turned_rad) + limit_rad  # nor is a jump a wrong sign
@@ -147,7 +147,7 @@ class RollAgainstRate:
         self._turned_rad += turned_rad
         self._long_s += elapsed_s
         if self._long_s >= LONG_STEP_S:
-            keep = 1 - self._long_s / SIGN_S
+            keep = max(1 - self._long_s / SIGN_S, 0.0)
             self._moved_turned = keep * self._moved_turned + self._moved_rad * self._turned_rad
             self._turned_turned = keep * self._turned_turned + self._turned_rad**2
             self._moved_rad = self._turned_rad = self._long_s = 0.0
@@ -160,8 +160,9 @@ class RollAgainstRate:
         found |= _DRIFT
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
-        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * self._turned_turned)
-        if self._moved_turned < SIGN_GAIN * self._turned_turned - beside:
+        turned = self._turned_turned
+        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * turned)
+        if self._moved_turned < min(SIGN_GAIN * turned, turned - beside):
             found |= _SIGN
         if roll_stuck:
             found |= _ROLL_STUCK

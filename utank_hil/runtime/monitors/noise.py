@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 NOISE_S: Final = 0.7
-MOST: Final = 1.5
+MOST: Final = 2.0
 """A residual counts as so many limits at most: one jump is no noise."""
 
 
@@ -37,7 +37,7 @@ class Noise:
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
         residual = min(max(residual, -self._most), self._most)
-        self.power += (residual * residual - self.power) * (elapsed_s / NOISE_S)
+        self.power += (residual * residual - self.power) * min(elapsed_s / NOISE_S, 1.0)
         self.found = self.power > self._limit_power
         return self.found
 

@@ -1,4 +1,7 @@
-"""Who sends: messages faster than their cycle, nodes that went silent, and frames of nobody.
+"""Who sends: messages faster than their cycle, nodes that went silent, frames of nobody.
+
+CAN finds what disturbs the cable and sends it again. So a frame whose own CRC or data ID is wrong
+comes from a node that is broken, or is none of the sender's.
 
 A message's counter and its cycle tell the same time. Frames that were heard, good or bad, and
 frames that its counter says were lost add up to one a cycle. With a second sender of the same
@@ -6,9 +9,11 @@ identifier it is twice as many, with a counter that skips more. What is above 1.
 summed; eight frames are too many.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final, Protocol
 
+from utank_hil.canbus.endpoints import Rejection
 from utank_hil.runtime.monitors.finding import Finding
 
 MOST_PER_CYCLE: Final = 1.25
@@ -16,10 +21,15 @@ MOST_FRAMES: Final = 8.0
 FOREIGN_SHARE: Final = 0.1
 """Of the bus: so much of it may be used by frames that are not in the catalogue."""
 FOREIGN_FRAMES: Final = 40.0
+DAMAGED_FRAMES: Final = 3
+"""With a wrong CRC or data ID within `DAMAGED_S`."""
+DAMAGED_S: Final = 1.0
 
 _SECOND: Final = int(Finding.SECOND_SENDER)
 _SILENT: Final = int(Finding.NODE_SILENT)
 _FLOOD: Final = int(Finding.FLOOD)
+_DAMAGED: Final = int(Finding.DAMAGED)
+_CRC: Final = Rejection.CRC
 
 
 class Heard(Protocol):
@@ -29,6 +39,7 @@ class Heard(Protocol):
     cycle_ns: int
     heard: int
     lost: int
+    rejected: dict[Rejection, int]
 
 
 class Stream:
@@ -40,6 +51,11 @@ class Stream:
         With a cycle.
     silent_s : float
         A silence of so long is found; infinite where others judge it.
+
+    Attributes
+    ----------
+    damaged : int
+        Frames with a wrong CRC or data ID in the last update.
     """
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
@@ -47,6 +63,8 @@ class Stream:
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
         self._heard, self._lost = receiver.heard, receiver.lost
+        self._damaged = receiver.rejected[_CRC]
+        self.damaged = 0
         self.excess = 0.0
         self._silent_s = 0.0
 
@@ -57,6 +75,9 @@ class Stream:
         came = heard + receiver.lost - self._lost
         self._heard += heard
         self._lost = receiver.lost
+        damaged = receiver.rejected[_CRC]
+        self.damaged = damaged - self._damaged
+        self._damaged = damaged
         excess = self.excess + came - MOST_PER_CYCLE * self._cycles_per_s * elapsed_s
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
@@ -84,16 +105,24 @@ class Senders:
         self._foreign_per_s = FOREIGN_SHARE * frames_per_s
         self._foreign = 0
         self._excess = 0.0
+        self._now_s = 0.0
+        self._damaged_s = [-math.inf] * DAMAGED_FRAMES
 
     def update(self, foreign: int, elapsed_s: float) -> int:
         """Take the foreign frames so far; return what was found."""
         found = 0
         both_s = elapsed_s + self._elapsed_before_s
+        self._now_s += elapsed_s
         for stream in self._due:
             found |= stream.update(both_s)
+            if stream.damaged:
+                times_s = self._damaged_s + [self._now_s] * min(stream.damaged, DAMAGED_FRAMES)
+                self._damaged_s = times_s[-DAMAGED_FRAMES:]
         self._due, self._later = self._later, self._due
         self._elapsed_before_s = elapsed_s
         before, self._found_before = self._found_before, found
+        if self._now_s - self._damaged_s[0] <= DAMAGED_S:
+            found |= _DAMAGED
         excess = self._excess + foreign - self._foreign - self._foreign_per_s * elapsed_s
         self._foreign = foreign
         self._excess = excess = min(max(excess, 0.0), 2 * FOREIGN_FRAMES)

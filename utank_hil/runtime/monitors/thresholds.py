@@ -126,7 +126,7 @@ def thresholds_of(
         level_most_m_s=tank.level_limit_m * fastest_rad_s,
         roll_noise_rad=5 * roll_s,
         rate_noise_rad_s=5 * rate_s,
-        level_noise_m=5 * sensors.level_noise_m,
+        level_noise_m=4 * sensors.level_noise_m,
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
         rate_still_rad_s=5 * rate_s,

@@ -1,0 +1,205 @@
+"""The campaign as a configuration: requirements, and the rows that show that they are met."""
+
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from firmware_sim.fault_injection.kinds import AnyFault
+from firmware_sim.scenario import Scenario
+from utank_hil.canbus import Fault
+from utank_hil.configuration import ControllerConfig, Section
+from utank_hil.parameters import Finite, NotNegative, Positive, refuse
+from utank_hil.runtime.panel import TimedAction
+
+
+def _fault_name(name: str) -> str:
+    if name not in Fault.__members__:
+        raise ValueError("is no fault of utank_hil/runtime/faults.py")
+    return name
+
+
+FaultName = Annotated[str, AfterValidator(_fault_name)]
+
+CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
+Reaction = Literal["stop", "ramp", "halve", "note", "none", "refuse", "drive"]
+REACTIONS: Final[dict[Reaction, str]] = {
+    "stop": "zero pressure at once, latched",
+    "ramp": "ramp to zero, latched",
+    "halve": "half the pressure, with an alarm",
+    "note": "discarded or counted; control goes on",
+    "none": "not told from a sound ship; control goes on",
+    "refuse": "not armed",
+    "drive": "the drive or the valve stops by itself",
+}
+"""What a row may ask for, in words."""
+
+
+class Requirement(Section):
+    """A row of the fault table that is asked for, or a line of the trials of an earlier version."""
+
+    id: str
+    fault: str
+    found_by: str = ""
+    within: str = ""
+    reaction: str = ""
+    elsewhere: str = ""
+    """What shows it, where no row of the campaign does."""
+
+
+class Setup(Section):
+    """A ship in a sea with one of the scenario's controllers.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    controller : str
+    wind_moment_nm : float
+        Heels her from the moment of the fault on.
+    """
+
+    scenario: Scenario
+    controller: str
+    wind_moment_nm: Finite = 0.0
+
+    @property
+    def config(self) -> ControllerConfig:
+        """The controller's."""
+        return self.scenario.controllers[self.controller]
+
+    def scenario_of(self, fault_s: float) -> Scenario:
+        """The scenario with the wind."""
+        if not self.wind_moment_nm:
+            return self.scenario
+        wind = {"actual_ship": {"wind_moment_nm": self.wind_moment_nm}, "actual_from_s": fault_s}
+        return self.scenario.model_copy(update=wind)
+
+    @model_validator(mode="after")
+    def _known(self) -> "Setup":
+        names = list(self.scenario.controllers)
+        if self.controller not in names:
+            refuse("", [("controller", f"must be one of {', '.join(names)}")])
+        return self
+
+
+class Row(Section):
+    """A fault, and what is to come of it.
+
+    Attributes
+    ----------
+    faults : tuple
+        Their times count from `Campaign.fault_s`.
+    operator : tuple of TimedAction
+        What the operator does besides; times after the fault began.
+    within_ms, halved_within_ms, zero_within_ms : float, optional
+        Limits from the fault on. Without the last, the pressure is to be zero within 250 ms of a
+        stop and within 1,040 ms of the beginning of a ramp.
+    codes : tuple of str
+        Faults that it may be called.
+    hardwired_stop : bool
+        No command can take the pressure away: that needs the hard-wired stop, and is not judged.
+    counts_from : dict of str to float
+        Times count from when what the controller was told of this is first so far from the truth:
+        before, nobody can know. Or from when the pump's pressure is so far from its set-point and
+        stays so, or from when the ship first rolls so far (`over_roll_rad`).
+    roll_window_s : float, optional
+        Over which the roll is compared, instead of what all rows have.
+    roll_limit : float
+        Variance of the roll over the passive ship's.
+    from_start : bool
+        The fault is there from the start, before anybody arms. Times count from when the controller
+        is in charge.
+    followed_s : float
+        How long the bus is followed after the fault.
+    """
+
+    id: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
+    meets: Annotated[tuple[str, ...], Field(min_length=1)]
+    setup: str = "pump"
+    faults: tuple[AnyFault, ...] = ()
+    operator: tuple[TimedAction, ...] = ()
+    reaction: Reaction
+    within_ms: Positive | None = None
+    halved_within_ms: Positive | None = None
+    zero_within_ms: Positive | None = None
+    codes: tuple[FaultName, ...] = ()
+    hardwired_stop: bool = False
+    counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
+    roll_window_s: Positive | None = None
+    roll_limit: Positive = 1.05
+    from_start: bool = False
+    followed_s: Positive = 4.0
+
+
+class LiveRow(Section):
+    """A fault that needs processes and a CAN interface.
+
+    Attributes
+    ----------
+    does : str
+        Name of the function in `firmware_sim.fault_campaign.live`; empty where it is shown
+        elsewhere.
+    judged : str
+        Whether the controller's fault or the drive's end counts.
+    elsewhere : str
+        What shows it, where the campaign does not run it.
+    """
+
+    id: Annotated[str, Field(pattern=r"^live-[a-z0-9-]+$")]
+    meets: Annotated[tuple[str, ...], Field(min_length=1)]
+    does: str = ""
+    judged: Literal["found", "zero"] = "zero"
+    within_ms: Positive | None = None
+    elsewhere: str = ""
+
+
+class Campaign(Section):
+    """Requirements and rows."""
+
+    fault_s: NotNegative
+    arm_s: NotNegative
+    setups: dict[str, Setup]
+    requirements: tuple[Requirement, ...]
+    rows: tuple[Row, ...]
+    live: tuple[LiveRow, ...] = ()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Campaign":
+        known = [requirement.id for requirement in self.requirements]
+        every: list[tuple[str, Sequence[Row | LiveRow]]]
+        every = [("rows", self.rows), ("live", self.live)]
+        ids = [row.id for _, rows in every for row in rows]
+        problems = [
+            (f"{key}.{place}.id", "is there twice")
+            for key, rows in every
+            for place, row in enumerate(rows)
+            if ids.count(row.id) > 1
+        ]
+        problems += [
+            (f"{key}.{place}.meets", f"{name} is no requirement")
+            for key, rows in every
+            for place, row in enumerate(rows)
+            for name in row.meets
+            if name not in known
+        ]
+        for place, row in enumerate(self.rows):
+            if row.setup not in self.setups:
+                problems.append((f"rows.{place}.setup", f"must be one of {', '.join(self.setups)}"))
+        met = {name for _, rows in every for row in rows for name in row.meets}
+        problems += [
+            (f"requirements.{place}", "is shown by no row: add one, or say `elsewhere`")
+            for place, requirement in enumerate(self.requirements)
+            if requirement.id not in met and not requirement.elsewhere
+        ]
+        refuse("", problems)
+        return self
+
+    def chosen(self, names: Sequence[str]) -> tuple[list[Row], list[LiveRow]]:
+        """Rows whose name, or what they meet, begins with one of the names; all without any."""
+
+        def matches(row: Row | LiveRow) -> bool:
+            return not names or any(own.startswith(tuple(names)) for own in (row.id, *row.meets))
+
+        return [row for row in self.rows if matches(row)], [
+            row for row in self.live if matches(row)
+        ]

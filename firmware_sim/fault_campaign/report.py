@@ -1,0 +1,113 @@
+"""A campaign's results as JSON, as JUnit and as a table."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from rich.table import Table
+
+from firmware_sim.fault_campaign.campaign import Campaign
+from firmware_sim.fault_campaign.verdict import Result
+
+
+def as_json(
+    results: Sequence[Result],
+    on_bus: Sequence[Mapping[str, Any]],
+    not_run: Mapping[str, str],
+    about: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Everything, for `json.dumps`.
+
+    Parameters
+    ----------
+    results : sequence of Result
+    on_bus : sequence of mapping
+        Live rows, as `run_live` gives them.
+    not_run : mapping of str to str
+        Rows that were not run, and why.
+    about : mapping
+        Where it comes from.
+    """
+    rows = [*(result.as_json() for result in results), *on_bus]
+    return {
+        "rows": rows,
+        "not_run": [{"id": name, "why": why} for name, why in not_run.items()],
+        "passed": sum(row["verdict"] == "pass" for row in rows),
+        "failed": sum(row["verdict"] == "fail" for row in rows),
+        "about": dict(about),
+    }
+
+
+def write_junit(
+    path: Path, results: Sequence[Result], not_run: Mapping[str, str], seconds: float
+) -> None:
+    """Write one test case a row.
+
+    Raises
+    ------
+    OSError
+        If the file can't be written.
+    """
+    suite = ElementTree.Element(
+        "testsuite",
+        name="faults",
+        tests=str(len(results) + len(not_run)),
+        failures=str(sum(not result.passed for result in results)),
+        skipped=str(len(not_run)),
+        time=f"{seconds:.1f}",
+    )
+    for result in results:
+        case = ElementTree.SubElement(suite, "testcase", classname="faults", name=result.row.id)
+        if not result.passed:
+            failure = ElementTree.SubElement(case, "failure", message=result.problems[0])
+            failure.text = "\n".join(result.problems)
+        ElementTree.SubElement(case, "system-out").text = f"{result.requirement}\n{result.wire}"
+    for name, why in not_run.items():
+        case = ElementTree.SubElement(suite, "testcase", classname="faults", name=name)
+        ElementTree.SubElement(case, "skipped", message=why)
+    ElementTree.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def milliseconds(value: float | None) -> str:
+    """A time for a table; nothing where there is none."""
+    return "" if value is None else f"{value:.0f}"
+
+
+def table(results: Sequence[Result]) -> Table:
+    """One line a row."""
+    drawn = Table(title="Faults")
+    for heading in ("row", "reaction"):
+        drawn.add_column(heading, no_wrap=True)
+    for heading in ("found\nms", "limit\nms", "zero\nms", "limit\nms", "roll\nvariance"):
+        drawn.add_column(heading, justify="right", no_wrap=True)
+    drawn.add_column("called")
+    drawn.add_column("", no_wrap=True)
+    drawn.caption = (
+        "worst of the seeds; times after the fault; zero: of the drive's set-point, or the end of "
+        "the valve's following; variance of the roll over that of the passive ship, at most 1.05"
+    )
+    for result in results:
+        drawn.add_row(
+            result.row.id,
+            result.row.reaction,
+            milliseconds(result.found_ms),
+            milliseconds(result.row.within_ms),
+            milliseconds(result.zero_ms),
+            milliseconds(result.zero_limit_ms),
+            "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
+            " ".join(result.codes),
+            "[green]pass[/green]" if result.passed else "[red]fail[/red]",
+        )
+    return drawn
+
+
+def requirement_text(campaign: Campaign, names: Sequence[str]) -> str:
+    """What a row meets, in words."""
+    texts = []
+    for each in campaign.requirements:
+        if each.id in names:
+            parts = [each.fault, each.found_by, each.within, each.reaction]
+            texts.append(f"{each.id}: " + "; ".join(part for part in parts if part))
+    return " | ".join(texts)

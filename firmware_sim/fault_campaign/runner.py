@@ -1,0 +1,128 @@
+"""Runs a campaign in lockstep on all cores."""
+
+import multiprocessing
+import os
+import signal
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing.sharedctypes import Synchronized
+from typing import Any, Final
+
+from firmware_sim.fault_campaign.campaign import Campaign, Row
+from firmware_sim.fault_campaign.trial import Outcome, Sea, Window
+from utank_hil.assembly import build_law
+from utank_hil.control import BuiltLaw
+
+POLL_S: Final = 0.1
+ROWS_A_TASK: Final = 30
+"""As many rows go on from one ship under way: few enough for the cores to end together."""
+
+Progress = Callable[[int], None]
+"""Takes the number of trials that are done."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """What the processes of the pool inherit."""
+
+    campaign: Campaign
+    window: Window
+    recorded: bool
+    done: "Synchronized[int]"
+    stop: Any  # a plain value without a lock
+
+
+_shared: list[_Shared] = []
+_laws: dict[str, BuiltLaw] = {}
+
+
+def _prepare(shared: _Shared) -> None:
+    # Ctrl-C reaches the whole process group; the parent alone decides what it means
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _shared[:] = [shared]
+
+
+def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcome]:
+    """Rows of one setup in one sea, in a process of the pool."""
+    shared = _shared[0]
+    setup = shared.campaign.setups[setup_name]
+    if setup_name not in _laws:
+        _laws[setup_name] = build_law(setup.config)
+    recorded = shared.recorded and first
+    sea = Sea(shared.campaign, setup, _laws[setup_name], seed, shared.window, recorded=recorded)
+    sea.prepare(rows)
+    outcomes = []
+    for row in rows:
+        if shared.stop.value:
+            break
+        try:
+            outcomes.append(sea.outcome(row))
+        except RuntimeError as error:
+            outcomes.append(Outcome(row.id, seed, error=str(error).strip().splitlines()[-1]))
+        with shared.done.get_lock():
+            shared.done.value += 1
+    return outcomes
+
+
+def run_rows(
+    campaign: Campaign,
+    rows: Sequence[Row],
+    seeds: Sequence[int],
+    window: Window,
+    progress: Progress,
+    stopped: Callable[[], bool],
+    *,
+    recorded: bool = False,
+    workers: int | None = None,
+) -> dict[str, list[Outcome]]:
+    """Run rows in the seas of some seeds.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    rows : sequence of Row
+    seeds : sequence of int
+    window : Window
+    progress : callable
+        Called several times a second.
+    stopped : callable
+        Whether to end early.
+    recorded : bool
+        Whether the outcomes of the first seed hold recordings.
+    workers : int, optional
+        Processes; by default as many as there are cores for this one.
+
+    Returns
+    -------
+    dict of str to list of Outcome
+        By row, in the order of the seeds; less where it was ended early.
+    """
+    context = multiprocessing.get_context("spawn")
+    done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
+    by_setup: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        by_setup[row.setup].append(row)
+    workers = workers or len(os.sched_getaffinity(0))
+    futures: list[Future[list[Outcome]]] = []
+    shared = _Shared(campaign, window, recorded, done, stop)
+    with ProcessPoolExecutor(workers, context, _prepare, (shared,)) as pool:
+        for seed in seeds:
+            for setup, its in by_setup.items():
+                tasks = -(-len(its) // ROWS_A_TASK)
+                futures += [
+                    pool.submit(_do, setup, seed, its[n::tasks], seed == seeds[0])
+                    for n in range(tasks)
+                ]
+        while not all(future.done() for future in futures):
+            time.sleep(POLL_S)
+            failed = any(each.done() and each.exception() for each in futures)
+            stop.value = stopped() or failed
+            progress(done.value)
+        outcomes = [each for future in futures for each in future.result()]
+    found: dict[str, list[Outcome]] = {row.id: [] for row in rows}
+    for each in sorted(outcomes, key=lambda each: seeds.index(each.seed)):
+        found[each.row].append(each)
+    return found

@@ -1,0 +1,372 @@
+"""One row in one sea: a ship under way, the fault, what came of it.
+
+All rows of a seed begin with the same ship in the same waves. She is simulated up to the fault
+once, and each row goes on from there in a copy of the process.
+"""
+
+import math
+import os
+import pickle
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
+
+import numpy as np
+
+from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
+from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
+from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.ship_side import build_ship_side
+from firmware_sim.truth import TRUTH
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import Fault, Mode
+from utank_hil.control import BuiltLaw
+from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.tick import TICK_NS
+
+T = TypeVar("T")
+
+SECOND_NS: Final = 1_000_000_000
+SAMPLE_TICKS: Final = 5
+"""Of the roll, for its variance, where the ship alone is integrated; and of a recording."""
+SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
+COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
+RECORDED_S: Final = 10.0
+"""Before the fault."""
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Over which time after the fault the roll is compared with the passive ship's.
+
+    Attributes
+    ----------
+    stopped_s : float
+        Of rows that end with the pump off: from then on the ship alone is integrated.
+    running_s : float
+        Of rows whose controller stays in charge.
+    """
+
+    stopped_s: float = 600.0
+    running_s: float = 600.0
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What came of a row in one sea; times in ms after the fault.
+
+    Attributes
+    ----------
+    row : str
+    seed : int
+    found_ms, halved_ms, noted_ms, zero_ms : float or None
+    mode, code : str
+        In the end, and the fault that was latched or shown.
+    alarms : tuple of str
+    was_active, armed_again : bool
+    refused : int
+        Commands that the drive refused.
+    steepest_pa_s : float
+        Of the commands, but those that cut.
+    roll_variance, passive_variance : float
+        In rad^2, over the same `window_s`.
+    wire : str
+        The first frame that the fault changed; empty if none differs.
+    error : str
+        Of the program.
+    rows : ndarray or None
+        Recording, columns `COLUMNS`, if it was asked for.
+    """
+
+    row: str
+    seed: int
+    found_ms: float | None = None
+    halved_ms: float | None = None
+    noted_ms: float | None = None
+    zero_ms: float | None = None
+    mode: str = ""
+    code: str = ""
+    alarms: tuple[str, ...] = ()
+    was_active: bool = False
+    armed_again: bool = False
+    refused: int = 0
+    steepest_pa_s: float = 0.0
+    roll_variance: float = math.nan
+    passive_variance: float = math.nan
+    window_s: float = math.nan
+    wire: str = ""
+    error: str = ""
+    rows: FloatArray | None = None
+
+
+class Recorder:
+    """Telemetry with the truth beside it."""
+
+    def __init__(self) -> None:
+        self.bench: FaultyBench | None = None
+        self.rows: list[FloatArray] = []
+
+    def __call__(self, row: FloatArray) -> None:
+        """Take a row of the controller's."""
+        if self.bench is not None:
+            plant = self.bench.ship.plant
+            true = (
+                plant.roll_rad,
+                plant.level_m,
+                plant.pressure_pa,
+                plant.pump_power_w,
+                plant.wave_moment_nm,
+            )
+            self.rows.append(np.array([*row, *true]))
+
+
+@dataclass(slots=True)
+class Underway:
+    """A ship under way, up to the fault."""
+
+    bench: FaultyBench
+    log: BusLog
+    recorder: Recorder
+    reference: list[Heard] = field(default_factory=list)
+
+
+class Sea:
+    """All rows of one setup in the waves of one seed.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    setup : Setup
+    law : BuiltLaw
+        Of the setup's controller.
+    seed : int
+    window : Window
+    recorded : bool
+        Whether the outcomes hold recordings.
+    """
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        setup: Setup,
+        law: BuiltLaw,
+        seed: int,
+        window: Window,
+        *,
+        recorded: bool = False,
+    ) -> None:
+        self._campaign, self._setup, self._law = campaign, setup, law
+        self._seed, self._window, self._recorded = seed, window, recorded
+        self._fault_ns = round(campaign.fault_s * SECOND_NS)
+        self._underway = self._start()
+        self._underway.bench.run(self._fault_ns)
+        self._passive: dict[bool, FloatArray] = {}
+
+    def _start(self) -> Underway:
+        log, recorder = BusLog(), Recorder()
+        bench = FaultyBench(
+            self._setup.scenario_of(self._campaign.fault_s),
+            self._setup.config,
+            self._law,
+            seed=self._seed,
+            script=(TimedAction(self._campaign.arm_s, Action.ARM),),
+            trace=log,
+            sink=recorder if self._recorded else None,
+            sink_every=SAMPLE_TICKS,
+        )
+        recorder.bench = bench
+        return Underway(bench, log, recorder)
+
+    def prepare(self, rows: list[Row]) -> None:
+        """Make what the rows are compared with: the bus without a fault, the passive ship."""
+        followed_s = max(row.followed_s for row in rows)
+        end_ns = self._fault_ns + round(followed_s * SECOND_NS)
+        log = self._underway.log
+        log.frames += in_a_copy(lambda: self._frames_until(end_ns))
+        self._underway.reference, log.frames = (
+            log.frames,
+            [each for each in log.frames if each[0] < self._fault_ns],
+        )
+        longest_s = max(
+            self._window.stopped_s,
+            self._window.running_s,
+            *(max(row.followed_s, row.roll_window_s or 0.0) for row in rows),
+        )
+        for enabled in (False, True):
+            self._passive[enabled] = in_a_copy(
+                lambda enabled=enabled: self._passive_roll(longest_s, enabled=enabled)  # type: ignore[misc]
+            )
+
+    def _frames_until(self, end_ns: int) -> list[Heard]:
+        known = len(self._underway.log.frames)
+        self._underway.bench.run(end_ns)
+        return self._underway.log.frames[known:]
+
+    def _passive_roll(self, seconds: float, *, enabled: bool) -> FloatArray:
+        """Of the ship that was passive all along, her pump enabled at zero pressure or off."""
+        plant = build_ship_side(
+            self._setup.scenario_of(self._campaign.fault_s), self._seed, ()
+        ).plant
+        plant.advance(0)
+        plant.drive_pump(0.0, enabled=enabled)
+        rolls = []
+        for time_ns in range(0, self._fault_ns + round(seconds * SECOND_NS), SAMPLE_NS):
+            plant.advance(time_ns)
+            rolls.append(plant.roll_rad)
+        return np.array(rolls)
+
+    def outcome(self, row: Row) -> Outcome:
+        """Do a row, in a copy of this process."""
+        return in_a_copy(lambda: self._outcome(row))
+
+    def _outcome(self, row: Row) -> Outcome:
+        underway = self._start() if row.from_start else self._underway
+        bench, log = underway.bench, underway.log
+        start_ns = bench.lockstep.now_ns
+        refused = bench.ship.refused_commands
+        watch = Watch(bench, row.operator, row.counts_from)
+        bench.place(row.faults)
+        bench.join([watch])
+        watched_ns = start_ns + round(row.followed_s * SECOND_NS)
+        bench.run(watched_ns)
+        stopped = not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
+        outcome = self._measured(row, watch, log, start_ns)
+        outcome.refused = bench.ship.refused_commands - refused
+        window_s = self._window.stopped_s if stopped else self._window.running_s
+        window_s = max(row.roll_window_s or window_s, row.followed_s)
+        end_ns = start_ns + round(window_s * SECOND_NS)
+        rolls = _Moments(watch)
+        if stopped:
+            rolls.add_ship_alone(bench, watched_ns, end_ns)
+        elif end_ns > watched_ns:
+            bench.run(end_ns)
+            rolls = _Moments(watch)
+            outcome.armed_again |= watch.armed_again
+            outcome.code = watch.code.name
+        outcome.mode = bench.node.mode.name
+        outcome.roll_variance, outcome.window_s = rolls.variance, window_s
+        passive = self._passive[self._pump_enabled(bench)]
+        outcome.passive_variance = float(passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS].var())
+        difference = first_difference(self._underway.reference, log.frames, watched_ns)
+        outcome.wire = "" if difference is None else _words(*difference, start_ns)
+        if self._recorded:
+            first_s = (start_ns / SECOND_NS) - RECORDED_S
+            outcome.rows = np.array([each for each in underway.recorder.rows if each[0] >= first_s])
+        return outcome
+
+    def _pump_enabled(self, bench: FaultyBench) -> bool:
+        return bench.ship.drive is not None and bench.ship.drive.enabled
+
+    def _measured(self, row: Row, watch: Watch, log: BusLog, start_ns: int) -> Outcome:
+        zero_ns = watch.pressed_ns + TICK_NS
+        begin_ns: int | None = start_ns
+        if row.from_start:
+            begin_ns = watch.active_ns
+        elif row.counts_from:
+            begin_ns = watch.over_ns
+            # what was found before is counted from the fault
+            if begin_ns is not None and watch.found_ns is not None and watch.found_ns < begin_ns:
+                begin_ns = start_ns
+        if begin_ns is None:
+            begin_ns = start_ns
+
+        def after(time_ns: int | None) -> float | None:
+            return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)
+
+        return Outcome(
+            row.id,
+            self._seed,
+            after(watch.found_ns),
+            after(watch.halved_ns),
+            after(watch.noted_ns),
+            after(zero_ns),
+            "",
+            watch.code.name,
+            tuple(sorted(code.name for code in watch.alarms if code is not Fault.NONE)),
+            watch.active_ns is not None,
+            watch.armed_again,
+            steepest_pa_s=log.steepest_pa_s(start_ns),
+        )
+
+
+class _Moments:
+    """Mean and variance of the roll, from a watch's samples on."""
+
+    def __init__(self, watch: Watch) -> None:
+        self._sum, self._square, self._count = watch.roll_sum, watch.roll_square, watch.samples
+
+    def add_ship_alone(self, bench: FaultyBench, start_ns: int, end_ns: int) -> None:
+        """Integrate the ship on her own, as she is: nothing is left to act on her."""
+        plant = bench.ship.plant
+        for time_ns in range(start_ns, end_ns, TICK_NS):
+            plant.advance(time_ns)
+            roll = plant.roll_rad
+            self._sum += roll
+            self._square += roll * roll
+            self._count += 1
+
+    @property
+    def variance(self) -> float:
+        """In rad^2."""
+        mean = self._sum / self._count
+        return self._square / self._count - mean * mean
+
+
+def write_recordings(
+    folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
+) -> dict[str, Path]:
+    """Write a recording of each row that has one, and return the files by row."""
+    from utank_hil.telemetry import write_recording
+
+    files = {}
+    for name, each in outcomes.items():
+        kept = {f"seed {one.seed}": one.rows for one in each if one.rows is not None}
+        if kept:
+            files[name] = folder / f"{name}.rrd"
+            write_recording(files[name], COLUMNS, kept, about=about)
+    return files
+
+
+def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
+    """The first difference between two logs of the bus, for people."""
+
+    def frame(heard: Heard | None) -> str:
+        if heard is None:
+            return "nothing"
+        time_ns, can_id, data = heard
+        return f"{can_id:08X}#{data.hex().upper()} at {(time_ns - start_ns) / 1e6:.2f} ms"
+
+    return f"{frame(here)} instead of {frame(there)}"
+
+
+def in_a_copy(work: Callable[[], T]) -> T:
+    """Do something in a copy of this process and return what it returned.
+
+    Raises
+    ------
+    RuntimeError
+        With the traceback, if it failed.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            try:
+                told = pickle.dumps((True, work()))
+            except Exception:  # raised again by the parent
+                told = pickle.dumps((False, traceback.format_exc()))
+            with os.fdopen(writing, "wb") as pipe:
+                pipe.write(told)
+        finally:
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        told = pipe.read()
+    os.waitpid(child, 0)
+    done, answer = pickle.loads(told) if told else (False, "the process ended without an answer")
+    if not done:
+        raise RuntimeError(answer)
+    return cast(T, answer)

@@ -1,0 +1,175 @@
+"""What happens on the bench after a fault: a node that looks on, and a log of the bus."""
+
+from collections.abc import Iterable, Mapping
+from itertools import pairwise, zip_longest
+from typing import Any
+
+from firmware_sim.faulty_bench import FaultyBench
+from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, load_catalogue
+from utank_hil.runtime.panel import TimedAction
+from utank_hil.tick import TICK_NS
+
+Heard = tuple[int, int, bytes]
+"""Time, identifier and data of a frame on the bus."""
+
+_COMMANDS = load_catalogue().codec(PumpCommand)
+ROUNDING_PA = 8.0
+JITTER_S = 0.002
+
+
+class BusLog:
+    """Every frame on the bus, and the controller's pump commands."""
+
+    def __init__(self) -> None:
+        self.frames: list[Heard] = []
+        self.commands: list[tuple[int, float]] = []
+
+    def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
+        """Take a frame."""
+        self.frames.append((time_ns, frame.can_id, frame.data))
+        if sender == "controller" and frame.can_id == _COMMANDS.can_id and len(frame.data) == 8:
+            command = _COMMANDS.decode(frame.data)
+            if command is not None:
+                self.commands.append((time_ns, command.pressure_pa))
+
+    def steepest_pa_s(self, since_ns: int) -> float:
+        """Greatest rate of the commands but of those that ask for nothing, rounding taken off."""
+        commands = [each for each in self.commands if each[0] >= since_ns]
+        return max(
+            (
+                (abs(later_pa - pressure_pa) - ROUNDING_PA) / ((later - time) * 1e-9 + JITTER_S)
+                for (time, pressure_pa), (later, later_pa) in pairwise(commands)
+                if later_pa != 0.0
+            ),
+            default=0.0,
+        )
+
+
+def first_difference(
+    reference: list[Heard], heard: list[Heard], end_ns: int
+) -> tuple[Heard | None, Heard | None] | None:
+    """The first frames, before a time, in which two logs differ; None if they don't."""
+    for there, here in zip_longest(reference, heard):
+        if there != here:
+            known = [each[0] for each in (there, here) if each is not None]
+            return (there, here) if min(known) < end_ns else None
+    return None
+
+
+class Watch:
+    """Looks at controller, drive and ship in each tick, after all of them.
+
+    Parameters
+    ----------
+    bench : FaultyBench
+    operator : iterable of TimedAction
+        Buttons to press, at times after the first tick.
+    counts_from : mapping of str to float
+        As in `Row`.
+
+    Attributes
+    ----------
+    active_ns, found_ns, halved_ns, noted_ns : int or None
+        When the controller was first in charge; latched a fault; halved the pressure; rejected,
+        missed or discarded anything.
+    over_ns : int or None
+        When what `counts_from` asks for was first so, or last became so for the pressure.
+    pressed_ns : int
+        When the drive's set-point last was not zero, or the valve last followed.
+    code : Fault
+        First one that was latched; while none is, what is shown.
+    alarms : set of Fault
+        All that were raised.
+    armed_again : bool
+        In charge once more after a fault.
+    roll_sum, roll_square, samples : float
+        Of the true roll, every tick.
+    """
+
+    name = "watch"
+    period_ns = TICK_NS
+    hears: frozenset[int] = frozenset()
+
+    def __init__(
+        self,
+        bench: FaultyBench,
+        operator: Iterable[TimedAction] = (),
+        counts_from: Mapping[Any, float] | None = None,
+    ) -> None:
+        self._bench = bench
+        self._script = sorted(operator, key=lambda timed: timed.time_s)
+        self._start_ns: int | None = None
+        self._counts_from = dict(counts_from or {})
+        self.over_ns: int | None = None
+        self._noted = self._count()
+        now_ns = bench.lockstep.now_ns
+        self.active_ns = now_ns if bench.node.mode is Mode.ACTIVE else None
+        self.found_ns: int | None = None
+        self.halved_ns: int | None = None
+        self.noted_ns: int | None = None
+        self.pressed_ns = now_ns - TICK_NS
+        self.code = Fault.NONE
+        self.alarms: set[Fault] = set()
+        self.armed_again = False
+        self.roll_sum = self.roll_square = 0.0
+        self.samples = 0
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Hear nothing."""
+
+    def _count(self) -> int:
+        """All that the controller refused or missed so far."""
+        node = self._bench.node
+        inbox, monitors = node.inbox, node.monitors
+        streams = sum(sum(each.rejected.values()) + each.lost for each in inbox.watched)
+        return streams + inbox.foreign + (monitors.gates.discarded if monitors else 0)
+
+    def _apart(self, name: str) -> float:
+        """How far something is from the truth, or the ship from upright."""
+        plant, drive = self._bench.ship.plant, self._bench.ship.drive
+        if name == "over_roll_rad":
+            return abs(plant.roll_rad)
+        if name == "pressure_pa":
+            return abs(plant.pressure_pa - drive.setpoint_pa) if drive is not None else 0.0
+        return abs(float(getattr(self._bench.node.inbox, name)) - float(getattr(plant, name)))
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Look."""
+        if self._start_ns is None:
+            self._start_ns = now_ns
+        while self._script and now_ns - self._start_ns >= self._script[0].time_s * 1e9:
+            self._bench.ship.panel.press(self._script.pop(0).action)
+        node = self._bench.node
+        supervisor = node.supervisor
+        mode = supervisor.mode
+        if mode is Mode.FAULT:
+            if self.found_ns is None:
+                self.found_ns, self.code = now_ns, supervisor.fault
+        elif mode is Mode.ACTIVE:
+            self.armed_again |= self.found_ns is not None
+            if self.active_ns is None:
+                self.active_ns = now_ns
+            if self.halved_ns is None and supervisor.degraded:
+                self.halved_ns = now_ns
+        if self.found_ns is None and node.fault is not Fault.NONE:
+            self.code = node.fault
+        if self.noted_ns is None and self._count() > self._noted:
+            self.noted_ns = now_ns
+        if now_ns % (10 * TICK_NS) == 0:
+            self.alarms |= node.alarms.codes
+        ship = self._bench.ship
+        if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
+            ship.valve is not None and ship.valve.following
+        ):
+            self.pressed_ns = now_ns
+        roll = ship.plant.roll_rad
+        for name, limit in self._counts_from.items():
+            if self._apart(name) <= limit:
+                if name == "pressure_pa" and self.found_ns is None:
+                    self.over_ns = None  # a pump may cross its set-point
+            elif self.over_ns is None:
+                self.over_ns = now_ns
+        self.roll_sum += roll
+        self.roll_square += roll * roll
+        self.samples += 1
+        return ()

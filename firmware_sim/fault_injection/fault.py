@@ -1,0 +1,103 @@
+"""What every fault has."""
+
+from functools import partial
+from typing import Annotated, Any, Final
+
+from pydantic import AfterValidator
+
+from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span
+from firmware_sim.fault_injection.place import Bench
+from utank_hil.canbus import Address, load_catalogue
+from utank_hil.canbus.catalogue import NamedMessage
+from utank_hil.configuration import Section
+from utank_hil.configuration.known_keys import nearest
+from utank_hil.parameters import NotNegative, Positive, Problem
+
+SECOND_NS: Final = 1_000_000_000
+
+NODE_OF: Final = {
+    Address.SENSORS: "sensors",
+    Address.DRIVE: "drive",
+    Address.VALVE: "valve",
+    Address.OPERATOR: "panel",
+    Address.CONTROLLER: "controller",
+}
+"""Name of the emulated node at an address."""
+
+
+def _choice(of: str, choices: list[str], name: str) -> str:
+    if name in choices:
+        return name
+    near = nearest(name, choices)
+    hint = f"; did you mean {near}?" if near else f"; there are {', '.join(choices)}"
+    raise ValueError(f"is no {of}{hint}")
+
+
+def sent_by_nodes() -> list[str]:
+    """Names of the messages that an emulated node sends."""
+    return [each.codec.name for each in load_catalogue().messages if each.source in NODE_OF]
+
+
+MessageName = Annotated[
+    str, AfterValidator(lambda name: _choice("message of an emulated node", sent_by_nodes(), name))
+]
+AnyMessageName = Annotated[
+    str,
+    AfterValidator(
+        lambda name: _choice(
+            "message", [each.codec.name for each in load_catalogue().messages], name
+        )
+    ),
+]
+NodeName = Annotated[str, AfterValidator(partial(_choice, "node", list(NODE_OF.values())))]
+
+
+class Fault(Section):
+    """When a fault is there: `at_s` after the start, for `for_s` or till the end."""
+
+    at_s: NotNegative = 0.0
+    for_s: Positive | None = None
+
+    def span(self, start_ns: int) -> Span:
+        """When it is there, of a run whose faults count from `start_ns`."""
+        begin_ns = start_ns + round(self.at_s * SECOND_NS)
+        lasts_ns = NEVER_NS if self.for_s is None else round(self.for_s * SECOND_NS)
+        return Span(begin_ns, begin_ns + lasts_ns)
+
+    def node_names(self) -> tuple[str, ...]:
+        """Nodes that must be emulated for it."""
+        return ()
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:
+        """Place it; `seed` is of what it draws."""
+        raise NotImplementedError
+
+
+class MessageFault(Fault):
+    """A fault of one message, at the node that sends it."""
+
+    message: MessageName
+
+    @property
+    def named(self) -> NamedMessage:
+        """The message in the catalogue."""
+        return load_catalogue().named(self.message)
+
+    def node_names(self) -> tuple[str, ...]:
+        """The sender."""
+        return (NODE_OF[self.named.source],)
+
+
+def signal_problems(
+    message: NamedMessage, signals: dict[str, Any] | tuple[str, ...]
+) -> list[Problem]:
+    """Names that a message has no signal for."""
+    known = message.kind._fields  # type: ignore[attr-defined]  # a NamedTuple
+    return [
+        (
+            f"signals.{place}" if isinstance(signals, tuple) else f"values.{name}",
+            f"is no signal of {message.codec.name}; it has {', '.join(known)} (got {name!r})",
+        )
+        for place, name in enumerate(signals)
+        if name not in known
+    ]

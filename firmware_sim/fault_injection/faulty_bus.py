@@ -1,0 +1,182 @@
+"""The modelled bus with faults: bit errors and what CAN controllers do about them, and worse.
+
+A bit error is seen at the end of the frame, the worst case. The frame is destroyed by an error
+frame and takes part in the next arbitration again. The sender's transmit error counter rises by 8
+with each and falls by 1 with each frame that gets through (ISO 11898-1); above 127 the sender is
+error-passive, above 255 it is off the bus until the fault is over.
+
+What a gateway or a repeater may do besides, with no CAN controller noticing: lose, delay, double,
+change or swap frames.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Final, Literal
+
+from firmware_sim.fault_injection.faulty_node import Span
+from utank_hil.canbus import Frame
+from utank_hil.runtime import SimulatedBus
+
+ERROR_FRAME_BITS: Final = 17
+"""Flag and delimiter, at most 20 bits, less the end of frame that is not sent."""
+PASSIVE: Final = 128
+OFF: Final = 256
+
+Arrived = tuple[int, int, Frame]
+
+
+class Destroyed(Frame):
+    """An attempt that a bit error has destroyed."""
+
+    __slots__ = ()
+
+
+class OtherFrame(Frame):
+    """A frame with an 11-bit identifier, or a remote frame: it uses the bus and says nothing."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """What happens to a share of the frames on the bus.
+
+    Attributes
+    ----------
+    span : Span
+    does : str
+        "loses", "delays", "doubles", "changes" or "swaps" (with the next one of its identifier).
+    share : float
+    can_id : int or None
+        None for all.
+    by_ns : int
+        Delay.
+    """
+
+    span: Span
+    does: Literal["loses", "delays", "doubles", "changes", "swaps"]
+    share: float
+    can_id: int | None
+    by_ns: int = 0
+
+
+class FaultyBus:
+    """A simulated bus on which things go wrong.
+
+    Parameters
+    ----------
+    bit_rate : int
+    seed : int
+        Of what happens by chance.
+
+    Attributes
+    ----------
+    disturbances : list of Disturbance
+    bit_errors : list of tuple of (Span, float, int or None)
+        Share of the attempts that are destroyed, of one sender or of all.
+    error_counts : dict of int to int
+        Transmit error counter by sender.
+    statistics : callable
+        As of `SimulatedBus`; destroyed attempts count as frames.
+    warn, cut_off : callable
+        Called with time and sender, when it gets error-passive and as long as it is off the bus.
+    hear_others : callable
+        Called with each `OtherFrame` that was carried.
+    """
+
+    def __init__(self, bit_rate: int = 250_000, seed: int = 1) -> None:
+        self._bus = SimulatedBus(bit_rate)
+        self.statistics = self._bus.statistics
+        self._draw = random.Random(seed).random
+        self.disturbances: list[Disturbance] = []
+        self.bit_errors: list[tuple[Span, float, int | None]] = []
+        self.error_counts: dict[int, int] = {}
+        self._off_until_ns: dict[int, int] = {}
+        self._held: list[tuple[int, int, int, Frame]] = []
+        self._held_count = 0
+        self._swapped: dict[int, Arrived] = {}
+        self.warn: Callable[[int, int], None] = lambda *_: None
+        self.cut_off: Callable[[int, int], None] = lambda *_: None
+        self.hear_others: Callable[[OtherFrame], None] = lambda _: None
+
+    def queue(self, sender: int, frame: Frame, now_ns: int) -> None:
+        """As in `SimulatedBus`, with the attempts that will fail in front."""
+        if now_ns < self._off_until_ns.get(sender, 0):
+            self.cut_off(now_ns, sender)
+            return
+        for span, share, of in self.bit_errors:
+            if of in (None, sender) and span.holds(now_ns):
+                attempts = OFF // 8
+                while attempts and self._draw() < share:
+                    self._bus.queue(sender, Destroyed(*frame), now_ns, ERROR_FRAME_BITS)
+                    attempts -= 1
+        self._bus.queue(sender, frame, now_ns)
+
+    def carry_until(self, before_ns: int) -> list[Arrived]:
+        """As in `SimulatedBus`, with what is left of the frames."""
+        arrived = self._bus.carry_until(before_ns)
+        if self.bit_errors:
+            arrived = [each for each in arrived if self._count_errors(*each)]
+        others = [each for each in arrived if isinstance(each[2], OtherFrame)]
+        if others:
+            for _, _, frame in others:
+                self.hear_others(OtherFrame(*frame))
+            arrived = [each for each in arrived if not isinstance(each[2], OtherFrame)]
+        if self.disturbances:
+            arrived = [out for each in arrived for out in self._disturbed(each)]
+        if self._held:
+            while self._held and self._held[0][0] < before_ns:
+                time_ns, _, sender, frame = heappop(self._held)
+                arrived.append((time_ns, sender, frame))
+            arrived.sort(key=lambda each: each[0])
+        return arrived
+
+    def _count_errors(self, time_ns: int, sender: int, frame: Frame) -> bool:
+        """Count an attempt; say whether it got through."""
+        if time_ns < self._off_until_ns.get(sender, 0):
+            return False
+        count = self.error_counts.get(sender, 0)
+        if not isinstance(frame, Destroyed):
+            self.error_counts[sender] = max(count - 1, 0)
+            return True
+        self.error_counts[sender] = count + 8
+        if count < PASSIVE <= count + 8:
+            self.warn(time_ns, sender)
+        if count + 8 >= OFF:
+            ends = [span.end_ns for span, _, of in self.bit_errors if of in (None, sender)]
+            self._off_until_ns[sender] = max(ends)
+            self.error_counts[sender] = 0
+            self.cut_off(time_ns, sender)
+        return False
+
+    def _disturbed(self, arrived: Arrived) -> list[Arrived]:
+        """What becomes of a frame that got through."""
+        time_ns, sender, frame = arrived
+        before = self._swapped.pop(frame.can_id, None)
+        frames = [arrived] if before is None else [arrived, (time_ns, *before[1:])]
+        for each in self.disturbances:
+            if each.can_id not in (None, frame.can_id) or not each.span.holds(time_ns):
+                continue
+            if self._draw() >= each.share:
+                continue
+            if each.does == "loses":
+                frames.remove(arrived)
+            elif each.does == "doubles":
+                frames.append(arrived)
+            elif each.does == "changes":
+                place = int(self._draw() * len(frame.data))
+                data = bytearray(frame.data)
+                data[place] ^= 1 + int(self._draw() * 255)
+                frames[frames.index(arrived)] = (time_ns, sender, Frame(frame.can_id, bytes(data)))
+            elif each.does == "swaps" and before is None:
+                frames.remove(arrived)
+                self._swapped[frame.can_id] = arrived
+            elif each.does == "delays":
+                frames.remove(arrived)
+                self._held_count += 1
+                held = (time_ns + each.by_ns, self._held_count, sender, frame)
+                heappush(self._held, held)
+            break
+        return frames

@@ -1,0 +1,191 @@
+"""Faults of frames: lost, damaged, repeated, out of sequence."""
+
+import random
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Iterable
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from firmware_sim.fault_injection.fault import NODE_OF, MessageFault
+from firmware_sim.fault_injection.faulty_node import Span, Spoil, Spoiled
+from firmware_sim.fault_injection.place import Bench
+from utank_hil.canbus import Frame
+from utank_hil.canbus.codec import FRAME_BYTES
+from utank_hil.canbus.e2e import data_ids, profile2_crc
+
+_FOREIGN_DATA_IDS: Final = data_ids(127)
+"""Of no message of the catalogue."""
+
+
+class FrameFault(MessageFault):
+    """A fault of a message's frames."""
+
+    @abstractmethod
+    def spoil(self, seed: int) -> Spoil:
+        """What becomes of a frame."""
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:
+        """Spoil the frames where they leave their node."""
+        _, source, codec = self.named
+        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, self.spoil(seed), codec.can_id))
+
+
+class Lost(FrameFault):
+    """Frames are lost: all of them, or a share by chance."""
+
+    kind: Literal["lost"]
+    share: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """Of the frames, by chance."""
+
+    def spoil(self, seed: int) -> Spoil:
+        """As in `FrameFault`."""
+        draw = random.Random(seed).random
+        return lambda frame, _: () if draw() < self.share else (frame,)
+
+
+class Frozen(FrameFault):
+    """The same frame again and again."""
+
+    kind: Literal["frozen"]
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        first: list[Frame] = []
+
+        def freeze(frame: Frame, _: float) -> Iterable[Frame]:
+            first.append(frame) if not first else None
+            return first[:1]
+
+        return freeze
+
+
+class Replayed(FrameFault):
+    """The first frames of the fault over and over, in the place of the new ones."""
+
+    kind: Literal["replayed"]
+    frames: Annotated[int, Field(ge=2)]
+    """So many are repeated."""
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        kept: list[Frame] = []
+        count = [0]
+
+        def replay(frame: Frame, _: float) -> Iterable[Frame]:
+            if len(kept) < self.frames:
+                kept.append(frame)
+                return (frame,)
+            count[0] += 1
+            return (kept[(count[0] - 1) % self.frames],)
+
+        return replay
+
+
+class Doubled(FrameFault):
+    """Every frame is sent so many times."""
+
+    kind: Literal["doubled"]
+    times: Annotated[int, Field(ge=2)] = 2
+    """So often each is sent."""
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        return lambda frame, _: (frame,) * self.times
+
+
+class Inserted(FrameFault):
+    """Beside each new frame one of some cycles ago."""
+
+    kind: Literal["inserted"]
+    back: Annotated[int, Field(ge=1)]
+    """So many cycles ago."""
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        old: deque[Frame] = deque(maxlen=self.back + 1)
+
+        def insert(frame: Frame, _: float) -> Iterable[Frame]:
+            old.append(frame)
+            return (frame, old[0]) if len(old) > self.back else (frame,)
+
+        return insert
+
+
+class Counter(FrameFault):
+    """The counter steps by another number, rightly protected; by zero it stands still."""
+
+    kind: Literal["counter"]
+    step: Annotated[int, Field(ge=0, le=15)]
+    """From frame to frame; a sound one steps by 1."""
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        codec = self.named.codec
+        counter: list[int] = []
+
+        def count(frame: Frame, _: float) -> Iterable[Frame]:
+            message = codec.decode(frame.data)
+            counter.append(frame.data[1] & 15 if not counter else counter.pop() + self.step)
+            return (Frame(codec.can_id, codec.encode(message, counter[0] & 15)),)
+
+        return count
+
+
+class Damaged(FrameFault):
+    """A fault of one frame of so many."""
+
+    every: Annotated[int, Field(ge=1)] = 1
+
+    @abstractmethod
+    def damage(self, data: bytes) -> bytes:
+        """The frame's bytes instead."""
+
+    def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
+        """As in `FrameFault`."""
+        count = [-1]
+
+        def harm(frame: Frame, _: float) -> Iterable[Frame]:
+            count[0] += 1
+            if count[0] % self.every:
+                return (frame,)
+            return (Frame(frame.can_id, self.damage(frame.data)),)
+
+        return harm
+
+
+class Corrupted(Damaged):
+    """Two bits of a byte are wrong, and no CAN controller has noticed."""
+
+    kind: Literal["corrupted"]
+    byte: Annotated[int, Field(ge=0, lt=FRAME_BYTES)] = 3
+    """Whose bits are wrong."""
+
+    def damage(self, data: bytes) -> bytes:
+        """As in `Damaged`."""
+        wrong = bytearray(data)
+        wrong[self.byte] ^= 0x24
+        return bytes(wrong)
+
+
+class WrongDataId(Damaged):
+    """The CRC is that of another message's data ID."""
+
+    kind: Literal["data_id"]
+
+    def damage(self, data: bytes) -> bytes:
+        """As in `Damaged`."""
+        return bytes([profile2_crc(data, _FOREIGN_DATA_IDS)]) + data[1:]
+
+
+class WrongLength(Damaged):
+    """The frame is too short."""
+
+    kind: Literal["length"]
+    length: Annotated[int, Field(ge=0, lt=FRAME_BYTES)]
+    """Bytes that are left."""
+
+    def damage(self, data: bytes) -> bytes:
+        """As in `Damaged`."""
+        return data[: self.length]

@@ -1,0 +1,245 @@
+"""Faults of what a message says: it stays intact, in sequence and in its cycle."""
+
+import random
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from typing import Annotated, Any, Literal, get_type_hints
+
+from pydantic import Field, model_validator
+
+from firmware_sim.fault_injection.fault import NODE_OF, MessageFault, signal_problems
+from firmware_sim.fault_injection.faulty_node import Span, Spoiled
+from firmware_sim.fault_injection.place import Bench
+from utank_hil.canbus import Frame
+from utank_hil.canbus.codec import FRAME_BYTES, field_kind
+from utank_hil.parameters import Finite, Positive, refuse
+
+Change = Callable[[Sequence[Any], float], Sequence[Any]]
+"""The values instead of the true ones, so many s after the fault began."""
+
+
+class SignalFault(MessageFault):
+    """A fault of some signals of a message."""
+
+    signals: Annotated[tuple[str, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _known_numbers(self) -> "SignalFault":
+        problems = signal_problems(self.named, self.signals)
+        hints = get_type_hints(self.named.kind)
+        problems += [
+            (f"signals.{place}", f"is no measured quantity (got {name!r})")
+            for place, name in enumerate(self.signals)
+            if not problems and self._measured and hints[name] is not float
+        ]
+        refuse("", problems)
+        return self
+
+    @property
+    def _measured(self) -> bool:
+        """Whether the signals must be physical quantities."""
+        return True
+
+    @abstractmethod
+    def change(self, seed: int) -> Change:
+        """What becomes of the values."""
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:
+        """Alter the message where it leaves its node."""
+        kind, source, codec = self.named
+        places = [kind._fields.index(name) for name in self.signals]  # type: ignore[attr-defined]
+        change = self.change(seed)
+
+        def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
+            message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
+            if message is None:  # another fault has been at it
+                return (frame,)
+            values = list(message)
+            changed = change([values[place] for place in places], since_s)
+            for place, value in zip(places, changed, strict=True):
+                values[place] = value
+            return (Frame(codec.can_id, codec.encode(kind(*values), frame.data[1] & 15)),)
+
+        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, alter, codec.can_id))
+
+
+class Stuck(SignalFault):
+    """The signals stay as they were when the fault began."""
+
+    kind: Literal["stuck"]
+
+    @property
+    def _measured(self) -> bool:
+        return False
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        held: list[Sequence[Any]] = []
+
+        def stay(values: Sequence[Any], _: float) -> Sequence[Any]:
+            held.append(values) if not held else None
+            return held[0]
+
+        return stay
+
+
+class Offset(SignalFault):
+    """The signals are off by a constant."""
+
+    kind: Literal["offset"]
+    by: Finite
+    """Added to each of them, in their unit."""
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        return lambda values, _: [value + self.by for value in values]
+
+
+class Drift(SignalFault):
+    """The signals run away."""
+
+    kind: Literal["drift"]
+    by_per_s: Finite
+    """Added to each of them with every second."""
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        return lambda values, since_s: [value + self.by_per_s * since_s for value in values]
+
+
+class Noise(SignalFault):
+    """White Gaussian noise of a standard deviation comes on top."""
+
+    kind: Literal["noise"]
+    deviation: Positive
+    """Standard deviation, in their unit."""
+
+    def change(self, seed: int) -> Change:
+        """As in `SignalFault`."""
+        draw = random.Random(seed).gauss
+        return lambda values, _: [value + draw(0.0, self.deviation) for value in values]
+
+
+class Spikes(SignalFault):
+    """One sample of so many is off."""
+
+    kind: Literal["spikes"]
+    by: Finite
+    """Added to that sample."""
+    every: Annotated[int, Field(ge=2)]
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        count = [-1]
+
+        def strike(values: Sequence[Any], _: float) -> Sequence[Any]:
+            count[0] += 1
+            return values if count[0] % self.every else [value + self.by for value in values]
+
+        return strike
+
+
+class Sign(SignalFault):
+    """The signals have the wrong sign."""
+
+    kind: Literal["sign"]
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        return lambda values, _: [-value for value in values]
+
+
+class Swapped(SignalFault):
+    """Two signals stand in each other's place."""
+
+    kind: Literal["swapped"]
+    signals: Annotated[tuple[str, ...], Field(min_length=2, max_length=2)]
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        return lambda values, _: values[::-1]
+
+
+class Late(SignalFault):
+    """The signals are as they were some time ago."""
+
+    kind: Literal["late"]
+    by_s: Positive
+    """Age of what is sent."""
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        cycle_s = self.named.codec.cycle_ns * 1e-9
+        line: deque[Sequence[Any]] = deque(maxlen=round(self.by_s / cycle_s) + 1)
+
+        def delay(values: Sequence[Any], _: float) -> Sequence[Any]:
+            line.append(values)
+            return line[0]
+
+        return delay
+
+
+def value_of(hint: Any, written: float | bool | str | None) -> Any:
+    """A signal's value as a configuration writes it: a number, a name of its table, or nothing.
+
+    Raises
+    ------
+    ValueError
+        If the signal can't have it.
+    """
+    kind = field_kind(hint)
+    if isinstance(written, str):
+        members = getattr(kind, "__members__", {})
+        if written not in members:
+            raise ValueError(f"must be one of {', '.join(members) or 'its numbers'}")
+        return members[written]
+    if isinstance(written, bool) is not (kind is bool):
+        raise ValueError("must be true or false" if kind is bool else "must not be true or false")
+    if kind is float:
+        return float("nan") if written is None else float(written)
+    if written is None or kind is bool:
+        return written
+    if written != int(written):
+        raise ValueError("must be a whole number")
+    return int(written)
+
+
+class Value(MessageFault):
+    """The signals say this, nothing standing for "not available"."""
+
+    kind: Literal["value"]
+    values: Annotated[dict[str, float | bool | str | None], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _known_values(self) -> "Value":
+        refuse("", value_problems(self.named, self.values))
+        return self
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Alter the message where it leaves its node."""
+        kind, source, codec = self.named
+        hints = get_type_hints(kind)
+        values = {name: value_of(hints[name], written) for name, written in self.values.items()}
+
+        def alter(frame: Frame, _: float) -> Iterable[Frame]:
+            message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
+            if message is None:
+                return (frame,)
+            altered = message._replace(**values)
+            return (Frame(codec.can_id, codec.encode(altered, frame.data[1] & 15)),)
+
+        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, alter, codec.can_id))
+
+
+def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
+    """What is wrong with values written for a message."""
+    problems = signal_problems(named, values)
+    hints = get_type_hints(named.kind)
+    for name, written in values.items():
+        try:
+            if name in hints:
+                value_of(hints[name], written)
+        except ValueError as error:
+            problems.append((f"values.{name}", f"{error} (got {written!r})"))
+    return problems

@@ -1,0 +1,246 @@
+"""Faults of the bus, and nodes on it that should not be there."""
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from firmware_sim.fault_injection.fault import (
+    SECOND_NS,
+    AnyMessageName,
+    Fault,
+    MessageName,
+    NodeName,
+)
+from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
+from firmware_sim.fault_injection.faulty_node import Span
+from firmware_sim.fault_injection.place import Bench
+from firmware_sim.fault_injection.signals import value_of, value_problems
+from utank_hil.canbus import Frame, Station, load_catalogue
+from utank_hil.canbus.codec import FRAME_BYTES
+from utank_hil.parameters import Positive, refuse
+from utank_hil.runtime.panel import OperatorPanel, TimedAction
+
+BIT_RATE: Final = 250_000
+_SHARE = Annotated[float, Field(gt=0, le=1)]
+
+
+def _identifier(written: str) -> str:
+    try:
+        number = int(written, 16)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 1 << 29:
+        raise ValueError("must be a hexadecimal identifier of at most 29 bits, such as '08FF1080'")
+    return written
+
+
+Identifier = Annotated[str, AfterValidator(_identifier)]
+
+
+class BusFault(Fault):
+    """A fault of the modelled bus; there is none of a real one."""
+
+    def node_names(self) -> tuple[str, ...]:
+        """Lockstep alone has a bus that can fail; it has the controller, too."""
+        return ("controller",)
+
+
+class Disturbed(BusFault):
+    """A gateway loses, delays, doubles, changes or swaps a share of the frames."""
+
+    kind: Literal["gateway"]
+    does: Literal["loses", "delays", "doubles", "changes", "swaps"]
+    """What becomes of the frames."""
+    share: _SHARE = 1.0
+    """Of the frames, by chance."""
+    message: MessageName | None = None
+    """All of them if none is named."""
+    by_s: Positive | None = None
+    """Delay."""
+
+    @model_validator(mode="after")
+    def _delay(self) -> "Disturbed":
+        if (self.by_s is None) is (self.does == "delays"):
+            refuse("", [("by_s", "is for does: delays, which needs it")])
+        return self
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Disturb the bus."""
+        assert bench.bus is not None
+        can_id = None if self.message is None else load_catalogue().named(self.message).codec.can_id
+        by_ns = round((self.by_s or 0.0) * SECOND_NS)
+        bench.bus.disturbances.append(Disturbance(span, self.does, self.share, can_id, by_ns))
+
+
+class BitErrors(BusFault):
+    """A share of the attempts to send is destroyed; of one node, as by a broken transceiver."""
+
+    kind: Literal["bit_errors"]
+    share: _SHARE
+    """Of the attempts to send, by chance."""
+    node: NodeName | None = None
+    """Whose transceiver is broken; without it everybody's frames."""
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Disturb the bus; the nodes' interfaces report what their kernel would."""
+        assert bench.bus is not None
+        names = list(bench.nodes)
+        sender = None if self.node is None else names.index(self.node)
+        bench.bus.bit_errors.append((span, self.share, sender))
+
+        def report(reason: str, time_ns: int, of: int) -> None:
+            if of < len(names):
+                bench.nodes[names[of]].link_error(time_ns, reason)
+
+        bench.bus.warn = lambda time_ns, of: report("error-passive on sending", time_ns, of)
+        bench.bus.cut_off = lambda time_ns, of: report("bus-off", time_ns, of)
+
+
+class _Flooder:
+    """Keeps so much of the bus in use, one frame after another."""
+
+    period_ns = 1_000_000
+
+    def __init__(self, name: str, frame: Frame, span: Span, per_s: float) -> None:
+        self.name = name
+        self._frame, self._span = frame, span
+        self._per_tick = per_s * self.period_ns / SECOND_NS
+        self._due = 0.0
+        self.hears: frozenset[int] = frozenset()
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Hear nothing."""
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Send what is due."""
+        if not self._span.holds(now_ns):
+            return ()
+        self._due += self._per_tick
+        count = int(self._due)
+        self._due -= count
+        return (self._frame,) * count
+
+
+class Flood(Fault):
+    """A node fills a share of the bus with frames of one identifier.
+
+    Attributes
+    ----------
+    identifier : str
+        Hexadecimal, as candump writes it.
+    share : float
+        Of a bus of 250 kbit/s; above 1 they queue up.
+    format : str
+        "extended"; "standard" and "remote" frames are handed to no node.
+    length : int
+        Data bytes.
+    """
+
+    kind: Literal["flood"]
+    identifier: Identifier
+    share: Annotated[float, Field(gt=0, le=3)]
+    format: Literal["extended", "standard", "remote"] = "extended"
+    length: Annotated[int, Field(ge=0, le=FRAME_BYTES)] = FRAME_BYTES
+
+    @model_validator(mode="after")
+    def _short(self) -> "Flood":
+        if self.format == "standard" and int(self.identifier, 16) >= 1 << 11:
+            refuse("", [("identifier", "must be below 800 in a standard frame")])
+        return self
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Join the bus."""
+        from utank_hil.runtime import frame_bits
+
+        # a standard identifier wins over the extended ones that begin with it
+        number = int(self.identifier, 16)
+        place = number << 18 if self.format == "standard" else number
+        plain = Frame(place, bytes(self.length))
+        frame = plain if self.format == "extended" else OtherFrame(*plain)
+        if self.format != "extended" and bench.bus is not None:
+            controller = bench.nodes["controller"]
+            bench.bus.hear_others = lambda _: controller.other_frames(1)
+        per_s = self.share * BIT_RATE / frame_bits(plain)
+        bench.joining.append(_Flooder(f"flood {len(bench.joining)}", frame, span, per_s))
+
+    def node_names(self) -> tuple[str, ...]:
+        """Frames of other kinds are counted by the controller in lockstep."""
+        return () if self.format == "extended" else ("controller",)
+
+
+class _Sender:
+    """Sends one message in its cycle, or once if it has none."""
+
+    hears: frozenset[int] = frozenset()
+
+    def __init__(self, name: str, fault: "Impostor", span: Span) -> None:
+        kind, _, codec = load_catalogue().named(fault.message)
+        self.name = name
+        self.period_ns = codec.cycle_ns or 10_000_000
+        self._once = not codec.cycle_ns
+        self._span, self._codec = span, codec
+        self._counter = fault.counter
+        hints = kind.__annotations__
+        self._message = kind(
+            **{field: value_of(hints[field], value) for field, value in fault.values.items()}
+        )
+        self._done = False
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Hear nothing."""
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Send."""
+        if not self._span.holds(now_ns) or (self._once and self._done):
+            return ()
+        self._done = True
+        self._counter = (self._counter + 1) & 15
+        return (Frame(self._codec.can_id, self._codec.encode(self._message, self._counter)),)
+
+
+class Impostor(Fault):
+    """A second node sends a message as well, in the cycle, rightly protected."""
+
+    kind: Literal["impostor"]
+    message: AnyMessageName
+    values: dict[str, float | bool | str | None]
+    counter: Annotated[int, Field(ge=0, le=15)] = 0
+    """Of the last frame before its first one."""
+
+    @model_validator(mode="after")
+    def _known_values(self) -> "Impostor":
+        named = load_catalogue().named(self.message)
+        problems = value_problems(named, self.values)
+        defaults: Any = getattr(named.kind, "_field_defaults", {})
+        missing = [
+            name
+            for name in named.kind._fields  # type: ignore[attr-defined]  # a NamedTuple
+            if name not in self.values and name not in defaults
+        ]
+        problems += [(f"values.{name}", "is required but missing") for name in missing]
+        refuse("", problems)
+        return self
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Join the bus."""
+        bench.joining.append(_Sender(f"impostor {len(bench.joining)}", self, span))
+
+
+class SecondPanel(Fault):
+    """A second operator's station, whose times count from when it first hears the controller."""
+
+    kind: Literal["second_panel"]
+    operator: tuple[TimedAction, ...] = ()
+    """What is done there."""
+
+    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
+        """Join the bus."""
+        panel = OperatorPanel(
+            load_catalogue(),
+            configuration_version=bench.version,
+            script=self.operator,
+            station=Station.OPERATOR_2,
+        )
+        panel.name = "second panel"
+        bench.joining.append(panel)

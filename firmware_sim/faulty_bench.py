@@ -1,0 +1,133 @@
+"""Ship's side and controller on one simulated bus, in which faults can be placed."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from firmware_sim.fault_injection.breakable_law import BreakableLaw
+from firmware_sim.fault_injection.faulty_bus import FaultyBus
+from firmware_sim.fault_injection.faulty_node import FaultyNode
+from firmware_sim.fault_injection.kinds import AnyFault, place_all
+from firmware_sim.fault_injection.place import Bench
+from firmware_sim.scenario import Scenario
+from firmware_sim.ship_side import ShipSide, build_ship_side
+from utank_hil.arrays import FloatArray
+from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.configuration import ControllerConfig
+from utank_hil.control import BuiltLaw
+from utank_hil.control.interface import Controller
+from utank_hil.retuning import Retuner
+from utank_hil.runtime import Lockstep, Node
+from utank_hil.runtime.controller_node import ControllerNode
+from utank_hil.runtime.lockstep import Trace
+from utank_hil.runtime.panel import TimedAction
+
+
+class FaultyBench:
+    """A bench in lockstep in which faults can be placed, at the start or under way.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its own faults are left to the caller.
+    config : ControllerConfig
+    law : BuiltLaw, optional
+        Of the controller; it is designed without.
+    seed : int
+    script : tuple of TimedAction
+        What the operator does.
+    trace : callable, optional
+        As `Lockstep` takes it.
+    sink : callable, optional
+        Takes the controller's telemetry, one row of so many ticks.
+    sink_every : int
+    retuner : Retuner, optional
+        Of a controller that retunes itself; its law can't be made to fail.
+    estimating : Retuner, optional
+        Who estimates sea and ship.
+
+    Attributes
+    ----------
+    ship : ShipSide
+    nodes : dict of str to FaultyNode
+        Sensors, drive, valve, panel and controller, as far as there are.
+    bus : FaultyBus
+    lockstep : Lockstep
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        config: ControllerConfig,
+        law: BuiltLaw | None = None,
+        *,
+        seed: int,
+        script: tuple[TimedAction, ...],
+        trace: Trace | None = None,
+        sink: Callable[[FloatArray], None] | None = None,
+        sink_every: int = 1,
+        retuner: Retuner | None = None,
+        estimating: Retuner | None = None,
+    ) -> None:
+        self._law = law or build_law(config)
+        self._config, self._trace, self._seed = config, trace, seed
+        self._sink, self._sink_every = sink, sink_every
+        self._retuner, self._estimating = retuner, estimating
+        self.ship: ShipSide = build_ship_side(scenario, seed, script)
+        self.breakable: BreakableLaw | None = None
+        self._controller = FaultyNode(self._new_controller())
+        self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
+        self.nodes["controller"] = self._controller
+        self.bus = FaultyBus(config.bit_rate, seed)
+        self._joined: list[Node] = []
+        self.lockstep = Lockstep(list(self.nodes.values()), self.bus, trace)
+
+    def _new_controller(self) -> ControllerNode:
+        def controller() -> Controller:
+            self.breakable = BreakableLaw(self._law.controller())
+            return self.breakable
+
+        law = replace(self._law, controller=controller)
+        return build_controller_node(
+            self._config,
+            law,
+            retuner=self._retuner,
+            estimating=self._estimating,
+            sink=self._sink,
+            sink_every=self._sink_every,
+        )
+
+    @property
+    def node(self) -> ControllerNode:
+        """The controller that runs at present."""
+        assert isinstance(self._controller.node, ControllerNode)
+        return self._controller.node
+
+    def restart_controller(self) -> None:
+        """Have a new controller take the place of the old one, as after its process died."""
+        self._controller.node = self._new_controller()
+
+    def join(self, nodes: Sequence[Node]) -> None:
+        """Have more nodes on the bus from now on, which must be a time at which all are due."""
+        self._joined += nodes
+        every = [*self.nodes.values(), *self._joined]
+        self.lockstep = Lockstep(every, self.bus, self._trace, self.lockstep.now_ns)
+
+    def place(self, faults: Sequence[AnyFault]) -> None:
+        """Place faults, whose times count from now."""
+        bench = Bench(
+            self.nodes,
+            self.ship.plant,
+            self.ship.drive,
+            self.ship.valve,
+            self.ship.vessel.version,
+            self.bus,
+            self.breakable,
+            self.restart_controller,
+        )
+        place_all(faults, bench, self.lockstep.now_ns, self._seed)
+        if bench.joining:
+            self.join(bench.joining)
+
+    def run(self, until_ns: int) -> None:
+        """Run to a time."""
+        self.lockstep.run_until(until_ns)

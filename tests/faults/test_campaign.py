@@ -1,0 +1,244 @@
+"""The campaign: its rows against the fault table, its judgement, and all of it in one sea."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from firmware_sim.commands.faults import faults
+from firmware_sim.fault_campaign.campaign import Campaign, Row
+from firmware_sim.fault_campaign.live import ACTIONS
+from firmware_sim.fault_campaign.runner import run_rows
+from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy
+from firmware_sim.fault_campaign.verdict import Result, judged
+from firmware_sim.fault_campaign.watch import first_difference
+from utank_hil.assembly import build_law
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.configuration import ConfigError, load_config
+from utank_hil.runtime.faults import FAULTS
+
+CAMPAIGN = load_config(Path("configs/faults/campaign.yaml"), Campaign)
+ROWS = {row.id: row for row in CAMPAIGN.rows}
+
+
+def test_every_fault_of_the_table_is_provoked_by_a_row() -> None:
+    provoked = {code for row in CAMPAIGN.rows for code in row.codes}
+    assert provoked == {row.code.name for row in FAULTS}
+
+
+def test_every_requirement_has_rows_or_says_what_shows_it_and_stands_in_the_document() -> None:
+    page = Path("docs/faults.md").read_text()
+    for each in CAMPAIGN.requirements:
+        assert f"| {each.id} |" in page
+        for place in each.elsewhere.split(", "):
+            assert not place or Path(place.strip("`")).exists()
+    for row in CAMPAIGN.rows:
+        assert f"`{row.id}`" in page
+
+
+def test_every_live_row_has_what_it_does_or_what_shows_it() -> None:
+    for row in CAMPAIGN.live:
+        assert (row.does in ACTIONS) is not bool(row.elsewhere)
+        if row.elsewhere.startswith("tests/"):
+            assert Path(row.elsewhere).is_file()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("id: motion-silent,", "id: tank-silent,", "rows.9.id"),
+        ("meets: [F05]", "meets: [F99]", "rows.26.meets"),
+        ("setup: wind", "setup: calm", "rows"),
+        ("codes: [LEVEL_LIMIT]", "codes: [LEVEL]", "rows"),
+        ("controller: on_off", "controller: off", "setups.valve.controller"),
+        ("meets: [F17]", "meets: [F18]", "requirements"),
+    ],
+)
+def test_what_is_wrong_in_a_campaign_is_named(tmp_path: Path, old: str, new: str, key: str) -> None:
+    text = Path("configs/faults/campaign.yaml").read_text()
+    assert old in text
+    scenarios = Path("configs/scenarios").resolve()
+    path = tmp_path / "campaign.yaml"
+    wrong = text.replace(old, new).replace(
+        "meets: [F17, T07]", "meets: [T07]" if "F17" in old else "meets: [F17, T07]"
+    )
+    path.write_text(wrong.replace("../scenarios", str(scenarios)))
+    with pytest.raises(ConfigError) as caught:
+        load_config(path, Campaign)
+    assert any(problem.key.startswith(key) for problem in caught.value.problems)
+
+
+GOOD = Outcome(
+    "roll-sign-flipped", 1, found_ms=500.0, zero_ms=520.0, mode="FAULT", code="MOTION_SIGN_FLIP",
+    was_active=True, roll_variance=1.0, passive_variance=1.0, window_s=60.0, wire="differs",
+)  # fmt: skip
+
+
+def verdict(row: str, *outcomes: Outcome) -> Result:
+    return judged(ROWS[row], CAMPAIGN.setups[ROWS[row].setup], "", outcomes)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"found_ms": 1001.0}, "found after 1001 ms, 1000 allowed"),
+        ({"found_ms": None}, "was not found"),
+        ({"zero_ms": 751.0}, "pressure at zero after 751 ms, 750 allowed"),
+        ({"mode": "ACTIVE"}, "in charge again"),
+        ({"armed_again": True}, "armed again"),
+        ({"code": "OVERRUN"}, "called OVERRUN"),
+        ({"refused": 1}, "refused 1"),
+        ({"wire": ""}, "did not reach the bus"),
+        ({"was_active": False}, "not in charge before"),
+        ({"roll_variance": 1.2}, "rolls 1.10 times"),
+        ({"error": "ValueError: x"}, "ValueError"),
+    ],
+)
+def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) -> None:
+    assert verdict("roll-sign-flipped", GOOD, GOOD).passed
+    result = verdict("roll-sign-flipped", GOOD, replace(GOOD, seed=2, **change))  # type: ignore[arg-type]
+    assert not result.passed
+    assert any(words in problem for problem in result.problems)
+
+
+def test_each_reaction_asks_for_its_own() -> None:
+    calm = replace(GOOD, mode="ACTIVE", found_ms=None, code="NONE")
+    assert verdict("roll-spike", replace(calm, noted_ms=10.0)).passed
+    assert not verdict("roll-spike", replace(calm, noted_ms=10.0, halved_ms=20.0)).passed
+    assert not verdict("roll-spike", calm).passed
+    assert verdict("roll-100-ms-late", calm).passed
+    assert not verdict("roll-100-ms-late", GOOD).passed
+    assert verdict("noise-10-fold", replace(calm, halved_ms=50.0, alarms=("NOISE",))).passed
+    ramp = replace(GOOD, code="TANK_SILENT", found_ms=990.0, zero_ms=1500.0, halved_ms=100.0)
+    assert verdict("tank-silent", ramp).passed
+    assert not verdict("tank-silent", replace(ramp, halved_ms=130.0)).passed
+    assert not verdict("tank-silent", replace(ramp, steepest_pa_s=300e3)).passed
+    assert verdict("controller-killed", replace(GOOD, code="NONE", zero_ms=60.0)).passed
+    assert not verdict("controller-killed", replace(GOOD, code="NONE", zero_ms=110.0)).passed
+    refused = replace(calm, was_active=False, mode="STANDBY")
+    assert verdict("held-arm-bit", refused).passed
+    assert not verdict("held-arm-bit", replace(refused, was_active=True)).passed
+
+
+def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:
+    later = replace(GOOD, seed=2, found_ms=700.0, zero_ms=730.0)
+    assert verdict("roll-sign-flipped", GOOD, later).found_ms == 700.0
+    missed = replace(GOOD, seed=2, found_ms=None)
+    assert verdict("roll-sign-flipped", GOOD, missed).as_json()["found_ms"] is None
+
+
+def test_first_difference_of_two_logs() -> None:
+    log = [(1, 2, b"a"), (3, 2, b"b")]
+    assert first_difference(log, log, 10) is None
+    assert first_difference(log, [log[0], (3, 2, b"c")], 10) == (log[1], (3, 2, b"c"))
+    assert first_difference(log, log[:1], 10) == (log[1], None)
+    assert first_difference(log, log[:1], 3) is None  # as far as both were followed
+
+
+def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing() -> None:
+    kept: list[int] = []
+    assert in_a_copy(lambda: kept.append(1) or len(kept)) == 1
+    assert not kept
+    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
+        in_a_copy(lambda: 1 / 0)
+
+
+@pytest.mark.slow
+def test_a_stopped_ship_alone_rolls_as_she_does_on_the_bench() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    row = ROWS["motion-silent"]
+    law = build_law(setup.config)
+    alone, bench = (
+        outcome_of(setup, law, row.model_copy(update={"followed_s": followed_s}))
+        for followed_s in (2.0, 12.0)
+    )
+    assert alone.roll_variance == pytest.approx(bench.roll_variance, rel=1e-9)
+
+
+def outcome_of(setup, law, row: Row) -> Outcome:
+    sea = Sea(CAMPAIGN, setup, law, 1, Window(12.0, 12.0))
+    sea.prepare([row])
+    return sea.outcome(row)
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Result]:
+    outcomes = run_rows(
+        CAMPAIGN, CAMPAIGN.rows, [1], Window(60.0, 20.0), lambda _: None, lambda: False
+    )
+    return {row.id: verdict(row.id, *outcomes[row.id]) for row in CAMPAIGN.rows}
+
+
+@pytest.mark.slow
+def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus(
+    results: dict[str, Result],
+) -> None:
+    failed = {name: each.problems for name, each in results.items() if not each.passed}
+    # the mean of several seas is asked for, and one of them need not be
+    for name in ("both-signs-from-start", "valve-stuck"):
+        assert all(why.startswith("rolls 1.") for why in failed.pop(name, ()))
+    assert not failed
+    for each in results.values():
+        assert math.isfinite(each.roll_ratio)
+        assert each.wire or not each.row.faults
+
+
+@pytest.mark.slow
+def test_the_same_rows_again_give_the_same_to_the_last_digit(results: dict[str, Result]) -> None:
+    names = ("noise-10-fold", "bit-errors-2-percent", "gateway-loses-5-percent", "rate-stuck")
+    again = run_rows(
+        CAMPAIGN, [ROWS[name] for name in names], [1], Window(60.0, 20.0), lambda _: None,
+        lambda: False, workers=1,
+    )  # fmt: skip
+    for name in names:
+        assert verdict(name, *again[name]).as_json() == results[name].as_json()
+
+
+def invoke(*arguments: str):
+    app = typer.Typer()
+    app.command()(faults)
+    return CliRunner().invoke(app, arguments)
+
+
+@pytest.mark.slow
+def test_command_prints_one_object_and_writes_junit_and_recordings(tmp_path: Path) -> None:
+    done = invoke("--rows", "roll-spike,F26", "--seeds", "1", "--json",
+                  "--junit", str(tmp_path / "junit.xml"), "--out", str(tmp_path))  # fmt: skip
+    assert done.exit_code == ExitCode.OK, done.output
+    told = json.loads(done.stdout)
+    assert {row["id"] for row in told["rows"]} == {"roll-spike", "roll-spikes"}
+    assert {row["verdict"] for row in told["rows"]} == {"pass"}
+    for row in told["rows"]:
+        assert row["requirement"].startswith("F12: spike")
+        assert Path(row["recording"]).exists()
+    assert told["not_run"]
+    assert all(each["id"].startswith("live-") for each in told["not_run"])
+    suite = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    assert suite.get("tests") == str(2 + len(told["not_run"]))
+    assert suite.get("failures") == "0"
+
+
+@pytest.mark.slow
+def test_a_row_that_fails_is_told_by_the_exit_code(tmp_path: Path) -> None:
+    text = Path("configs/faults/campaign.yaml").read_text()
+    line = next(each for each in text.splitlines() if "id: roll-spike," in each)
+    scenarios = Path("configs/scenarios").resolve()
+    path = tmp_path / "strict.yaml"
+    strict = text.replace(line, line.replace("within_ms: 30", "within_ms: 1"))
+    path.write_text(strict.replace("../scenarios", str(scenarios)))
+    done = invoke(str(path), "--rows", "roll-spike", "--seeds", "1")
+    assert done.exit_code == ExitCode.REFUSED
+    assert "1 allowed" in done.output
+
+
+@pytest.mark.parametrize(("arguments", "words"), [(["--rows", "no-such"], "no row"),
+                                                  (["none.yaml"], "none.yaml")])  # fmt: skip
+def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
+    done = invoke(*arguments)
+    assert done.exit_code == ExitCode.USAGE
+    assert words in done.output
