@@ -30,11 +30,15 @@ from utank_hil.canbus import (
     SensorTank,
     Station,
     Switch,
+    ValveFault,
+    ValveState,
+    ValveStatus,
 )
 from utank_hil.configuration import load_config
 from utank_hil.control import LevelObserver
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.inbox import MEASURED, Inbox
+from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.tick import TICK_NS
 
 NAN = math.nan
@@ -324,3 +328,172 @@ def test_emulated_sensors_are_what_a_law_measures() -> None:
 def test_a_measurement_that_does_not_exist_is_refused_with_those_that_do() -> None:
     with pytest.raises(ValueError, match="no measurement 'rol_rad'; there are roll_rad"):
         measure_of(("level_m", "rol_rad"))
+
+
+CYCLE_NS = CATALOGUE.codec(SensorTank).cycle_ns
+
+
+def listening(**on_board: bool) -> Line:
+    line = Line()
+    line.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M, **on_board)
+    return line
+
+
+def test_new_it_knows_nothing_and_trusts_nothing() -> None:
+    for inbox in (Inbox(CATALOGUE, VERSION), Inbox(CATALOGUE, VERSION, pump=False, valve=True)):
+        for name in ("roll_rad", "roll_rate_rad_s", "port_level_m", "starboard_level_m",
+                     "pressure_pa", "power_w", "frames", "foreign", "tank_cycles"):  # fmt: skip
+            assert getattr(inbox, name) == 0, name
+        for name in ("motion_ns", "tank_ns", "valve_ns", "valve_echo_ns", "conflict_ns"):
+            assert getattr(inbox, name) == NEVER_HEARD_NS, name
+        assert inbox.valve_opening == 1.0
+        assert inbox.valve_state is None
+        assert inbox.drive_fault is DriveFault.NONE
+        for name in ("high_level", "drive_held_back", "versions_match", "panel_matches",
+                     "protection_valid"):  # fmt: skip
+            assert getattr(inbox, name) is False, name
+
+
+def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> None:
+    line = listening()
+    inbox = line.inbox
+    assert inbox.drive_state is None
+    assert {inbox.pump_ns, inbox.drive_ns, inbox.echo_ns} == {NEVER_HEARD_NS}
+    beats = {address: CATALOGUE.receiver(Heartbeat, address).can_id for address in Address
+             if (Heartbeat, address) in CATALOGUE._codecs}  # fmt: skip
+    expected = {CATALOGUE.codec(DriveStatus2).can_id, beats[Address.DRIVE], beats[Address.SENSORS]}
+    assert inbox.expected == expected
+    heard = {receiver.can_id for receiver in inbox.watched}
+    assert heard == expected | {CATALOGUE.codec(kind).can_id for kind in GOOD} | {
+        beats[Address.OPERATOR], beats[Address.OPERATOR_2],
+        CATALOGUE.codec(OperatorCommand, Address.OPERATOR_2).can_id,
+    }  # fmt: skip
+    assert CATALOGUE.codec(ValveStatus).can_id not in heard
+
+
+def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> None:
+    line = listening(pump=False, valve=True)
+    inbox = line.inbox
+    assert inbox.drive_state is DriveState.OPERATION_ENABLED
+    century_ns = 100 * 366 * 86_400 * 1_000_000_000
+    assert min(inbox.pump_ns, inbox.drive_ns, inbox.echo_ns) > century_ns
+    line.say(GOOD[SensorMotion])
+    line.say(GOOD[SensorTank])
+    assert inbox.protection_valid
+    line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
+    assert not inbox.versions_match
+    line.beat(Address.VALVE, CATALOGUE.version, VERSION)
+    assert inbox.versions_match
+    assert CATALOGUE.codec(DriveStatus1).can_id not in {each.can_id for each in inbox.watched}
+
+
+def test_what_the_valve_says_is_kept_and_its_echo_is_fresh_only_when_it_moves() -> None:
+    line = listening(valve=True)
+    inbox, sender = line.inbox, CATALOGUE.transmitter(ValveStatus)
+
+    def say(opening: float, echo: int | None) -> int:
+        flags = [False] * (len(ValveStatus._fields) - 5)
+        status = ValveStatus(opening, ValveState.FOLLOWING, ValveFault.NONE, echo, None, *flags)
+        line.hear(sender.frame(status))
+        return line.now_ns
+
+    first_ns = say(0.4, None)
+    assert inbox.valve_state is ValveState.FOLLOWING
+    assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
+    assert inbox.valve_echo_ns == NEVER_HEARD_NS
+    say(NAN, None)
+    assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
+    second_ns = say(0.5, 3)
+    assert (inbox.valve_ns, inbox.valve_echo_ns) == (second_ns, second_ns)
+    third_ns = say(0.5, 3)
+    say(0.5, None)
+    assert (inbox.valve_ns > third_ns, inbox.valve_echo_ns) == (True, second_ns)
+    assert say(0.5, 4) == inbox.valve_echo_ns
+
+
+def test_a_drive_without_an_echo_is_not_fresh_for_it() -> None:
+    line = Line()
+    line.say(GOOD[DriveStatus1])
+    echo_ns = line.inbox.echo_ns
+    for echo in (None, 4, None, 4):
+        line.say(GOOD[DriveStatus1]._replace(command_echo=echo))  # type: ignore[attr-defined]
+        assert line.inbox.echo_ns == echo_ns
+
+
+@pytest.mark.parametrize("limited", ["power_limited", "speed_limited"])
+def test_a_drive_at_its_power_or_speed_is_held_back(limited: str) -> None:
+    line, status = Line(), GOOD[DriveStatus1]
+    for said in (True, False, True):
+        line.say(status._replace(**{limited: said}))  # type: ignore[attr-defined]
+        assert line.inbox.drive_held_back is said
+    line.say(status._replace(pressure_limited=True, rate_limited=True))  # type: ignore[attr-defined]
+    assert not line.inbox.drive_held_back
+
+
+def test_the_panel_in_command_is_to_match_and_not_the_other() -> None:
+    line = Line()
+    for address, versions, matches in (
+        (Address.OPERATOR_2, (CATALOGUE.version, VERSION), False),
+        (Address.OPERATOR, (CATALOGUE.version, VERSION + 1), False),
+        (Address.OPERATOR, (CATALOGUE.version, VERSION), True),
+        (Address.OPERATOR_2, (CATALOGUE.version + 1, VERSION), True),
+        (Address.OPERATOR, (CATALOGUE.version + 1, VERSION), False),
+    ):
+        line.hear(beat_of(address, *versions))
+        assert line.inbox.panel_matches is matches
+
+
+BEATS = {address: CATALOGUE.transmitter(Heartbeat, address)
+         for address in (Address.OPERATOR, Address.OPERATOR_2)}  # fmt: skip
+
+
+def beat_of(address: Address, catalogue: int, configuration: int) -> Frame:
+    return BEATS[address].frame(
+        Heartbeat(
+            NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, catalogue, configuration, NAN, NAN
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("lost", "after_ns", "cycles"),
+    [
+        (0, CYCLE_NS, 1),
+        (0, CYCLE_NS // 3, 1),  # it jitters
+        (1, 2 * CYCLE_NS, 2),
+        (3, 4 * CYCLE_NS, 4),
+        (3, 4 * CYCLE_NS + CYCLE_NS // 2, 4),  # still what the counter says
+        (2, 4 * CYCLE_NS + CYCLE_NS // 2 + 1, 5),  # beyond it the time does: 4.5 and a little
+        (1, 9 * CYCLE_NS + CYCLE_NS // 3, 9),
+        (0, 17 * CYCLE_NS, 17),
+    ],
+)
+def test_cycles_of_the_levels_are_counted_by_the_counter_and_long_gaps_by_the_time(
+    lost: int, after_ns: int, cycles: int
+) -> None:
+    line = Line()
+    inbox = line.inbox
+    for _ in range(2):  # frames lost before are counted once
+        line.now_ns += CYCLE_NS
+        line.frame(GOOD[SensorTank])
+        inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
+    before = inbox.tank_cycles
+    for _ in range(lost):
+        line.frame(GOOD[SensorTank])
+    line.now_ns += after_ns
+    inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
+    assert inbox.tank_cycles - before == cycles
+    line.now_ns += CYCLE_NS
+    inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
+    assert inbox.tank_cycles - before == cycles + 1
+
+
+def test_only_what_the_catalogue_does_not_know_is_foreign() -> None:
+    line = Line()
+    line.hear(CATALOGUE.transmitter(ValveStatus).frame(
+        ValveStatus(*[0.0], *[None] * 4, *[False] * (len(ValveStatus._fields) - 5))
+    ))  # fmt: skip
+    assert (line.inbox.frames, line.inbox.foreign) == (1, 0)
+    for number in (1, 2, 3):
+        line.hear(Frame(0x1ABCDEF0, bytes(8)))
+        assert (line.inbox.frames, line.inbox.foreign) == (1 + number, number)
