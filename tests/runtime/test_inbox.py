@@ -463,6 +463,9 @@ def beat_of(address: Address, catalogue: int, configuration: int) -> Frame:
         (1, 2 * CYCLE_NS, 2),
         (3, 4 * CYCLE_NS, 4),
         (3, 4 * CYCLE_NS + CYCLE_NS // 2, 4),  # still what the counter says
+        (3, 3 * CYCLE_NS + 2 * CYCLE_NS // 5, 4),
+        (2, 3 * CYCLE_NS + 3 * CYCLE_NS // 5, 3),
+        (2, 4 * CYCLE_NS + 2 * CYCLE_NS // 5, 3),
         (2, 4 * CYCLE_NS + CYCLE_NS // 2 + 1, 5),  # beyond it the time does: 4.5 and a little
         (1, 9 * CYCLE_NS + CYCLE_NS // 3, 9),
         (0, 17 * CYCLE_NS, 17),

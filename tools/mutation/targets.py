@@ -32,6 +32,12 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Receiver.accept: if counter == self._expected: -> if False:": "the short way for most",
         "Receiver.accept: if self._bucket: -> if True:": "draining an empty bucket does nothing",
     },
+    "utank_hil/runtime/inbox.py": {
+        ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 2 << 62": _NEVER,
+        ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 1 << 63": _NEVER,
+        ": _Accept = Callable[[Frame], tuple[Any, ...] | None] -> "
+        "_Accept = Callable[[Frame], tuple[Any, ...] & None]": "a type that nothing runs",
+    },
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
     },
