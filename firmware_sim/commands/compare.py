@@ -28,7 +28,9 @@ _SHARES: Final = ("roll_below_no_tank", "roll_below_passive", "active_share")
 
 
 def compare(
-    reference: Annotated[Path, typer.Argument(help="Campaign or bench folder, or recording.")],
+    reference: Annotated[
+        Path, typer.Argument(help="Campaign or bench folder; or a recording, log or table.")
+    ],
     others: Annotated[list[Path], typer.Argument(help="One or more of the same kind.")],
     json_: Json = False,
 ) -> None:
@@ -75,7 +77,7 @@ def _recording(place: Path) -> Path:
     file = place / RECORDING if place.is_dir() else place
     if not file.is_file():
         wanted = f"{RECORDING} or a campaign" if place.is_dir() else "such file"
-        fail(f"{place}: there is no {wanted}; name a folder of `bench` or `campaign`, or a .rrd")
+        fail(f"{place}: there is no {wanted}; name a folder of `bench` or `campaign`, or a file")
     return file
 
 

@@ -1,7 +1,7 @@
 """Recorded runs side by side, by means over batches of their records."""
 
 import json
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +18,8 @@ from firmware_sim.comparison.difference import (
 )
 from utank_hil.analysis.motion.confidence import batch_means, rms_batches
 from utank_hil.arrays import FloatArray
-from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.recording import read_about
+from utank_hil.telemetry.signal_files import read_signals, require
 
 BATCH_PERIODS: Final = 20
 """Mean periods of the roll in a batch: after so many a lightly damped ship has forgotten."""
@@ -28,29 +29,13 @@ _WAVES: Final = ("sea", "voyage", "vessel")
 Runs = dict[str, dict[str, FloatArray]]
 
 
-def _roll_rad(run: dict[str, FloatArray]) -> FloatArray:
-    return run.get("true_roll_rad", run["roll_rad"])
-
-
-def _level_m(run: dict[str, FloatArray]) -> FloatArray:
-    return run.get("true_level_m", (run["starboard_level_m"] - run["port_level_m"]) / 2)
-
-
-def _pressure_pa(run: dict[str, FloatArray]) -> FloatArray:
-    return run.get("true_pressure_pa", run["pressure_actual_pa"])
-
-
-def _drawn_w(run: dict[str, FloatArray]) -> FloatArray:
-    return np.maximum(run.get("true_shaft_power_w", run["pump_power_w"]), 0.0)
-
-
-_FIGURES: Final[dict[str, tuple[Callable[[dict[str, FloatArray]], FloatArray], bool]]] = {
-    "roll_rms_rad": (_roll_rad, True),
-    "level_rms_m": (_level_m, True),
-    "pressure_rms_pa": (_pressure_pa, True),
-    "power_mean_w": (_drawn_w, False),
+_FIGURES: Final = {
+    "roll_rms_rad": ("true_roll_rad", "roll_rad"),
+    "level_rms_m": ("true_level_m", "level_m", "starboard_level_m"),
+    "pressure_rms_pa": ("true_pressure_pa", "pressure_actual_pa"),
+    "power_mean_w": ("true_shaft_power_w", "pump_power_w"),
 }
-"""Figures of a record: what they are made from, and whether they are root mean squares."""
+"""Figures of a record, and the columns that each is made from: the first that both records have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,18 +77,20 @@ class Record:
 
 
 def read_record(path: Path) -> Record:
-    """Read a recording.
+    """Read a recording, a log of the bus or a table.
 
     Raises
     ------
     ValueError
-        If the file is none.
+        If the file is none, or has no roll.
     """
-    runs = read_recording(path)
-    try:
-        about = read_about(path)
-    except ValueError:  # of an older version: it can be compared all the same
-        about = {}
+    runs = read_signals(path)
+    for columns in runs.values():
+        require(path, columns, "roll_rad")
+    about: dict[str, Any] = {}
+    if path.suffix == ".rrd":
+        with suppress(ValueError):  # one of an older version does not say
+            about = read_about(path)
     return Record(path, about, runs)
 
 
@@ -124,14 +111,26 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
 def _compared(first: Record, second: Record) -> list[Comparison]:
     found = []
     together = first.waves is not None and first.waves == second.waves
-    for run in same_runs(list(first.runs), list(second.runs), str(second.path)):
-        one, two = first.columns(run), second.columns(run)
+    if len(first.runs) == len(second.runs) == 1:  # a log knows no names of runs
+        pairs = [(next(iter(first.runs)), next(iter(second.runs)))]
+    else:
+        common = same_runs(list(first.runs), list(second.runs), str(second.path))
+        pairs = [(run, run) for run in common]
+    for run, other in pairs:
+        one, two = first.columns(run), second.columns(other)
         remarks = list(differing(first.about, second.about))
         same = together and _at_same_times(one, two)
         if not same:
             remarks.append("not the same waves at the same times: not paired")
-        figures = {name: _figure(one, two, name, paired_=same) for name in _FIGURES}
-        if figures["roll_rms_rad"].half_width is None:
+        counts = [_batches(each) for each in (one, two)]
+        if same:
+            counts = [min(counts)] * 2
+        figures = {
+            name: _figure(one[column], two[column], name, counts, paired_=same)
+            for name, columns in _FIGURES.items()
+            if (column := _known(one, two, columns)) is not None
+        }
+        if min(counts) < LEAST_BATCHES:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * BATCH_PERIODS} rolls")
         found.append(Comparison(str(second.path), run, {}, figures, tuple(remarks)))
     return found
@@ -143,25 +142,35 @@ def _at_same_times(one: dict[str, FloatArray], two: dict[str, FloatArray]) -> bo
     return count == longest and bool(np.abs(one["time_s"] - two["time_s"]).max(initial=0) < 1e-3)
 
 
+def _known(
+    one: dict[str, FloatArray], two: dict[str, FloatArray], names: tuple[str, ...]
+) -> str | None:
+    """The first of some columns that both have, without gaps."""
+    both = (name for name in names if name in one and name in two)
+    return next(
+        (name for name in both if np.isfinite(one[name]).all() and np.isfinite(two[name]).all()),
+        None,
+    )
+
+
 def _figure(
-    one: dict[str, FloatArray], two: dict[str, FloatArray], name: str, *, paired_: bool
+    one: FloatArray, two: FloatArray, name: str, counts: list[int], *, paired_: bool
 ) -> Difference:
-    of, is_rms = _FIGURES[name]
-    counts = [_batches(each) for each in (one, two)]
-    if paired_:
-        counts = [min(counts)] * 2
     enough = min(counts) >= LEAST_BATCHES
-    means = rms_batches if is_rms else batch_means
+    if name == "power_mean_w":
+        one, two = np.maximum(one, 0.0), np.maximum(two, 0.0)  # what flows back counts as nothing
+    means = batch_means if name == "power_mean_w" else rms_batches
     values = [
-        means(of(each), count if enough else 1)
-        for each, count in zip((one, two), counts, strict=True)
+        means(each, count if enough else 1) for each, count in zip((one, two), counts, strict=True)
     ]
     return paired(*values) if paired_ else independent(*values)
 
 
 def _batches(run: dict[str, FloatArray]) -> int:
     """Batches of a run, each of `BATCH_PERIODS` rolls or more."""
-    roll_rad = _roll_rad(run) - _roll_rad(run).mean()
+    roll_rad = run.get("true_roll_rad", run["roll_rad"])
+    roll_rad = roll_rad[np.isfinite(roll_rad)]
+    roll_rad = roll_rad - roll_rad.mean()
     # noise crosses zero often: a roll is from well to port to well to starboard
     sides = np.sign(roll_rad[np.abs(roll_rad) > roll_rad.std() / 2])
     rolls = int(np.count_nonzero(np.diff(sides) > 0))

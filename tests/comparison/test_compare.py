@@ -143,6 +143,22 @@ def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
     assert "not the same waves" in apart["remarks"][0]
 
 
+def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_have(tmp_path: Path):
+    roll = waves(3, 1800.0)
+    first = recorded(tmp_path / "a.rrd", roll)
+    table = tmp_path / "measured.csv"
+    rows = (f"{k / 20:.2f},{math.degrees(0.5 * value):.6f}" for k, value in enumerate(roll))
+    table.write_text("time_s,roll_deg\n" + "\n".join(rows) + "\n")
+    (each,) = found(first, table)["comparisons"]
+    assert list(each["figures"]) == ["roll_rms_rad"]
+    figure = each["figures"]["roll_rms_rad"]
+    assert figure["value"] == pytest.approx(0.5 * figure["reference"], rel=1e-4)
+    table.write_text("time_s,pitch_deg\n0,1\n")
+    done = CliRunner().invoke(APP, [str(first), str(table)])
+    assert done.exit_code == 2
+    assert "has no column roll_rad or roll_deg" in done.stderr
+
+
 def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
     short = [recorded(tmp_path / f"{n}.rrd", waves(n, 300.0)) for n in (1, 2)]
     (each,) = found(*short)["comparisons"]
