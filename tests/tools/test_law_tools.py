@@ -40,6 +40,8 @@ def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passiv
             assert row["roll_rms_deg"] > best, name
     assert best < passive
     assert rows["clairvoyant"]["level_peak_m"] <= 4.0 + 1e-6
+    assert best < rows["causal bound"]["roll_rms_deg"] < passive
+    assert rows["causal bound"]["share"] < 1
 
 
 def test_model_errors_change_what_the_laws_take_away(tool, monkeypatch):

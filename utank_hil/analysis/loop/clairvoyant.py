@@ -1,21 +1,21 @@
 """How little a ship could roll: the best pressure history for a whole record known in advance.
 
-One large sparse quadratic programme over all samples, x = (roll, roll rate, level, level rate, pump
-pressure), commands held over a sample, waves as the motion w(k) that they cause with the tank
-passive::
+One large sparse quadratic programme over all samples (`best_history`), waves as the motion w(k)
+that they cause with the tank passive::
 
-    minimize    mean square of the roll in w(k) + x(k)
-    subject to  x(k+1) = A x(k) + B u(k),    x(0) = 0
-                |u| <= P_max,    |u(k+1) - u(k)| <= rate Ts,    |level in w(k) + x(k)| <= h_max
+    minimize    mean of squares of the roll in w(k) + y(k), and of c(k)'x(k) + d(k) v(k)
+    subject to  x(k+1) = A x(k) + B v(k),    y(k) = C x(k) + D v(k),    x(1) = 0
+                |v| <= P_max,    |v(k+1) - v(k)| <= rate Ts,    |level in w(k) + y(k)| <= h_max
                 P h' <= W / At
 
-The last one, on the power, is not convex. For water no faster than v it is replaced by its convex
+The last one, on the power, is not convex. For water no faster than f it is replaced by its convex
 hull (McCormick)::
 
-    |v P + P_max h'| <= W / At + P_max v,    |h'| <= v
+    |f P + P_max h'| <= W / At + P_max f,    |h'| <= f
 
 So what comes out is a bound: no controller that commands at these samples does better, and with a
-power limit perhaps none can do as well.
+power limit perhaps none can do as well. With c and d zero it is the clairvoyant bound. The linear
+terms are those of `causal_bound`.
 """
 
 import math
@@ -26,10 +26,10 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.sampling import transition_and_step
+from utank_hil.dynamics.sampling import LinearModel, sample
 
 _ROLL, _LEVEL, _SPEED = (STATES.index(s) for s in ("roll_rad", "level_m", "level_rate_m_s"))
-_STATES = len(STATES) + 1  # and the pressure
+_PRESSURE = len(STATES)  # the last state
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,12 +45,15 @@ class ClairvoyantRun:
         Actual pressure then, behind the drive's lag.
     command_pa : ndarray, shape (N,)
         Held over each sample.
+    linear_cost : float
+        Mean of the linear terms, 0 without them.
     """
 
     roll_rms_rad: float
     motion: FloatArray
     pressure_pa: FloatArray
     command_pa: FloatArray
+    linear_cost: float = 0.0
 
 
 def clairvoyant_bound(
@@ -68,9 +71,57 @@ def clairvoyant_bound(
         Its delay makes no difference where the whole record is known.
     wave_motion : ndarray, shape (N + 1, 4)
         `STATES` with the tank passive (`passive_motion`), at 0, Ts, ... N Ts.
-    sample_time_s : float
+    sample_time_s, fastest_water_m_s
+        As `best_history` takes them.
+
+    Raises
+    ------
+    ValueError
+        If nothing keeps within the limits, or the solver fails.
+    """
+    model = pump_with_lag(plant, sample_time_s, delay_s=0.0)
+    return best_history(plant, model, wave_motion[1:], fastest_water_m_s=fastest_water_m_s)
+
+
+def pump_with_lag(plant: DesignPlant, sample_time_s: float, delay_s: float) -> LinearModel:
+    """Sampled model from the command to `STATES` and the actual pressure; all are states."""
+    pump = plant.model(STATES)
+    whole = np.eye(len(STATES) + 1)
+    sampled = sample(pump, sample_time_s, delay_s, plant.lag_s)
+    if len(sampled.A) != len(whole):
+        raise ValueError(f"delay_s must be below the sample time of {sample_time_s:g} s")
+    # the pressure by its own lag: it is no output of the pump's model
+    reach = -math.expm1(-(sample_time_s - delay_s) / plant.lag_s)
+    return LinearModel(
+        sampled.A, sampled.B, whole, np.vstack([sampled.D, [[reach]]]), sample_time_s
+    )
+
+
+def best_history(
+    plant: DesignPlant,
+    model: LinearModel,
+    waves: FloatArray,
+    state_slope: FloatArray | None = None,
+    command_slope: FloatArray | None = None,
+    *,
+    fastest_water_m_s: float = 4.0,
+) -> ClairvoyantRun:
+    """Least mean square of the roll plus the mean of linear terms, the waves known.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+        Of which the limits count, and the tank.
+    model : LinearModel
+        From `pump_with_lag`.
+    waves : ndarray, shape (N, 4)
+        `STATES` with the tank passive.
+    state_slope : ndarray, shape (N, 5), optional
+        c(k), of the model's states in rad^2 per unit.
+    command_slope : ndarray, shape (N,), optional
+        d(k), in rad^2 per Pa.
     fastest_water_m_s : float
-        v; counts with a finite power limit only.
+        f; counts with a finite power limit only.
 
     Raises
     ------
@@ -80,54 +131,60 @@ def clairvoyant_bound(
     import clarabel
     from scipy import sparse
 
-    limits = plant.limits
-    waves = wave_motion[1:]
-    count = len(waves)
+    limits, count, states = plant.limits, len(waves), len(model.A)
     unit = limits.pressure_pa  # pressures in this unit, roll in degrees: all numbers near one
-    scale = np.ones(_STATES)
-    scale[-1] = unit
-    a, b = _plant_with_lag(plant, sample_time_s)
-    a, b = a * scale / scale[:, None], b * unit / scale[:, None]
+    degrees = np.rad2deg(1.0)
+    scale = np.ones(states)
+    scale[_PRESSURE] = unit
+    a, b = model.A * scale / scale[:, None], model.B * unit / scale[:, None]
+    d = model.D[:, 0] * unit / scale
 
-    # unknowns: x(1) ... x(N), then u(0) ... u(N-1)
+    # unknowns: x(1) ... x(N), then v(1) ... v(N)
     each, back = sparse.eye(count), sparse.eye(count, k=-1)
     dynamics = sparse.hstack(
-        [sparse.eye(count * _STATES) - sparse.kron(back, a), -sparse.kron(each, b)]
+        [sparse.eye(count * states) - sparse.kron(back, a), -sparse.kron(back, b)]
     )
 
-    def of_state(row: FloatArray) -> sparse.csc_matrix:
-        return sparse.hstack([sparse.kron(each, row[None]), sparse.csc_matrix((count, count))])
+    def of_output(row: FloatArray) -> sparse.csc_matrix:
+        return sparse.hstack([sparse.kron(each, row[None]), float(row @ d) * each])
 
-    unit_rows = np.eye(_STATES)
-    command = sparse.hstack([sparse.csc_matrix((count, count * _STATES)), each])
-    step = sparse.hstack([sparse.csc_matrix((count, count * _STATES)), each - back])
+    unit_rows = np.eye(states)
+    no_state = sparse.csc_matrix((count, count * states))
     bounded = [  # (rows, offset, bound): |rows x + offset| <= bound
-        (command, np.zeros(count), 1.0),
-        (step, np.zeros(count), limits.rate_pa_s * sample_time_s / unit),
-        (of_state(unit_rows[_LEVEL]), waves[:, _LEVEL], limits.level_m),
+        (sparse.hstack([no_state, each]), np.zeros(count), 1.0),
+        (
+            sparse.hstack([no_state, each - back]),
+            np.zeros(count),
+            limits.rate_pa_s * model.dt / unit,
+        ),
+        (of_output(unit_rows[_LEVEL]), waves[:, _LEVEL], limits.level_m),
     ]
     if math.isfinite(limits.power_w):
-        v, flow = fastest_water_m_s, limits.power_w / (plant.tank.reservoir_area_m2 * unit)
-        cut = of_state(v * unit_rows[-1] + unit_rows[_SPEED])
+        fastest, flow = fastest_water_m_s, limits.power_w / (plant.tank.reservoir_area_m2 * unit)
+        cut = of_output(fastest * unit_rows[_PRESSURE] + unit_rows[_SPEED])
         bounded += [
-            (cut, waves[:, _SPEED], flow + v),
-            (of_state(unit_rows[_SPEED]), waves[:, _SPEED], v),
+            (cut, waves[:, _SPEED], flow + fastest),
+            (of_output(unit_rows[_SPEED]), waves[:, _SPEED], fastest),
         ]
     rows = sparse.vstack([dynamics] + [sign * r for r, _, _ in bounded for sign in (1, -1)])
-    right = [np.zeros(count * _STATES)]
+    right = [np.zeros(count * states)]
     right += [bound - sign * offset for _, offset, bound in bounded for sign in (1, -1)]
 
-    degrees = np.rad2deg(1.0)
-    roll = of_state(degrees * unit_rows[_ROLL])
+    roll = of_output(unit_rows[_ROLL])
+    slope = np.zeros(count * (states + 1))
+    if state_slope is not None:
+        slope[: count * states] = (degrees**2 / count * state_slope * scale).ravel()
+    if command_slope is not None:
+        slope[count * states :] = degrees**2 / count * command_slope * unit
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    limits_count = rows.shape[0] - count * _STATES
+    limits_count = rows.shape[0] - count * states
     solution = clarabel.DefaultSolver(
-        sparse.triu(2 / count * roll.T @ roll).tocsc(),
-        2 / count * degrees * (roll.T @ waves[:, _ROLL]),
+        sparse.triu(2 / count * degrees**2 * roll.T @ roll).tocsc(),
+        2 / count * degrees**2 * (roll.T @ waves[:, _ROLL]) + slope,
         rows.tocsc(),
         np.concatenate(right),
-        [clarabel.ZeroConeT(count * _STATES), clarabel.NonnegativeConeT(limits_count)],
+        [clarabel.ZeroConeT(count * states), clarabel.NonnegativeConeT(limits_count)],
         settings,
     ).solve()
     if solution.status != clarabel.SolverStatus.Solved:
@@ -135,20 +192,14 @@ def clairvoyant_bound(
             f"no pressure history keeps within the limits ({solution.status}): the waves alone may "
             f"lift the water beyond level_m = {limits.level_m}"
         )
-    x = np.array(solution.x)
-    states = x[: count * _STATES].reshape(count, _STATES) * scale
-    motion = waves + states[:, : len(STATES)]
+    found = np.array(solution.x)
+    command = found[count * states :]
+    outputs = (found[: count * states].reshape(count, states) + np.outer(command, d)) * scale
+    motion = waves + outputs[:, : len(STATES)]
     return ClairvoyantRun(
         roll_rms_rad=float(np.sqrt(np.mean(np.square(motion[:, _ROLL])))),
         motion=motion,
-        pressure_pa=states[:, -1],
-        command_pa=x[count * _STATES :] * unit,
+        pressure_pa=outputs[:, _PRESSURE],
+        command_pa=command * unit,
+        linear_cost=float(slope @ found) / degrees**2,
     )
-
-
-def _plant_with_lag(plant: DesignPlant, sample_time_s: float) -> tuple[FloatArray, FloatArray]:
-    """State after a sample from that before it, and from the command held over it."""
-    pump = plant.model(STATES)
-    n = len(STATES)
-    a = np.block([[pump.A, pump.B], [np.zeros((1, n)), np.full((1, 1), -1 / plant.lag_s)]])
-    return transition_and_step(a, np.append(np.zeros(n), 1 / plant.lag_s)[:, None], sample_time_s)
