@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import Field
 
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
@@ -32,6 +33,13 @@ class ConstrainedFromFile(ConstrainedDesign):
 
 
 @dataclass(frozen=True, slots=True)
+class SelfTunedFromFile(SelfTunedDesign):
+    """A self-tuned law whose sea a file may name as a scenario does."""
+
+    sea: LawSea | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class StateSpaceFromFile(StateSpaceDesign):
     """A law in matrices, which may stand in a data file."""
 
@@ -49,7 +57,9 @@ else:
     _installed = tuple(point.load() for point in entry_points(group=GROUP))
     _of_a_valve = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
     _of_a_pump = tuple(
-        _FROM_FILE.get(law, law) for law in (*LAWS, *_installed) if law not in _of_a_valve
+        _FROM_FILE.get(law, law)
+        for law in (*LAWS, SelfTunedFromFile, *_installed)
+        if law not in _of_a_valve
     )
     PumpLaw = Annotated[reduce(or_, _of_a_pump), Field(discriminator="kind")]
 

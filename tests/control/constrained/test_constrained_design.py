@@ -109,6 +109,24 @@ def test_bad_values_are_refused_by_name(bad):
         dataclasses.replace(DESIGN, **bad)
 
 
+def test_a_plan_that_the_law_follows_is_the_law_whatever_its_length():
+    # the principle of optimality: with a knot at each sample the horizon makes no difference
+    gains = [
+        dataclasses.replace(
+            DESIGN,
+            knots=tuple(range(samples)),
+            horizon=samples,
+            after_horizon="law",
+            heel_std_rad=0.0,
+        )
+        .law(DesignPlant(SHIP, TANK, limits=LIMITS))
+        .unlimited()
+        .gain[0, :-1]
+        for samples in (2, 25)
+    ]
+    np.testing.assert_allclose(gains[0], gains[1], rtol=1e-3, atol=1e-3 * np.abs(gains[0]).max())
+
+
 def test_a_margin_that_leaves_no_level_is_refused():
     with pytest.raises(ValueError, match="level_margin_m"):
         dataclasses.replace(DESIGN, level_margin_m=4.0).law(DesignPlant(SHIP, TANK, limits=LIMITS))

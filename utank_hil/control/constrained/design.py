@@ -2,8 +2,9 @@
 
 A Kalman filter on the model of ship, tank, drive, waves and heel (`sea_plant`) estimates the state;
 what it foresees of the waves is in every prediction. The cost is roll, level and pressure over the
-horizon, and roll and level for ever after it with the tank passive: a plan that leaves the ship
-swinging is not cheap. What a steady heel explains of the motion is taken off first.
+horizon, and what follows it for ever: roll and level with the tank passive, or what the law without
+limits, which knows the sea, pays from there on. Without either, a plan that leaves the ship
+swinging would be cheap. What a steady heel explains of the motion is taken off first.
 """
 
 from dataclasses import dataclass
@@ -65,8 +66,9 @@ class ConstrainedDesign:
     knots : tuple of int
         Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
     horizon : int
-        Samples N that are planned, 400 at most. After them the tank is taken to be passive for
-        ever.
+        Samples N that are planned, 400 at most.
+    after_horizon : {"passive", "law"}
+        What is taken to follow the plan for ever: the passive tank, or the law without limits.
     pressure_weight_rad2 : float
         Greatest pressure throughout costs as much as this square of a roll angle.
     level_weight_rad2_m2 : float
@@ -99,6 +101,7 @@ class ConstrainedDesign:
         *(0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56),
     )
     horizon: Annotated[int, Range(least=1, most=MOST_HORIZON)] = 60
+    after_horizon: Literal["passive", "law"] = "passive"
     pressure_weight_rad2: Positive = 2.6e-4
     level_weight_rad2_m2: NotNegative = 3e-5
     level_margin_m: NotNegative = 0.2
@@ -166,7 +169,11 @@ class ConstrainedDesign:
             self.horizon,
             weight,
             self.pressure_weight_rad2 / limits.pressure_pa**2,
-            terminal=_passive_cost(model, weight),
+            terminal=(
+                _passive_cost(model, weight)
+                if self.after_horizon == "passive"
+                else _cost_of_law(model, weight, self.pressure_weight_rad2, limits.pressure_pa)
+            ),
         )
         steady_state, steady_command = _steady(whole, self.heel_share)
         return ConstrainedLaw(
@@ -197,7 +204,26 @@ def _passive_cost(model: LinearModel, weight: FloatArray) -> FloatArray:
     """L with |L x|^2 the weighed squares of all outputs from the state x on, the pump at zero."""
     from scipy.linalg import solve_discrete_lyapunov
 
-    cost = solve_discrete_lyapunov(model.A.T, model.C.T @ (weight[:, None] * model.C))
+    return _root(solve_discrete_lyapunov(model.A.T, model.C.T @ (weight[:, None] * model.C)))
+
+
+def _cost_of_law(
+    model: LinearModel, weight: FloatArray, pressure_weight: float, unit_pa: float
+) -> FloatArray:
+    """L with |L x|^2 the least cost from the state x on, the heel, its last element, left out."""
+    from scipy.linalg import solve_discrete_are
+
+    n = len(model.A)
+    a, c = model.A[:-1, :-1], model.C[:, :-1]
+    b, d = unit_pa * model.B[:-1], unit_pa * model.D
+    weighed = weight[:, None]
+    cost = solve_discrete_are(
+        a, b, c.T @ (weighed * c), pressure_weight + d.T @ (weighed * d), s=c.T @ (weighed * d)
+    )
+    return np.hstack([_root(cost), np.zeros((n - 1, 1))])
+
+
+def _root(cost: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh((cost + cost.T) / 2)
     root: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return root

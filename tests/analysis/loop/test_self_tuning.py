@@ -1,0 +1,108 @@
+"""Laws that design themselves: margins, predictions against other computations, budgets."""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.scaled_law import NoLawError
+from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.analysis.loop.self_tuning import (
+    SelfTuned,
+    SelfTunedDesign,
+    _mean_positive_product,
+    passive_roll_rad,
+    self_tuned,
+    unknown_sea,
+)
+from utank_hil.assembly import build_law
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics.linear import coupled_model
+from utank_hil.sea import EffectiveSlope, Sea, jonswap
+
+CONTROLLERS = Path("configs/controllers")
+SHIPPED = load_config(CONTROLLERS / "constrained_gpc.yaml", ControllerConfig)
+PLANT = SHIPPED.plant
+STORM = jonswap(4.0, 12.5)
+SEA = SeaModel(tuple(STORM.frequency_hz), tuple(STORM.density))
+
+
+@functools.cache
+def tuned(power_w: float = float("inf")) -> SelfTuned:
+    return self_tuned(PLANT, SEA, mean_power_w=power_w)
+
+
+def moment():
+    return Sea.irregular(STORM, 1, components=4096).roll_moment(
+        PLANT.ship.stiffness_nm_rad, EffectiveSlope(SEA.effective_slope)
+    )
+
+
+def test_the_law_has_all_margins_and_its_roll_is_that_of_another_computation():
+    found = tuned()
+    measured = found.design.measured
+    assert not robustness(found.law, PLANT, measured, with_delay_margin=False).failures()
+    system = coupled_model(PLANT.ship, PLANT.tank)
+    motion = motion_in_sea(found.law, system, measured, moment(), PLANT.delay_s, PLANT.lag_s)
+    assert found.prediction.roll_rad == pytest.approx(motion.roll_rms_rad, rel=0.03)
+    assert found.prediction.level_m == pytest.approx(motion.level_rms_m, rel=0.03)
+    assert found.prediction.pressure_pa == pytest.approx(motion.pressure_rms_pa, rel=0.05)
+    assert found.prediction.roll_rad < 0.5 * found.passive_roll_rad
+
+
+def test_passive_roll_is_that_of_the_sum_over_components():
+    system = coupled_model(PLANT.ship, PLANT.tank)
+    motion = motion_in_sea(None, system, ("roll_rad",), moment())
+    assert passive_roll_rad(PLANT, SEA) == pytest.approx(motion.roll_rms_rad, rel=0.01)
+
+
+def test_a_power_budget_is_kept_and_costs_roll():
+    free = tuned()
+    spared = tuned(0.5 * free.prediction.power_w)
+    assert spared.prediction.power_w <= 0.5 * free.prediction.power_w
+    assert free.prediction.roll_rad < spared.prediction.roll_rad < spared.passive_roll_rad
+    with pytest.raises(NoLawError, match="the gentlest one puts"):
+        tuned(1e-3)
+
+
+def test_mean_of_the_positive_part_of_a_product_is_that_of_draws():
+    rng = np.random.default_rng(1)
+    for r in (-0.9, 0.0, 0.6):
+        x, y = rng.multivariate_normal([0, 0], [[4.0, 6 * r], [6 * r, 9.0]], 400_000).T
+        expected = np.maximum(x * y, 0).mean()
+        assert _mean_positive_product(2.0, 3.0, 6 * r) == pytest.approx(expected, rel=0.02)
+
+
+def test_another_ship_gets_a_law_with_all_margins_too():
+    naval = load_config(CONTROLLERS / "naval_constrained_gpc.yaml", ControllerConfig).plant
+    design = SelfTunedDesign("self_tuned")
+    found = design.tuned(naval)
+    assert not found.robustness.failures()
+    assert found.design.sample_time_s < SHIPPED.law.sample_time_s  # she rolls faster
+    sea = unknown_sea(naval.ship)
+    assert found.passive_roll_rad == pytest.approx(passive_roll_rad(naval, sea))
+
+
+def test_a_sea_without_waves_is_refused():
+    class Still:
+        def slope_density(self, omega_rad_s):
+            return 0 * omega_rad_s
+
+    with pytest.raises(NoLawError, match="does not roll"):
+        self_tuned(PLANT, Still())
+
+
+def test_a_file_names_a_sea_or_none(tmp_path):
+    config = load_config(CONTROLLERS / "self_tuned.yaml", ControllerConfig)
+    assert isinstance(config.law, SelfTunedDesign)
+    assert config.law.sea.spectrum.hs_m == pytest.approx(4.7, abs=0.1)
+    path = tmp_path / "law.yaml"
+    ship = (CONTROLLERS / "../ships/thesis_first.yaml").resolve()
+    path.write_text(f"name: any\nvessel: {ship}\nlaw: {{kind: self_tuned, mean_power_w: 300e3}}\n")
+    config = load_config(path, ControllerConfig)
+    assert config.law.sea is None
+    law = build_law(config)
+    assert not robustness(law.linear, config.plant, law.measured).failures()
