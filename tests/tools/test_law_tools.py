@@ -44,6 +44,14 @@ def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passiv
     assert rows["causal bound"]["share"] < 1
 
 
+def test_a_law_that_knows_the_sea_leaves_less_roll_than_one_tuned_in_a_storm(tool):
+    arguments = ("--seeds", "2", "--seconds", "300", "--only", "17 s", "--json")
+    found = tool("studies.many_seas", *arguments).found["seas"]
+    assert len(found) == 2
+    for row in found.values():
+        assert row["constrained"] < row["self-tuned"] < 1
+
+
 def test_model_errors_change_what_the_laws_take_away(tool, monkeypatch):
     names = ("none", "pump gain 0.8", "roll period x 0.7")
     some = [error for error in model_errors.ERRORS if error.name in names]

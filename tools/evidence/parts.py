@@ -47,6 +47,12 @@ PARTS = (
         6,
     ),
     Part(
+        "many_seas",
+        "python -m tools.studies.many_seas --seconds 900 --seeds 2 --json",
+        "shares of the possible in twenty-eight seas, the self-tuned law among them",
+        10,
+    ),
+    Part(
         "constrained_campaign",
         "python -m tools.studies.constrained_campaign --seeds 8 --out docs/pictures --json",
         "constrained against clipped GPC, sea by sea, with its picture",

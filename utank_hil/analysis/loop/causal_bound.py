@@ -271,7 +271,9 @@ def causal_bound(problem: CausalProblem, runs: Sequence[CausalRun]) -> CausalBou
     def bounds(mean: FloatArray) -> tuple[FloatArray, FloatArray]:
         waves, best, causal = np.moveaxis(mean, -1, 0)
         # a record with higher waves has a higher clairvoyant bound; the causal one has paid for it
-        return passive * np.sqrt(best / waves), np.sqrt(causal)
+        clairvoyant = passive * np.sqrt(best / waves)
+        # the clairvoyant one bounds causal laws, too: a loose value may fall below it
+        return clairvoyant, np.sqrt(np.maximum(causal, clairvoyant**2))
 
     def share(best: FloatArray, causal: FloatArray) -> FloatArray:
         return (passive - causal) / (passive - best)
