@@ -53,15 +53,15 @@ def seas() -> dict[str, Spectrum]:
     """The sixteen, then the new ones."""
     found = {f"February {hour}:40": measured_hour(f"2019-02-{hour}:40") for hour in HOURS}
     found["storm hour"] = measured_hour(STORM_HOUR)
-    for hs_m, tp_s in ((2, 6.5), (3, 8), (4, 9.5), (5, 11), (4, 12.5), (3, 14), (3, 17)):
+    for hs_m, tp_s in ((2.0, 6.5), (3, 8), (4, 9.5), (5, 11), (4, 12.5), (3, 14), (3, 17)):
         found[f"JONSWAP {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s)
-    for hs_m, tp_s, gamma in ((1.5, 15, 7), (2, 18, 6), (1, 12.5, 7), (2.5, 13.5, 5)):
+    for hs_m, tp_s, gamma in ((1.5, 15.0, 7), (2, 18, 6), (1, 12.5, 7), (2.5, 13.5, 5)):
         found[f"swell {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s, gamma)
     found["2 m 14 s and 1.5 m 6 s"] = both(jonswap(2, 14, 5), jonswap(1.5, 6))
     found["1.5 m 11 s and 1.5 m 7 s"] = both(jonswap(1.5, 11, 5), jonswap(1.5, 7))
     found["1 m 17 s and 2.5 m 8.5 s"] = both(jonswap(1, 17, 5), jonswap(2.5, 8.5))
     found["2 m 12.5 s and 2.5 m 9 s"] = both(jonswap(2, 12.5, 5), jonswap(2.5, 9))
-    for hs_m, tp_s in ((3.5, 7.5), (2.5, 7), (1.5, 5.5), (5, 9)):
+    for hs_m, tp_s in ((3.5, 7.5), (2.5, 7.0), (1.5, 5.5), (5, 9)):
         found[f"steep {hs_m} m {tp_s} s"] = jonswap(hs_m, tp_s)
     return found
 
