@@ -35,7 +35,7 @@ def test_faults_and_retunings_leave_nothing_behind() -> None:
         return candidate
 
     samples, counts = sail(
-        1000, 50, settings=SETTINGS, retune=retune, episode_s=75.0, cargo_s=150.0
+        1000, 50, 3, settings=SETTINGS, retune=retune, episode_s=75.0, cargo_s=150.0
     )
     print(counts, verdict(samples))
     assert counts["last 50 events: RETUNED"] > 0
