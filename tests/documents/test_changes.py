@@ -19,6 +19,7 @@ pytestmark = pytest.mark.slow
 COPIED = ("configs", "docs", "firmware_sim", "tests", "tools", "utank_hil", "pyproject.toml")
 ROW = re.compile(r"^\| \d+ \| `(\S+)` \|", re.M)
 CHANGING = [page for page in HOW_TO if "```diff" in page.read_text(encoding="utf-8")]
+WRITTEN = {"docs/configuration.md"}
 ALSO = ("catalogue", "codec", "e2e")
 """Tests of the bus, beside those that a page changes."""
 
@@ -88,8 +89,9 @@ def rows(walked: Path) -> list[str]:
 def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
     before, after = contents(ROOT), contents(walked)
     changed = {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
-    assert changed == set(rows(walked))
-    assert len(changed) <= 6
+    changed -= WRITTEN  # by `make docs`, whenever a key is new
+    assert changed == set(rows(walked)) - WRITTEN
+    assert len(changed) <= 7
 
 
 def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
