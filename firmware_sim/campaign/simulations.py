@@ -77,6 +77,8 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
     """
     if simulation == "bus":
         return _on_the_bus(scenario, seed, laws)
+    if scenario.faults:
+        raise ValueError("faults befall bus and nodes, which simulation: bus alone has: take that")
     records = {"linear": _linear, "nonlinear": _nonlinear}[simulation](scenario, seed, laws)
     return _judged(scenario, list(records))
 

@@ -83,6 +83,11 @@ def test_shares_are_of_the_rolls_and_a_ship_that_capsized_counts_for_none(tmp_pa
         ("linear", {"actual_ship.wind_moment_nm": 1e6}, "knows no steady heel"),
         ("linear", {"actual_ship.inertia_kg_m2": 2e9, "actual_from_s": 5.0}, "keeps ship"),
         ("nonlinear", {"plant": "linear"}, "remove one"),
+        (
+            "linear",
+            {"faults": [{"kind": "hangs", "node": "sensors"}]},
+            "faults befall bus and nodes",
+        ),
         ("linear", {"controllers.gpc.law.sample_time_s": 0.2}, "is not a known key"),
         ("linear", {"controllers.gpc.law.order": 2e9}, "order"),
         ("linear", {"sea.heading_deg": 0.0}, "gives no roll moment"),
