@@ -170,6 +170,13 @@ def test_levels_within_the_margins_of_gauges_and_sloshing_are_measurements(
     assert line.inbox.starboard_level_m == pytest.approx(starboard_m)
 
 
+def test_where_no_limit_is_known_any_level_is_a_measurement() -> None:
+    line = Line()
+    line.inbox = Inbox(CATALOGUE, VERSION)
+    line.say(SensorTank(-9.0, 9.0, Switch.OFF, Switch.OFF, Quality.GOOD))
+    assert line.inbox.level_m == pytest.approx(9.0)
+
+
 @pytest.mark.parametrize("kind", GOOD)
 def test_damaged_repeated_and_foreign_frames_change_nothing(kind: type) -> None:
     line = Line()

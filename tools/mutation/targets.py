@@ -37,6 +37,16 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 1 << 63": _NEVER,
         ": _Accept = Callable[[Frame], tuple[Any, ...] | None] -> "
         "_Accept = Callable[[Frame], tuple[Any, ...] & None]": "a type that nothing runs",
+        "Inbox._on_either_motion: if math.isfinite(motion.roll_rad + "
+        "motion.roll_rate_rad_s) and (gate is None or gate.passes(motion.roll_rad, "
+        "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
+        "motion.roll_rate_rad_s) and (gate is None or gate.passes(motion.roll_rad, "
+        "motion.roll_rate_rad_s, now_ns)):": _SUM,
+        "Inbox._on_motion: if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and "
+        "(self._gates is None or self._gates.motion.passes(motion.roll_rad, "
+        "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
+        "motion.roll_rate_rad_s) and (self._gates is None or "
+        "self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
     },
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
