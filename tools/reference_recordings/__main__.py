@@ -49,7 +49,7 @@ def _accepted(case: Case) -> str:
         return "new"
     if kept.read_bytes() == content:
         return ""
-    said = compare(kept) or "the ship or its troubles are others; the controller answers the same"
+    said = compare(kept) or "another head, ship or trouble; the controller answers the same"
     kept.write_bytes(content)
     return said
 

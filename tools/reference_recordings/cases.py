@@ -180,7 +180,9 @@ def dropped(*kinds: type[Any]) -> Spoil:
 
 
 def damaged(frame: Frame) -> Iterable[Frame]:
-    """Flips bits of every frame."""
+    """Flips bits of the motion sensor's frames."""
+    if frame.can_id != _CATALOGUE.codec(SensorMotion).can_id:
+        return (frame,)
     data = bytearray(frame.data)
     data[3] ^= 0x24
     return (Frame(frame.can_id, bytes(data)),)

@@ -5,7 +5,7 @@ from typing import Final
 
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
-from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.frame_log import FrameLog, FrameLogError
 from utank_hil.telemetry.replay import entries_of, replay
 from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
 
@@ -22,8 +22,8 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
     changes : dict, optional
         Sections of the configuration that are others than recorded.
     """
-    log = FrameLog(path)
     try:
+        log = FrameLog(path)
         with recorded_config(log.head) as config:
             chosen: ControllerConfig = config.model_copy(update=changes or {})
             law = build_law(chosen)
@@ -35,6 +35,6 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
                 retuner=log.head["retuner"],
                 estimating=log.head.get("estimating", False),
             )
-    except ReplayHeadError as error:
+    except (FrameLogError, ReplayHeadError) as error:
         return str(error)
     return "; ".join([str(result.first), *why]) if result.first is not None else ""

@@ -70,7 +70,7 @@ def replay(
                     chosen,
                     law,
                     retuner=recording.head["retuner"],
-                    estimating=recording.head["estimating"],
+                    estimating=recording.head.get("estimating", False),
                 )
             cut = recording.cut
     except (OSError, ValueError) as error:
