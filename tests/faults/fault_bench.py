@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -134,6 +135,20 @@ def frozen(*messages: type) -> Fault:
 def doubled(frame: Frame) -> Iterable[Frame]:
     """Sends every frame twice."""
     return (frame, frame)
+
+
+def altered(kind: type[Any], change: Callable[[Any], Any], counter_step: int = 1) -> Fault:
+    """Changes what messages of a kind say, rightly protected; their counter runs in steps."""
+    receiver, transmitter = CATALOGUE.receiver(kind), CATALOGUE.transmitter(kind)
+
+    def alter(frame: Frame) -> Iterable[Frame]:
+        if frame.can_id != receiver.can_id:
+            return (frame,)
+        message = receiver.accept(frame)
+        transmitter.counter = counter_step * frame.data[1] - 1
+        return (transmitter.frame(change(message)),)
+
+    return alter
 
 
 @dataclass
