@@ -59,6 +59,12 @@ PARTS = (
         15,
     ),
     Part(
+        "sea_estimates",
+        "python -m tools.studies.sea_estimates --hours 3 --json",
+        "what the motion tells of waves, load and stability, against the truth",
+        30,
+    ),
+    Part(
         "forecast_errors",
         "python -m tools.studies.forecast_errors --seeds 8 --json",
         "how far ahead predictors see the roll, by their sea",
