@@ -203,4 +203,6 @@ def test_every_extra_is_one_of_the_project_and_holds_its_packages() -> None:
     extras = PROJECT["optional-dependencies"]
     held = {extra: " ".join(extras[extra]) for extra in ("bench", "viewer")}
     for package, extra in EXTRA_OF.items():
-        assert {"rerun": "rerun-sdk", "rerun_cli": "rerun-sdk"}.get(package, package) in held[extra]
+        assert {"dask": "distributed", "rerun": "rerun-sdk", "rerun_cli": "rerun-sdk"}.get(
+            package, package
+        ) in held[extra]

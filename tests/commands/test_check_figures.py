@@ -83,7 +83,7 @@ def test_warnings_are_notes_with_key_and_remedy_and_do_not_fail(tmp_path: Path) 
     result = invoke("check", path)
     assert result.exit_code == 0
     assert f"warning: {words}" in result.stderr
-    assert "warning" not in result.stdout
+    assert "warning:" not in result.stdout
     (warning,) = json.loads(invoke("check", path, "--json").stdout)["warnings"]
     assert warning.startswith(words)
 

@@ -60,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     config = controller(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_module, "SocketCanPort", ShipInThePort)
-        words = (config, "--bus", "any0", "--duration", 3.5, "--out", folder, "--json")
+        words = (config, "--bus", "vcan0", "--duration", 3.5, "--out", folder, "--json")
         result = invoke(run, *words)
     report = json.loads(result.stdout)
     assert report["mode"] == Mode.ACTIVE.name

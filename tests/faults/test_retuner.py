@@ -11,7 +11,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import ControllerStatus, Fault, Mode, PumpCommand, RetuningState
 from utank_hil.configuration import ControllerConfig
-from utank_hil.control import ARX, PredictiveLaw
+from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import (
     Answer,
     Candidate,
@@ -60,7 +60,6 @@ def law_of(gain: float) -> Candidate:
     return Candidate(
         PredictiveLaw(np.zeros((2, 1, 1)), gains, np.zeros((1, 1, 1)), 0.2),
         0.0,
-        ARX(np.ones((1, 1, 1)), np.zeros((2, 1, 1)), 0.2),
         SUMMARY,
     )
 
@@ -142,7 +141,6 @@ def test_after_a_refusal_the_law_is_the_one_it_was() -> None:
         law_of(1e12),
         law_of(float("nan")),
         replace(law_of(1e5), law=replace(law_of(1e5).law, input_gains=np.full((2, 1, 1), 1.7e308))),
-        replace(law_of(1e5), model=ARX(np.zeros((1500, 1, 1)), np.zeros((1501, 1, 1)), 0.2)),
         replace(
             law_of(1e5),
             law=PredictiveLaw(np.zeros((2, 1, 1)), np.zeros((2, 1, 2)), np.zeros((1, 1, 2)), 0.2),

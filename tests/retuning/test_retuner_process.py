@@ -208,7 +208,7 @@ def test_worker_killed_at_any_instant_is_replaced_and_every_record_is_answered(k
         descriptors = len(os.listdir("/proc/self/fd"))
         for number in range(1, kills + 1):
             _wait(lambda: worker_of(retuner) is not None)
-            retuner.submit(number, RECORD, 0)
+            retuner.desks[0].submit(number, RECORD, 0)
             time.sleep(draw.uniform(0, 0.5))
             worker = worker_of(retuner)
             if worker is not None:

@@ -104,7 +104,9 @@ def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault) -> No
     last_good_ns = bench.now_ns - TICK_NS
     fault(bench)
     bench.run(2000)
-    assert bench.node.fault is Fault.MOTION_SILENT
+    # five repeated frames are there before the sample is too old
+    repeated = fault is _standing_counter
+    assert bench.node.fault is (Fault.PROTECTION if repeated else Fault.MOTION_SILENT)
     zero_ns = next(t for t, c in bench.commands if t > last_good_ns and c.pressure_pa == 0.0)
     assert zero_ns - last_good_ns <= 250 * MS
     assert all(c.pressure_pa == 0.0 for t, c in bench.commands if t >= zero_ns)

@@ -9,10 +9,13 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 
 # name: default, most
 LIMITS = {
-    "motion_age_ms": (30, 1000),
+    "motion_age_ms": (40, 1000),
+    "motion_spare_age_ms": (100, 1000),
+    "hardwired_age_ms": (150, 1000),
     "tank_age_ms": (1000, 1000),
     "tank_degraded_age_ms": (100, 1000),
     "pump_age_ms": (1000, 1000),
+    "pump_degraded_age_ms": (200, 1000),
     "drive_age_ms": (60, 1000),
     "echo_age_ms": (100, 1000),
     "drive_enabled_within_ms": (40, 1000),

@@ -338,7 +338,7 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
         feed(ring, table(100))
         wait_for(lambda: any_recorded(file))
         pid = recorder._process.pid
-        subprocess.run(["prlimit", f"--pid={pid}", "--fsize=240000"], check=True)
+        subprocess.run(["prlimit", f"--pid={pid}", "--fsize=330000"], check=True)
         feed(ring, table(rows)[100:])
     with pytest.raises(RecorderError, match="the recorder failed: ") as caught:
         recorder.stop()

@@ -251,13 +251,13 @@ class Session:
         inbox = node.inbox
         whole = is_whole(frame)
         before = None if whole or frame.can_id in self._own else self._content()
-        counted = inbox.frames, inbox.foreign, inbox.conflict_ns
+        counted = inbox.frames, inbox.foreign, inbox.conflict_ns, inbox.claimed_twice_ns
         node.receive(frame, now_ns)
         self.drive.receive(frame, now_ns)
         if before is not None and self._content() != before:
             raise FuzzError(f"{frame} ({kind}) is not whole and changed what the nodes hold")
         if self._hushed:
-            inbox.frames, inbox.foreign, inbox.conflict_ns = counted
+            inbox.frames, inbox.foreign, inbox.conflict_ns, inbox.claimed_twice_ns = counted
         self._counts[kind] += 1
         self._counts["whole" if whole else "not whole"] += 1
         self._counts[f"in {node.mode.name}"] += 1

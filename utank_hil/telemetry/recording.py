@@ -116,10 +116,14 @@ def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:
         blocks.setdefault(run_of(chunk.entity_path), []).append(block)
     if not blocks:
         raise ValueError(f"{path}: no telemetry in this recording")
-    return {
-        run: {column: np.concatenate([b[column] for b in parts]) for column in parts[0]}
-        for run, parts in blocks.items()
-    }
+    return {run: _in_order(parts) for run, parts in blocks.items()}
+
+
+def _in_order(parts: list[dict[str, FloatArray]]) -> dict[str, FloatArray]:
+    """Blocks of rows as one table; what mends a cut file may have exchanged them."""
+    table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+    order = np.argsort(table[TIME_COLUMN], kind="stable")
+    return {column: values[order] for column, values in table.items()}
 
 
 def read_about(path: Path) -> dict[str, Any]:
