@@ -60,7 +60,7 @@ check: setup
 	$(VENV)/bin/mypy
 	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
 	$(VENV)/bin/mypy tools/compiled.py tools/sbom.py
-	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence fuzz mutation peers studies thesis)
+	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence fuzz mutation peers reference_recordings studies thesis)
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 

@@ -10,7 +10,13 @@ author = "the developers of utank-hil"
 version = release = importlib.metadata.version("utank-hil")
 
 root_doc = "docs/index"
-include_patterns = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/**.md"]
+include_patterns = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "configs/seas/README.md",
+    "docs/**.md",
+]
 exclude_patterns = ["docs/evidence"]
 extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 

@@ -79,7 +79,7 @@ def campaign(
         _print(loaded, groups, failed)
         console = Console()
         console.print(f"results: {shown(folder)}", soft_wrap=True)
-        lead_on(console, f"campaign {shown(study)} --resume", f"compare {shown(folder)} OTHER")
+        lead_on(console, f"campaign {shown(study)} --resume", f"report {shown(folder)}")
     if interrupted:
         notes.print("interrupted: the same command with --resume goes on from here")
         raise typer.Exit(ExitCode.INTERRUPTED)

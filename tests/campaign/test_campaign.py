@@ -21,6 +21,7 @@ from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
 from tools.evidence import campaign_part
 from utank_hil.commands.common import new_app
+from utank_hil.commands.report import write_page
 
 pytestmark = pytest.mark.slow
 
@@ -130,6 +131,10 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     assert "roll RMS below it %" in again.stdout
     assert "3 cases without a result: sea.heading_deg" in again.stdout
     assert sorted((out / "rows").iterdir()) == rows
+    page = write_page([out], tmp_path / "report.html").read_text(encoding="utf-8")
+    mean, width = (100 * shares[name] for name in ("mean", "half_width"))
+    assert f"gpc (sea.heading_deg 90.0): {mean:.1f} ± {width:.1f} % below the passive" in page
+    assert "3 cases have no result." in page
 
 
 def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Path):

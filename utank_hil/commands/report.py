@@ -15,7 +15,7 @@ PAGE: Final = "report.html"
 
 def report(
     runs: Annotated[
-        list[Path], typer.Argument(help="Folders of benches, recordings (.rrd) of runs.")
+        list[Path], typer.Argument(help="Folders of benches and campaigns, recordings (.rrd).")
     ],
     out: Annotated[
         Path | None,
@@ -50,6 +50,7 @@ def write_page(runs: list[Path], page: Path) -> Path:
         If a run can't be read or the page can't be written; says which.
     """
     from utank_hil.commands.report_bench import FIGURES, bench_sections
+    from utank_hil.commands.report_campaign import SUMMARY, campaign_sections
     from utank_hil.commands.report_recording import recording_sections
     from utank_hil.pictures.report_page import write_report_page
 
@@ -64,12 +65,14 @@ def write_page(runs: list[Path], page: Path) -> Path:
                         f"{run / FIGURES}: has no {error}: it is of another version, run the bench "
                         "again"
                     ) from error
+            elif run.is_dir() and (run / SUMMARY).exists():
+                found = campaign_sections(run)
             elif run.is_file():
                 found = recording_sections(run, Path(scratch))
             elif run.is_dir():
                 raise ValueError(
-                    f"{run}: holds no {FIGURES}: give the folder of a bench, or the .rrd file of "
-                    "a run"
+                    f"{run}: holds no {FIGURES} and no {SUMMARY}: give the folder of a bench or "
+                    "of a campaign, or the .rrd file of a run"
                 )
             else:
                 raise ValueError(f"{run}: is not there")
