@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
 ON_VCAN := tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence"
 # these in one kernel, the others in another: both take as long
-LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py)
+LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py test_replay_on_vcan.py)
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -22,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
-	@echo "make test       lint, types and the tests, those on a real CAN bus included: ten minutes"
+	@echo "make test       lint, types and the tests, those on a real CAN bus included: a quarter of an hour"
 	@echo "make test-fast  the quick tests, without CAN: half a minute"
 	@echo "make compiled   simulations in half the time, until the source changes; a minute, with gcc"
 	@echo "make evidence   what takes longer, where its result is missing or out of date: hours at first;"
