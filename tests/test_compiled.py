@@ -12,7 +12,7 @@ import pytest
 from utank_hil import compiled
 
 RUN = """
-import hashlib, json
+import hashlib, json, pickle
 from pathlib import Path
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import run_lockstep
@@ -25,6 +25,8 @@ class Watch:
     def stopped(self, done_s): return False
 
 scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+# the bench sends its jobs to other processes
+assert pickle.loads(pickle.dumps(scenario)) == scenario
 digests = {
     job.name: hashlib.sha256(run_lockstep(job, Watch()).rows.tobytes()).hexdigest()
     for job in jobs_of(scenario, 1, 60.0)

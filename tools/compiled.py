@@ -45,7 +45,10 @@ PATTERNS: Final = (
     "utank_hil/runtime/wire_time.py",
     "utank_hil/telemetry/memory_log.py",
 )
-"""No file with a dataclass that a configuration holds: pydantic needs its `__dict__`."""
+NOT: Final = frozenset(["utank_hil/runtime/monitors/thresholds.py"])
+"""No file with a dataclass that a configuration holds: pydantic needs its `__dict__`, and pickle
+can't fill a frozen one that is compiled.
+"""
 
 
 def build() -> Path:
@@ -53,7 +56,8 @@ def build() -> Path:
     made = folder()
     if modules_in(made):
         return made
-    files = [str(path.relative_to(ROOT)) for each in PATTERNS for path in sorted(ROOT.glob(each))]
+    found = [str(path.relative_to(ROOT)) for each in PATTERNS for path in sorted(ROOT.glob(each))]
+    files = [file for file in found if file not in NOT]
     os.chdir(ROOT)  # mypyc names modules by their paths from here
     made.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=made.parent) as scratch:
