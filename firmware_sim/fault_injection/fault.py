@@ -1,5 +1,6 @@
 """What every fault has."""
 
+from abc import ABC, abstractmethod
 from functools import partial
 from typing import Annotated, Any, Final
 
@@ -52,7 +53,7 @@ AnyMessageName = Annotated[
 NodeName = Annotated[str, AfterValidator(partial(_choice, "node", list(NODE_OF.values())))]
 
 
-class Fault(Section):
+class Fault(Section, ABC):
     """When a fault is there: `at_s` after the start, for `for_s` or till the end."""
 
     at_s: NotNegative = 0.0
@@ -68,9 +69,9 @@ class Fault(Section):
         """Nodes that must be emulated for it."""
         return ()
 
+    @abstractmethod
     def place(self, bench: Bench, span: Span, seed: int) -> None:
         """Place it; `seed` is of what it draws."""
-        raise NotImplementedError
 
 
 class MessageFault(Fault):

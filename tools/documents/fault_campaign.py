@@ -17,7 +17,10 @@ END = "<!-- End of the generated tables. -->\n"
 REQUIREMENTS = (
     "| requirement | fault | found by | within | reaction | shown by |\n|---|---|---|---|---|---|\n"
 )
-ROWS = "\n| row | reaction asked for | found within, ms |\n|---|---|---|\n"
+ROWS = (
+    "\n| row | reaction asked for | found within, ms | counted from a difference of |\n"
+    "|---|---|---|---|\n"
+)
 
 
 def requirements(campaign: Campaign) -> list[str]:
@@ -41,7 +44,8 @@ def page() -> str:
     campaign = load_config(CAMPAIGN, Campaign)
     rows = [
         f"| `{row.id}` | {REACTIONS[row.reaction]} | "
-        f"{'' if row.within_ms is None else f'{row.within_ms:g} '}|\n"
+        f"{'' if row.within_ms is None else f'{row.within_ms:g} '}| "
+        f"{', '.join(f'`{name}` {value:g}' for name, value in row.counts_from.items())} |\n"
         for row in campaign.rows
     ]
     return "".join(
