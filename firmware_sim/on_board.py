@@ -8,18 +8,15 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
-from rich.table import Table
 
 from firmware_sim.bench import BenchResult
 from firmware_sim.place import Place
 from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
 from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
 from utank_hil.arrays import FloatArray
-from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
-"""Single amplitudes of roll whose exceedance is printed."""
-_SHOWN_RAD: Final = (LEVELS_RAD[1], LEVELS_RAD[3])
+"""Single amplitudes of roll whose exceedance is told."""
 _NO_TANK: Final = "no tank"
 
 
@@ -85,36 +82,3 @@ def on_board_json(result: BenchResult) -> dict[str, Any]:
         "levels_rad": list(LEVELS_RAD),
         "runs": {name: asdict(each) for name, each in judged_runs(result).items()},
     }
-
-
-def on_board_table(result: BenchResult) -> Table:
-    """Table of what the roll is like for people at the scenario's place."""
-    place = result.scenario.place_on_board
-    table = Table(title="On board")
-    table.add_column("", no_wrap=True)
-    for heading in (
-        *(f"above\n{math.degrees(level):g}°" for level in _SHOWN_RAD),
-        "lateral\nRMS g",
-        "MII\n/min",
-        "MSI\n2 h",
-        "work\nallowed",
-    ):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.caption = (
-        "shares of the roll's amplitudes; interruptions of who stands; motion\n"
-        "sickness incidence by McCauley et al. 1976 (ISO 2631-1 gives more,\n"
-        f"from the dose in the JSON); NORDFORSK 1987; at {place.height_m:.1f} m above and\n"
-        f"{place.starboard_m:.1f} m to starboard of the centre of gravity, by roll alone"
-    )
-    for name, each in judged_runs(result).items():
-        felt, above = each.comfort, each.exceedance
-        shares = dict(zip(LEVELS_RAD, above, strict=True)) if above is not None else {}
-        table.add_row(
-            name,
-            *(f"{shares[level]:.1%}" if shares else "" for level in _SHOWN_RAD),
-            f"{felt.lateral_rms_m_s2 / GRAVITY_M_S2:.3f}",
-            f"{felt.interruptions_per_min:.2f}",
-            f"{felt.sickness_percent:.1f}%",
-            felt.allowed_work[-1] if felt.allowed_work else "none",
-        )
-    return table

@@ -1,28 +1,35 @@
-"""The tables that a bench prints."""
+"""The tables of a bench, made of its JSON: for the terminal and for the report."""
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 from rich.markup import escape
 from rich.table import Table as RichTable
 
-from firmware_sim.bench import BenchResult
-from firmware_sim.figures import RunFigures, figures
-from firmware_sim.retuning_figures import SETTLING_S, RetuningFigures, retuning_figures
+from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.scenario import PASSIVE
-from firmware_sim.verdicts import mark_of
-from utank_hil.analysis.motion.statistics import RollStatistics
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 NO_TANK: Final = "no tank"
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
+_SHOWN: Final = (1, 3)
+"""Of the levels whose exceedance is in the JSON: 5 and 10 degrees."""
+
+Told = Mapping[str, Any]
+"""What `firmware_sim.report.as_json` says of a bench, or a part of it."""
 
 
-def motion_table(result: BenchResult) -> RichTable:
+def tables(told: Told) -> list[RichTable]:
+    """All tables of a bench, without empty ones."""
+    found = [motion_table(told), pump_table(told), on_board_table(told), retuning_table(told)]
+    return [table for table in found if table.rows]
+
+
+def motion_table(told: Told) -> RichTable:
     """Table of how much the ship rolled; runs that do not count stand at its end."""
-    bare, runs = figures(result)
     table = _table(
-        f"{result.scenario.name} · {result.mode} · seed {result.seed}",
+        f"{told['scenario']} · {told['mode']} · seed {told['seed']}",
         "roll\nRMS °",
         "signif.\n°",
         "max.\n°",
@@ -32,43 +39,50 @@ def motion_table(result: BenchResult) -> RichTable:
         "water\nstrikes",
     )
     table.caption = (
-        f"{result.settle_s:g} s to {result.end_s:g} s of the same waves; strikes of the whole run"
+        f"{told['settle_s']:g} s to {told['end_s']:g} s of the same waves; strikes of the whole run"
     )
-    counting = [run for run in runs if run.ranked]
-    capsized = result.without_tank_capsized_s < result.end_s
+    bare, compared = told["no_tank"], _compared(told)
+    counting = [run for run in compared if run["ranked"]]
+    capsized_s = bare["capsized_s"]
+    capsized = capsized_s is not None and capsized_s < told["end_s"]
     table.add_row(
         NO_TANK, *_roll_cells(bare), "capsized" if capsized else "", end_section=not counting
     )
     for run in counting:
         table.add_row(*_motion_cells(run), end_section=run is counting[-1])
-    marks = {run.name: mark_of(result, run) for run in result.runs}
-    for run in runs:
-        mark = marks[run.name]
-        if mark is not None:
-            table.add_row(*_motion_cells(run, mark.word), style="red")
+    for run in compared:
+        if run["mark"] is not None:
+            table.add_row(*_motion_cells(run), style="red")
     return table
 
 
-def _motion_cells(run: RunFigures, mark: str = "") -> tuple[str, ...]:
+def _compared(told: Told) -> list[Told]:
+    return [run for run in told["runs"] if run["compared"]]
+
+
+def _motion_cells(run: Told) -> tuple[str, ...]:
+    passive = run["name"] == PASSIVE
     return (
-        run.name,
-        *_roll_cells(run.roll),
-        mark or _percent(run.roll_below_no_tank),
-        "" if run.name == PASSIVE else _percent(run.roll_below_passive),
-        "" if run.name == PASSIVE else f"{run.active_share:.0%}",
-        str(run.strikes),
+        run["name"],
+        *_roll_cells(run["roll"]),
+        _percent(run["roll_below_no_tank"]) if run["mark"] is None else run["mark"]["word"],
+        "" if passive else _percent(run["roll_below_passive"]),
+        "" if passive else f"{run['active_share']:.0%}",
+        str(run["strikes"]),
     )
 
 
-def pump_table(result: BenchResult) -> RichTable:
+def pump_table(told: Told) -> RichTable:
     """Table of what pump and bus did for it."""
-    runs = figures(result)[1]
-    pumps = [run.pump for run in runs]
+    runs = _compared(told)
     columns = [
-        ("pressure\nRMS", *in_one_unit([pump.pressure_rms_pa for pump in pumps], "Pa")),
-        ("pressure\npeak", *in_one_unit([pump.pressure_peak_pa for pump in pumps], "Pa")),
-        ("power\nmean", *in_one_unit([pump.power_mean_w for pump in pumps], "W")),
-        ("power\npeak", *in_one_unit([pump.power_peak_w for pump in pumps], "W")),
+        (heading, *in_one_unit([run["pump"][name] for run in runs], unit))
+        for heading, name, unit in (
+            ("pressure\nRMS", "pressure_rms_pa", "Pa"),
+            ("pressure\npeak", "pressure_peak_pa", "Pa"),
+            ("power\nmean", "power_mean_w", "W"),
+            ("power\npeak", "power_peak_w", "W"),
+        )
     ]
     table = _table(
         "Pump and bus",
@@ -79,10 +93,10 @@ def pump_table(result: BenchResult) -> RichTable:
     table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
     for index, run in enumerate(runs):
         table.add_row(
-            run.name,
+            run["name"],
             *(cells[index] for _, _, cells in columns),
-            f"{run.pump.level_peak_m:.2f}",
-            f"{run.bus_load:.1%}",
+            f"{run['pump']['level_peak_m']:.2f}",
+            f"{run['bus_load']:.1%}",
         )
     return table
 
@@ -108,13 +122,39 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
 
 
-def retuning_table(result: BenchResult) -> RichTable | None:
-    """Table of what retuning found and gained; None where nothing retuned."""
-    found = {
-        run.name: retuning_figures(run, result.scenario, result.settle_s) for run in result.runs
-    }
-    if not any(found.values()):
-        return None
+def on_board_table(told: Told) -> RichTable:
+    """Table of what the roll is like for people at the scenario's place."""
+    judged = told["on_board"]
+    levels, place = judged["levels_rad"], judged["place"]
+    table = _table(
+        "On board",
+        *(f"above\n{math.degrees(levels[index]):g}°" for index in _SHOWN),
+        "lateral\nRMS g",
+        "MII\n/min",
+        "MSI\n2 h",
+        "work\nallowed",
+    )
+    table.caption = (
+        "shares of the roll's amplitudes; interruptions of who stands; motion\n"
+        "sickness incidence by McCauley et al. 1976 (ISO 2631-1 gives more,\n"
+        f"from the dose in the JSON); NORDFORSK 1987; at {place['height_m']:.1f} m above and\n"
+        f"{place['starboard_m']:.1f} m to starboard of the centre of gravity, by roll alone"
+    )
+    for name, each in judged["runs"].items():
+        felt, above = each["comfort"], each["exceedance"]
+        table.add_row(
+            name,
+            *("" if above is None else f"{above[index]:.1%}" for index in _SHOWN),
+            f"{felt['lateral_rms_m_s2'] / GRAVITY_M_S2:.3f}",
+            f"{felt['interruptions_per_min']:.2f}",
+            f"{felt['sickness_percent']:.1f}%",
+            felt["allowed_work"][-1] if felt["allowed_work"] else "none",
+        )
+    return table
+
+
+def retuning_table(told: Told) -> RichTable:
+    """Table of what retuning found and gained; without rows where nothing retuned."""
     table = _table(
         "Retuning",
         "retuned\nat s",
@@ -131,32 +171,31 @@ def retuning_table(result: BenchResult) -> RichTable | None:
         f"± one standard deviation; before the first identification, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
-    for name, retuning in found.items():
-        if retuning is not None:
-            table.add_row(name, *_retuning_cells(retuning))
+    for run in told["runs"]:
+        if run["retuning"] is not None:
+            table.add_row(run["name"], *_retuning_cells(run["retuning"]))
     return table
 
 
-def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
-    found, true = retuning.found, retuning.truth
+def _retuning_cells(retuning: Told) -> tuple[str, ...]:
+    found, true = retuning["found"], retuning["truth"]
     period = ship = tank = ""
     if found is not None:
-        deviation_s = found.roll_period_s * found.period_deviation
-        period = f"{found.roll_period_s:.3f} ± {deviation_s:.3f} / {true.roll_period_s:.3f}"
-        ship = f"{found.damping_nms_rad / 1e6:#.4g} / {true.damping_nms_rad / 1e6:#.4g}"
-        tank = f"{found.tank_damping_ratio:.4f} / {true.tank_damping_ratio:.4f}"
-    rolls = (retuning.roll_before_rad, retuning.roll_after_rad)
+        deviation_s = found["roll_period_s"] * found["period_deviation"]
+        period = f"{found['roll_period_s']:.3f} ± {deviation_s:.3f} / {true['roll_period_s']:.3f}"
+        ship = f"{found['damping_nms_rad'] / 1e6:#.4g} / {true['damping_nms_rad'] / 1e6:#.4g}"
+        tank = f"{found['tank_damping_ratio']:.4f} / {true['tank_damping_ratio']:.4f}"
+    rolls = (retuning["roll_before_rad"], retuning["roll_after_rad"])
+    state, attempts = retuning["state"], retuning["attempts"]
     return (
-        "" if retuning.retuned_at_s is None else f"{retuning.retuned_at_s:.0f}",
+        "" if retuning["retuned_at_s"] is None else f"{retuning['retuned_at_s']:.0f}",
         *("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls),
-        _percent(retuning.roll_after_below_before),
+        _percent(retuning["roll_after_below_before"]),
         period,
         ship,
         tank,
-        retuning.state
-        if retuning.attempts <= 1
-        else f"{retuning.state}, attempt {retuning.attempts}",
-        escape("; ".join(retuning.reasons)),
+        state if attempts <= 1 else f"{state}, attempt {attempts}",
+        escape("; ".join(retuning["reasons"])),
     )
 
 
@@ -172,9 +211,6 @@ def _table(title: str, *headings: str) -> RichTable:
     return table
 
 
-def _roll_cells(roll: RollStatistics) -> tuple[str, str, str]:
-    return (
-        f"{math.degrees(roll.rms_rad):.2f}",
-        "" if roll.significant_rad is None else f"{math.degrees(roll.significant_rad):.2f}",
-        f"{math.degrees(roll.maximum_rad):.2f}",
-    )
+def _roll_cells(roll: Told) -> tuple[str, ...]:
+    keys = ("rms_rad", "significant_rad", "maximum_rad")
+    return tuple("" if roll[key] is None else f"{math.degrees(roll[key]):.2f}" for key in keys)

@@ -77,10 +77,8 @@ def bench(
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name, run_bench
-    from firmware_sim.model_limits import passed_limits
-    from firmware_sim.on_board import on_board_table
-    from firmware_sim.report import REPORT_FILES, as_json, endings, exit_code, write_report
-    from firmware_sim.report_tables import motion_table, pump_table, retuning_table
+    from firmware_sim.report import REPORT_FILES, as_json, exit_code, write_report
+    from firmware_sim.report_tables import tables
     from firmware_sim.scenario import Scenario
 
     if bus is not None and not real_time:
@@ -126,20 +124,16 @@ def bench(
             fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
     files, failures = write_report(result, out, about)
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
+    told = as_json(result, files, about)
     if json_:
-        sys.stdout.write(json.dumps(as_json(result, files, about)) + "\n")
+        sys.stdout.write(json.dumps(told) + "\n")
     else:
         console = Console()
-        print_table(console, motion_table(result))
-        print_table(console, pump_table(result))
-        if (on_board := on_board_table(result)).rows:  # not all of them capsized
-            print_table(console, on_board)
-        retuning = retuning_table(result)
-        if retuning is not None:
-            print_table(console, retuning)
-        for ending in endings(result):
+        for table in tables(told):
+            print_table(console, table)
+        for ending in told["endings"]:
             console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
-        for limit in passed_limits(result):
+        for limit in told["limits_passed"]:
             console.print(f"[yellow]{escape(limit)}[/yellow]", soft_wrap=True)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:

@@ -11,10 +11,10 @@ import pytest
 from firmware_sim import report
 from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
 from firmware_sim.figures import figures
-from firmware_sim.on_board import on_board, on_board_table
+from firmware_sim.on_board import on_board
 from firmware_sim.place import Place
 from firmware_sim.report import as_json, endings, exit_code, write_report
-from firmware_sim.report_tables import motion_table
+from firmware_sim.report_tables import motion_table, on_board_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
@@ -76,7 +76,7 @@ def test_people_on_board_are_judged_over_the_window_and_stand_in_the_json(storm)
     roll = result.runs[1].column("true_roll_rad")[round(SETTLE_S / RECORD_S) :]
     expected = on_board(roll, RECORD_S, Place(**told["place"]))
     assert told["runs"][result.runs[1].name] == dataclasses.asdict(expected)
-    table = on_board_table(result)
+    table = on_board_table(as_json(result, {}, {}))
     assert table.row_count == len(told["runs"])
     assert "7.9 m above" in str(table.caption)
 
@@ -186,7 +186,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
     drawn: list[BenchCurve] = []
     monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
     write_report(result, tmp_path, about(result, tmp_path))
-    cells = [list(column.cells) for column in motion_table(result).columns]
+    cells = [list(column.cells) for column in motion_table(as_json(result, {}, {})).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
     for run, curve in zip(result.runs, drawn, strict=True):
         name, rms, _, _, _, below, _, _ = table[run.name]
@@ -254,7 +254,7 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
         assert run.roll_below_passive == pytest.approx(1 - own / rms[1], abs=1e-9)
     assert endings(shortened) == ["ended at 90 of 120 s", "not run: lqg"]
     assert exit_code(shortened) is ExitCode.INTERRUPTED
-    assert "40 s to 90 s" in str(motion_table(shortened).caption)
+    assert "40 s to 90 s" in str(motion_table(as_json(shortened, {}, {})).caption)
     as_told = as_json(shortened, {}, {})
     assert (as_told["interrupted"], as_told["not_run"]) == (True, ["lqg"])
     assert (as_told["duration_s"], as_told["end_s"]) == (DURATION_S, pytest.approx(90.0))
@@ -268,7 +268,9 @@ def test_unfinished_runs_are_all_compared_over_the_time_they_share(storm) -> Non
         (slice(1000, None), "ended at 120 s with 1400 of the 1600 rows from 40 s to 120 s"),
     ],
 )
-def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why: str) -> None:
+def test_run_with_too_few_rows_is_told_and_not_compared(
+    storm, rows: slice, why: str, tmp_path: Path
+) -> None:
     result, _ = storm
     *whole, last = result.runs
     runs = (*whole, cut(last, rows))
@@ -283,6 +285,8 @@ def test_run_with_too_few_rows_is_told_and_not_compared(storm, rows: slice, why:
     told = as_json(some, {}, {})["runs"][-1]
     assert (told["name"], told["compared"]) == (last.name, False)
     assert "roll" not in told
+    _, failures = write_report(some, tmp_path, about(some, tmp_path))
+    assert failures == []
     # without the passive run, nothing is said to be below it
     lone = dataclasses.replace(result, runs=(cut(whole[0], rows), *whole[1:], last))
     assert all(run.roll_below_passive is None for run in figures(lone)[1])
@@ -307,7 +311,7 @@ def test_figure_that_can_not_be_told_is_an_empty_cell_and_null(storm) -> None:
         end_s=2.0,
         without_tank_rad=result.without_tank_rad[:count],
     )
-    significant = list(motion_table(short).columns[2].cells)
+    significant = list(motion_table(as_json(short, {}, {})).columns[2].cells)
     assert significant == [""] * (1 + len(result.runs))
     told = json.loads(json.dumps(as_json(short, {}, {}), allow_nan=False))
     assert told["no_tank"]["significant_rad"] is None

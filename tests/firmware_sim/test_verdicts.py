@@ -83,7 +83,7 @@ def test_runs_that_count_are_ranked_by_their_roll_with_reductions() -> None:
     assert told["b"].roll_below_passive == pytest.approx(0.5)
     assert endings(result) == []
     assert exit_code(result) is ExitCode.OK
-    assert list(motion_table(result).columns[6].cells) == ["", "", "100%", "100%"]
+    assert list(motion_table(as_json(result, {}, {})).columns[6].cells) == ["", "", "100%", "100%"]
 
 
 BAD = {
@@ -120,7 +120,11 @@ def test_a_marked_run_is_not_ranked_gives_no_reduction_and_the_exit_code_says_so
     (said,) = endings(result)
     assert said.startswith(f"bad: not ranked, {why}")
     assert exit_code(result) is ExitCode.NOT_RANKED
-    rows = list(zip(*(column.cells for column in motion_table(result).columns), strict=True))
+    rows = list(
+        zip(
+            *(column.cells for column in motion_table(as_json(result, {}, {})).columns), strict=True
+        )
+    )
     assert [row[0] for row in rows] == ["no tank", "passive", "good", "bad"]
     assert rows[-1][4:6] == (word, "")
     json_run = json.loads(json.dumps(as_json(result, {}, {}), allow_nan=False))["runs"][1]
@@ -254,6 +258,6 @@ def test_a_column_has_one_unit_in_which_its_largest_value_is_readable(values: li
 
 def test_small_ships_pumps_are_shown_in_kilowatts() -> None:
     weak = with_column(run("a", 0.03), "true_shaft_power_w", 4.2e3, slice(None))
-    table = pump_table(result_of(PASSIVE_RUN, weak))
+    table = pump_table(as_json(result_of(PASSIVE_RUN, weak), {}, {}))
     assert [column.header for column in table.columns][3:5] == ["power\nmean kW", "power\npeak kW"]
     assert list(table.columns[3].cells) == ["0.00", "4.20"]

@@ -3,13 +3,19 @@
 import json
 import sys
 import tempfile
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from utank_hil.commands.common import Json, fail, notes, shown
 
+if TYPE_CHECKING:
+    from utank_hil.commands.report_parts import Report, ReportKind
+
+GROUP: Final = "utank_hil.reports"
+"""Entry points of kinds of runs that leave a folder (`ReportKind`)."""
 PAGE: Final = "report.html"
 
 
@@ -49,39 +55,36 @@ def write_page(runs: list[Path], page: Path) -> Path:
     OSError, ValueError
         If a run can't be read or the page can't be written; says which.
     """
-    from utank_hil.commands.report_bench import FIGURES, bench_sections
-    from utank_hil.commands.report_campaign import SUMMARY, campaign_sections
-    from utank_hil.commands.report_recording import recording_sections
     from utank_hil.pictures.report_page import write_report_page
 
-    verdicts, sections, headings = [], [], []
-    for run in runs:
-        with tempfile.TemporaryDirectory() as scratch:
-            if run.is_dir() and (run / FIGURES).exists():
-                try:
-                    found = bench_sections(run, Path(scratch))
-                except KeyError as error:
-                    raise ValueError(
-                        f"{run / FIGURES}: has no {error}: it is of another version, run the bench "
-                        "again"
-                    ) from error
-            elif run.is_dir() and (run / SUMMARY).exists():
-                found = campaign_sections(run)
-            elif run.is_file():
-                found = recording_sections(run, Path(scratch))
-            elif run.is_dir():
-                raise ValueError(
-                    f"{run}: holds no {FIGURES} and no {SUMMARY}: give the folder of a bench or "
-                    "of a campaign, or the .rrd file of a run"
-                )
-            else:
-                raise ValueError(f"{run}: is not there")
-            title, below, verdict, parts = found
-            headings.append((title, below))
-            verdicts.append(verdict)
-            sections += parts
-    title, below = headings[0]
-    if len(headings) > 1:
-        title = ", ".join(title for title, _ in headings)
-        below = " ".join(f"{title}: {below}" for title, below in headings)
+    reports = [_report(run) for run in runs]
+    title, below = reports[0].title, reports[0].below
+    if len(reports) > 1:
+        title = ", ".join(each.title for each in reports)
+        below = " ".join(f"{each.title}: {each.below}" for each in reports)
+    verdicts = [each.verdict for each in reports]
+    sections = [section for each in reports for section in each.sections]
     return write_report_page(page, title, below, verdicts, sections)
+
+
+def _report(run: Path) -> "Report":
+    from utank_hil.commands.report_recording import recording_report
+
+    if not run.exists():
+        raise ValueError(f"{run}: is not there")
+    with tempfile.TemporaryDirectory() as scratch:
+        if run.is_file():
+            return recording_report(run, Path(scratch))
+        kinds: list[ReportKind] = [point.load() for point in entry_points(group=GROUP)]
+        for kind in kinds:
+            if (run / kind.file).exists():
+                try:
+                    return kind.report(run, Path(scratch))
+                except KeyError as error:
+                    reason = f"has no {error}: it is of another version, make it again"
+                    raise ValueError(f"{run / kind.file}: {reason}") from error
+    files = " and no ".join(kind.file for kind in kinds)
+    raise ValueError(
+        f"{run}: holds no {files}: give the folder of a bench or of a campaign, or the .rrd file "
+        "of a run"
+    )

@@ -1,14 +1,54 @@
-"""Sections that every report has: the roll's statistics, and where the results come from."""
+"""What every report has: its parts, the roll's statistics, and where the results come from."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
+from rich.table import Table
+from rich.text import Text
 
 from utank_hil.arrays import FloatArray
-from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.pictures.roll_statistics import draw_roll_statistics
+
+
+class Report(NamedTuple):
+    """The report of a run: heading, the line below it, what is said first of all, and the rest."""
+
+    title: str
+    below: str
+    verdict: Verdict
+    sections: Sequence[ReportSection]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportKind:
+    """A kind of run that can be reported.
+
+    Attributes
+    ----------
+    file : str
+        By which the run's folder is known.
+    report : callable
+        Of the folder, with another one for pictures that are made for the report. Raises OSError
+        or ValueError for what it can't read, KeyError for what another version wrote.
+    """
+
+    file: str
+    report: Callable[[Path, Path], Report]
+
+
+def printed(table: Table) -> ReportTable:
+    """A table of the terminal."""
+
+    def plain(markup: object) -> str:
+        return " ".join(Text.from_markup(str(markup or "")).plain.split())
+
+    rows = zip(*([plain(cell) for cell in column.cells] for column in table.columns), strict=True)
+    caption = ": ".join(filter(None, (plain(table.title), plain(table.caption))))
+    return ReportTable([plain(column.header) for column in table.columns], list(rows), caption)
 
 
 def roll_figure(rolls: Mapping[str, FloatArray], step_s: float, scratch: Path) -> ReportSection:

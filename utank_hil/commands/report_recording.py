@@ -10,7 +10,7 @@ import numpy as np
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.commands.report_parts import about_section, roll_figure
+from utank_hil.commands.report_parts import Report, about_section, roll_figure
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import (
     ReportPicture,
@@ -27,8 +27,8 @@ RUN, LOG = "run-", "log-"
 """Beginnings of the names of a run's recording and of its log of alarms."""
 
 
-def recording_sections(file: Path, scratch: Path) -> tuple[str, str, Verdict, list[ReportSection]]:
-    """Title, line below it, verdict and sections of a recording's report.
+def recording_report(file: Path, scratch: Path) -> Report:
+    """The report of a recording.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def recording_sections(file: Path, scratch: Path) -> tuple[str, str, Verdict, li
         sections.append(about_section(about, about["configuration"]))
     title = (about or {}).get("configuration", {}).get("name", name)
     below = f"Recording {file.name}, {duration_s:.0f} s" + (f", {about['date']}." if about else ".")
-    return f"{title}: run", below, _verdict(rows, alarms), sections
+    return Report(f"{title}: run", below, _verdict(rows, alarms), sections)
 
 
 def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdict:

@@ -1,0 +1,69 @@
+"""What a report says of a campaign: read from the files that it left."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from firmware_sim.campaign.store import PICTURE, SUMMARY
+from firmware_sim.campaign.tables import interval, pairs_table, runs_table
+from firmware_sim.scenario import PASSIVE
+from utank_hil.commands.report_parts import Report, ReportKind, about_section, printed
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
+
+MOST_LINES: Final = 8
+"""Of the verdict."""
+
+
+def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001
+    """The report of a campaign.
+
+    Parameters
+    ----------
+    folder : Path
+        What ``utank-hil campaign --out`` wrote.
+    scratch : Path
+        As of every report; this one makes no pictures.
+
+    Raises
+    ------
+    OSError, ValueError
+        If a file of the campaign is missing or is none.
+    """
+    told = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    groups, failed, study = told["groups"], told["failures"], told["configuration"]
+    picture = ReportPicture((folder / PICTURE).read_bytes(), "Rolls of each run, with intervals")
+    tables = [printed(runs_table(groups, "Runs")), printed(pairs_table(groups))]
+    sections = [
+        ReportSection("Results", pictures=[picture], tables=tables),
+        ReportSection("What it leaves out", [f"{each}." for each in told["leaves_out"]]),
+    ]
+    if failed:
+        rows = [[reason, str(count)] for reason, count in failed.items()]
+        table = ReportTable(["reason", "cases"], rows, text=True)
+        sections.append(ReportSection("Cases without a result", tables=[table]))
+    sections.append(about_section(told, study))
+    below = f"{told['cases']} cases, simulation {study['simulation']}. {told['date']}."
+    title = f"{study.get('name') or folder.name}: campaign"
+    return Report(title, below, _verdict(told), sections)
+
+
+CAMPAIGN: Final = ReportKind(SUMMARY, campaign_report)
+
+
+def _verdict(told: dict[str, Any]) -> Verdict:
+    lines = []
+    for group in told["groups"]:
+        where = ", ".join(f"{key} {value}" for key, value in group["parameters"].items())
+        lines += [
+            f"{pair['run']}{f' ({where})' if where else ''}: "
+            f"{interval(pair['share_below'], 100, 1)} % below the passive tank, mean of "
+            f"{pair['share_below']['cases']} pairs."
+            for pair in group["paired"]
+            if pair["against"] == PASSIVE
+        ]
+    wrong = []
+    if told["interrupted"]:
+        wrong.append("The campaign was interrupted: --resume goes on from there.")
+    if told["failures"]:
+        wrong.append(f"{sum(told['failures'].values())} cases have no result.")
+    return Verdict([*lines[:MOST_LINES], *wrong], good=not wrong)

@@ -1,0 +1,127 @@
+"""What a report says of a bench: read from the files that it left."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from firmware_sim.report_tables import tables
+from firmware_sim.scenario import PASSIVE
+from utank_hil.arrays import FloatArray
+from utank_hil.commands.check_report import ship_line
+from utank_hil.commands.report_parts import (
+    Report,
+    ReportKind,
+    about_section,
+    printed,
+    roll_figure,
+)
+from utank_hil.configuration import Vessel
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
+from utank_hil.telemetry import read_recording
+
+Recorded = Mapping[str, Mapping[str, FloatArray]]
+"""Columns by run."""
+FIGURES, PICTURE, RECORDING = "bench.json", "bench.png", "bench.rrd"
+
+
+def bench_report(folder: Path, scratch: Path) -> Report:
+    """The report of a bench.
+
+    Parameters
+    ----------
+    folder : Path
+        What ``utank-hil bench --out`` wrote.
+    scratch : Path
+        Folder for pictures that are made for the report.
+
+    Raises
+    ------
+    OSError, ValueError
+        If a file of the bench is missing or is none.
+    """
+    told = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+    says = "Roll and power of each run, and roll, level and pressure over time"
+    sections = [
+        ReportSection("What was run", _what_was_run(told)),
+        ReportSection(
+            "Roll and cost",
+            pictures=[ReportPicture((folder / PICTURE).read_bytes(), says)],
+            tables=[printed(table) for table in tables(told)],
+        ),
+        *_roll_figure(told, read_recording(folder / RECORDING), scratch),
+        _deadlines(told),
+        about_section(told, told["configuration"]),
+    ]
+    below = (
+        f"{told['mode']}, seed {told['seed']}, {told['settle_s']:g} s to {told['end_s']:g} s of "
+        f"the same waves for each run. {told['date']}."
+    )
+    return Report(f"{told['scenario']}: bench", below, _verdict(told), sections)
+
+
+BENCH: Final = ReportKind(FIGURES, bench_report)
+
+
+def _roll_figure(told: dict[str, Any], recorded: Recorded, scratch: Path) -> list[ReportSection]:
+    # a run that is not compared may have ended before the compared time begins
+    compared = [run["name"] for run in told["runs"] if run["compared"]]
+    rolls = {}
+    for name in compared:
+        time_s = recorded[name]["time_s"]
+        between = (time_s >= told["settle_s"]) & (time_s <= told["end_s"])
+        rolls[name] = recorded[name]["true_roll_rad"][between]
+    if not rolls:
+        return []
+    step_s = float(np.median(np.diff(recorded[compared[0]]["time_s"])))
+    return [roll_figure(rolls, step_s, scratch)]
+
+
+def _verdict(told: dict[str, Any]) -> Verdict:
+    ranked = [run for run in told["runs"] if run["ranked"] and run["name"] != PASSIVE]
+    lines = []
+    if ranked:
+        best = min(ranked, key=lambda run: run["rank"])
+        below, bare = best["roll_below_passive"], best["roll_below_no_tank"]
+        line = f"{best['name']} rolls {math.degrees(best['roll']['rms_rad']):.2f}° RMS"
+        if below is not None:
+            line += f", {_less(below)} than the passive tank"
+        if bare is not None:
+            line += f" and {_less(bare)} than no tank"
+        power = best["pump"]["power_mean_w"]
+        lines.append(f"{line}, for {power / 1e3:.3g} kW of shaft power on average.")
+    wrong = [*told["endings"], *told["limits_passed"]]
+    lines += wrong or ["No run failed, and no limit of the model was passed."]
+    return Verdict(lines, good=not wrong)
+
+
+def _less(share: float) -> str:
+    return f"{abs(share):.0%} {'less' if share >= 0 else 'more'}"
+
+
+def _what_was_run(told: dict[str, Any]) -> list[str]:
+    vessel = Vessel.model_validate(told["configuration"]["vessel"])
+    sea = told["configuration"]["sea"]
+    keys = ("kind", "hs_m", "tp_s", "time", "heading_deg")
+    names = [run["name"] for run in told["runs"] if run["name"] != PASSIVE]
+    return [
+        f"Ship: {vessel.name}. {ship_line(vessel)}",
+        f"Sea: {', '.join(f'{key} {sea[key]}' for key in keys if sea.get(key) is not None)}.",
+        f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
+    ]
+
+
+def _deadlines(told: dict[str, Any]) -> ReportSection:
+    loops = {run["name"]: run["loop"] for run in told["runs"] if run["loop"]}
+    if not loops:
+        return ReportSection("Deadlines", ["Simulated time: there are none."])
+    keys = [key for key, value in next(iter(loops.values())).items() if not isinstance(value, dict)]
+    rows = [
+        [name, *(f"{loop[key]:.4g}" if loop[key] is not None else "" for key in keys)]
+        for name, loop in loops.items()
+    ]
+    headings = ["", *(key.replace("_", " ") for key in keys)]
+    return ReportSection("Deadlines", tables=[ReportTable(headings, rows)])
