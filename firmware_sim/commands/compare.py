@@ -88,7 +88,7 @@ def _table(reference: Path, found: list["Comparison"]) -> Table:
     )
     for heading in ("run", *found[0].parameters, "figure"):
         table.add_column(heading, no_wrap=True)
-    for heading in ("reference", "this", "difference", "%", "pairs"):
+    for heading in ("first", "this", "difference", "%", "pairs"):
         table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
         for name, figure in each.figures.items():
@@ -101,14 +101,13 @@ def _cells(name: str, figure: "Difference") -> list[str]:
     scale, unit = _unit(name)
     width = "" if figure.half_width is None else f" ± {scale * figure.half_width:.3g}"
     share = f"{figure.difference / figure.reference:+.1%}" if figure.reference else ""
-    count = str(figure.count) if figure.paired else f"{figure.count}, not paired"
     return [
         f"{name.rsplit('_', 1)[0] if unit not in ('', '%') else name} {unit}".strip(),
         f"{scale * figure.reference:.4g}",
         f"{scale * figure.value:.4g}",
         f"{scale * figure.difference:+.3g}{width}",
         "" if name in _SHARES else share,
-        count,
+        str(figure.count) if figure.paired else "none",
     ]
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from firmware_sim.comparison.difference import (
+    CompareError,
     Comparison,
     Difference,
     differing,
@@ -26,8 +27,11 @@ BATCH_PERIODS: Final = 20
 MOST_BATCHES, LEAST_BATCHES = 30, 6
 _WAVES: Final = ("sea", "voyage", "vessel")
 
-Runs = dict[str, dict[str, FloatArray]]
+LEAST_KNOWN: Final = 0.9
+"""Of the values of a column, for a figure to be made from it."""
 
+Columns = dict[str, FloatArray]
+Runs = dict[str, Columns]
 
 _FIGURES: Final = {
     "roll_rms_rad": ("true_roll_rad", "roll_rad"),
@@ -68,7 +72,7 @@ class Record:
             text = text.replace(json.dumps(name), json.dumps(digest))
         return text
 
-    def columns(self, run: str) -> dict[str, FloatArray]:
+    def columns(self, run: str) -> Columns:
         """One run without the time that its scenario leaves out at the start."""
         columns = self.runs[run]
         settle_s = self.about.get("configuration", {}).get("settle_s", 0.0)
@@ -100,7 +104,7 @@ def compare_records(reference: Path, others: list[Path]) -> list[Comparison]:
     Raises
     ------
     CompareError
-        If they have no run in common.
+        If they have no run in common, or runs no column.
     ValueError
         If a file is no recording.
     """
@@ -125,32 +129,46 @@ def _compared(first: Record, second: Record) -> list[Comparison]:
         counts = [_batches(each) for each in (one, two)]
         if same:
             counts = [min(counts)] * 2
-        figures = {
-            name: _figure(one[column], two[column], name, counts, paired_=same)
-            for name, columns in _FIGURES.items()
-            if (column := _known(one, two, columns)) is not None
-        }
+        figures = {}
+        for name, columns in _FIGURES.items():
+            known = _known(one, two, columns)
+            if known is not None:
+                figures[name] = _figure(*_without_gaps(*known, same), name, counts, paired_=same)
+        if not figures:
+            raise CompareError(
+                f"{second.path}: run {other} has no column of which it and run {run} of "
+                f"{first.path} know {LEAST_KNOWN:.0%} of the values"
+            )
         if min(counts) < LEAST_BATCHES:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * BATCH_PERIODS} rolls")
         found.append(Comparison(str(second.path), run, {}, figures, tuple(remarks)))
     return found
 
 
-def _at_same_times(one: dict[str, FloatArray], two: dict[str, FloatArray]) -> bool:
+def _at_same_times(one: Columns, two: Columns) -> bool:
     count = min(len(one["time_s"]), len(two["time_s"]))
     longest = max(len(one["time_s"]), len(two["time_s"]))
     return count == longest and bool(np.abs(one["time_s"] - two["time_s"]).max(initial=0) < 1e-3)
 
 
 def _known(
-    one: dict[str, FloatArray], two: dict[str, FloatArray], names: tuple[str, ...]
-) -> str | None:
-    """The first of some columns that both have, without gaps."""
-    both = (name for name in names if name in one and name in two)
-    return next(
-        (name for name in both if np.isfinite(one[name]).all() and np.isfinite(two[name]).all()),
-        None,
-    )
+    one: Columns, two: Columns, names: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray] | None:
+    """Of both, the first column that has few gaps in either; sensors start after the log."""
+    for name in names:
+        if name in one and name in two:
+            both = one[name], two[name]
+            if all(np.isfinite(each).mean() >= LEAST_KNOWN for each in both):
+                return both
+    return None
+
+
+def _without_gaps(one: FloatArray, two: FloatArray, same: bool) -> tuple[FloatArray, FloatArray]:
+    """Both without the rows that they do not know; if their times are the `same`, that either."""
+    kept_one, kept_two = np.isfinite(one), np.isfinite(two)
+    if same:
+        kept_one = kept_two = kept_one & kept_two
+    return one[kept_one], two[kept_two]
 
 
 def _figure(
@@ -166,7 +184,7 @@ def _figure(
     return paired(*values) if paired_ else independent(*values)
 
 
-def _batches(run: dict[str, FloatArray]) -> int:
+def _batches(run: Columns) -> int:
     """Batches of a run, each of `BATCH_PERIODS` rolls or more."""
     roll_rad = run.get("true_roll_rad", run["roll_rad"])
     roll_rad = roll_rad[np.isfinite(roll_rad)]

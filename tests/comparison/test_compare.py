@@ -159,6 +159,40 @@ def test_recording_and_somebody_s_table_are_compared_by_the_columns_that_both_ha
     assert "has no column roll_rad or roll_deg" in done.stderr
 
 
+def test_gaps_are_left_out_if_they_are_few(tmp_path: Path):
+    roll = waves(5, 1800.0)
+    first, second = roll.copy(), 0.5 * roll
+    first[:100] = np.nan  # the sensor starts after the log
+    second[7000:8000] = np.nan
+    about = {"configuration": {"sea": {}}, "seed": 1}
+    paths = [
+        recorded(tmp_path / f"{n}.rrd", each, **about) for n, each in enumerate((first, second))
+    ]
+    (each,) = found(*paths)["comparisons"]
+    figure = each["figures"]["roll_rms_rad"]
+    assert figure["paired"]
+    assert figure["difference"] == pytest.approx(-0.5 * figure["reference"], rel=1e-4)
+    second[: len(roll) // 5] = np.nan
+    recorded(tmp_path / "1.rrd", second, **about)
+    (each,) = found(*paths)["comparisons"]
+    assert "roll_rms_rad" not in each["figures"]
+    table = tmp_path / "measured.csv"
+    rows = "".join(f"{k / 20},{'' if k % 3 else 0.1}\n" for k in range(9000))
+    table.write_text(f"time_s,roll_rad\n{rows}")
+    done = CliRunner().invoke(APP, [str(paths[0]), str(table)])
+    assert done.exit_code == 2
+    assert "know 90% of the values" in done.stderr
+
+
+def test_table_of_a_bench_fits_eighty_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+    for n in (1, 2):
+        recorded(Path(f"{n}.rrd"), waves(n, 2400.0))
+    done = CliRunner().invoke(APP, ["1.rrd", "2.rrd"])
+    assert "┃ figure " in done.stdout
+
+
 def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
     short = [recorded(tmp_path / f"{n}.rrd", waves(n, 300.0)) for n in (1, 2)]
     (each,) = found(*short)["comparisons"]
