@@ -75,11 +75,11 @@ def firmware_sim(
 ) -> None:
     """Emulate ship, tank, sensors, pump drive and operator of a scenario until Ctrl-C.
 
-    With [bold]utank-hil run[/bold] on the same bus this is a bench. Hardware on the bus takes the
+    With **utank-hil run** on the same bus this is a bench. Hardware on the bus takes the
     place of nodes that are left out; without the drive, the ship's pump gives the pressure that the
     real drive reports.
 
-    [bold]Example:[/bold] firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
+    **Example:** firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
     loaded = load(scenario, Scenario)
     if loaded.faults:

@@ -69,9 +69,9 @@ def bench(
 ) -> None:
     """Run a scenario: the tank passive, then with each controller, in the same waves.
 
-    [bold]Example:[/bold] utank-hil bench --seed 7 --duration 600
+    **Example:** utank-hil bench --seed 7 --duration 600
 
-    In real time each run lasts its duration; without [bold]--duration[/bold] that is 120 s. A run
+    In real time each run lasts its duration; without **--duration** that is 120 s. A run
     that capsized, ended in a fault or was not in charge is marked, not ranked, and the exit code
     says so (docs/exit-codes.md).
     """

@@ -42,9 +42,9 @@ def campaign(
 ) -> None:
     """Run the cases of a study, keep their figures as Parquet, and compare the laws.
 
-    [bold]Example:[/bold] utank-hil campaign configs/studies/storm_seeds.yaml --resume
+    **Example:** utank-hil campaign configs/studies/storm_seeds.yaml --resume
 
-    After Ctrl-C, or if it was killed, the same command with [bold]--resume[/bold] goes on where it
+    After Ctrl-C, or if it was killed, the same command with **--resume** goes on where it
     was. A case that fails is recorded with its reason and ends nothing.
     """
     # loaded when it runs: `--help` needs none of it

@@ -36,7 +36,7 @@ def compare(
 ) -> None:
     """Compare runs, recordings or campaigns with the first: differences with 95 % intervals.
 
-    [bold]Example:[/bold] utank-hil compare out/before out/after
+    **Example:** utank-hil compare out/before out/after
 
     Where the waves are the same, values are compared pair by pair: cases of campaigns, and pieces
     of recordings of the same seed and sea.

@@ -44,7 +44,7 @@ def controller(
     Roll, level and pressure are linear predictions for the scenario's sea, without any limit of
     pump or tank. Laws that miss a required margin are marked as refused.
 
-    [bold]Example:[/bold] utank-hil design controller configs/controllers/gpc.yaml
+    **Example:** utank-hil design controller configs/controllers/gpc.yaml
     """
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.trade import Design, trade

@@ -47,7 +47,7 @@ def tank(
     height and place, and differs in duct area and damping. Roll is a linear prediction. The active
     tank has an LQG law that meets the required margins, within the limits of pump and level.
 
-    [bold]Example:[/bold] utank-hil design tank configs/ships/naval_vessel.yaml --sweep
+    **Example:** utank-hil design tank configs/ships/naval_vessel.yaml --sweep
     """
     from firmware_sim.tank_report import loading_json, loading_table, sweep_json, sweep_tables
     from utank_hil.analysis.tank_design import best_passive_tank

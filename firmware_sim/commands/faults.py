@@ -47,11 +47,11 @@ def faults(
 ) -> None:
     """Inject each fault of the fault table and judge what becomes of it.
 
-    [bold]Example:[/bold] utank-hil faults --rows motion,F19 --seeds 10
+    **Example:** utank-hil faults --rows motion,F19 --seeds 10
 
-    In lockstep on all cores. Without [bold]--full[/bold] the roll is compared over 60 s, and over
+    In lockstep on all cores. Without **--full** the roll is compared over 60 s, and over
     20 s where the controller stays in charge. Rows that need processes and an interface run with
-    [bold]--bus[/bold] only. The exit code says whether a row failed (docs/exit-codes.md).
+    **--bus** only. The exit code says whether a row failed (docs/exit-codes.md).
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign

@@ -98,7 +98,7 @@ def init(
     The tank is sized by stability, frequency and room, the pump by the water it must move, and the
     law is one that meets the required margins. Exit code 1: no tank can be, and why.
 
-    [bold]Example:[/bold] utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
+    **Example:** utank-hil init patrol --length 63 --beam 9.5 --displacement 1900
     --gm 0.9 --roll-period 9.5
     """
     from firmware_sim.starter import FILES, make_starter

@@ -58,7 +58,7 @@ def passed(file: Path, bus: str = "can0", *checks: Check, ended: str = "") -> Pa
 def test_without_a_record_the_reason_names_the_command(file: Path) -> None:
     assert reason(file) == (
         f"{record_path(file)}: there is no record of a commissioning; run utank-hil commission "
-        f"{file} --channel can0 at the quay"
+        f"{file} --bus can0 at the quay"
     )
 
 
@@ -180,7 +180,7 @@ def commission(monkeypatch: pytest.MonkeyPatch, loop: type[AtTheQuay], *words: o
     monkeypatch.setattr(module, "RealTimeLoop", loop)
     application = new_app()
     application.command()(module.commission)
-    return CliRunner().invoke(application, [*map(str, words), "--channel", "can0"])
+    return CliRunner().invoke(application, [*map(str, words), "--bus", "can0"])
 
 
 def test_the_command_leads_through_and_writes_the_record(

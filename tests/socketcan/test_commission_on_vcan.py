@@ -55,7 +55,7 @@ def run_until(folder: Path, controller: Path, record: Path, mode: Mode, fault: F
 
 
 def commission(folder: Path, controller: Path, record: Path) -> dict[str, Any]:
-    words = ("utank-hil", "commission", controller, "--channel", CHANNEL, "--json")
+    words = ("utank-hil", "commission", controller, "--bus", CHANNEL, "--json")
     watcher = Watcher()
     try:
         with (

@@ -31,7 +31,7 @@ def check(
     Exit code 0: fit to be used. 1: a law misses the required margins. 2: the file is wrong; every
     error is listed with file, key and reason.
 
-    [bold]Example:[/bold] utank-hil check configs/controllers/gpc.yaml
+    **Example:** utank-hil check configs/controllers/gpc.yaml
     """
     from utank_hil.commands import check_report as report
 

@@ -32,9 +32,7 @@ SAY_TICKS: Final = 500
 
 def commission(
     config: Annotated[Path, typer.Argument(help="Controller configuration.")],
-    channel: Annotated[
-        str, typer.Option("--channel", "--bus", help="SocketCAN interface, for example can0.")
-    ],
+    channel: Annotated[str, typer.Option("--bus", help="SocketCAN interface, for example can0.")],
     record: Annotated[
         Path | None,
         typer.Option(
@@ -53,7 +51,7 @@ def commission(
     to 2 degrees. Stop and disarm act as always. What is wrong is named with its remedy. Without a
     record that it was passed, utank-hil run refuses to arm (docs/commissioning.md).
 
-    [bold]Example:[/bold] utank-hil commission controller.yaml --channel can0
+    **Example:** utank-hil commission controller.yaml --bus can0
     """
     loaded = load(config, ControllerConfig)
     path = record or record_path(config)

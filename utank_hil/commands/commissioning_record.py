@@ -119,7 +119,7 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     if (vessel.pump is None and vessel.valve is None) or (path is None and _is_emulated(bus)):
         return ""
     path = path or record_path(file)
-    remedy = f"run utank-hil commission {file} --channel {bus} at the quay"
+    remedy = f"run utank-hil commission {file} --bus {bus} at the quay"
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         stands_for, passed, date = (record[key] for key in ("commissioned_for", "passed", "date"))

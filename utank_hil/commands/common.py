@@ -67,7 +67,7 @@ def new_app(
         no_args_is_help=True,
         add_completion=completion,
         pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
+        rich_markup_mode="markdown",
         context_settings={"help_option_names": ["-h", "--help"]},
         help=help_text,
     )

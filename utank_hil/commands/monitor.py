@@ -25,7 +25,7 @@ def monitor(
     else at the largest roll. Without a display the viewer is served on loopback for a browser; from
     another machine: ssh -L PORT:127.0.0.1:PORT SHIP, for both ports of the address.
 
-    [bold]Example:[/bold] utank-hil monitor out/bench.rrd
+    **Example:** utank-hil monitor out/bench.rrd
     """
     from utank_hil.telemetry import open_viewer
     from utank_hil.telemetry.highlight import highlight_s

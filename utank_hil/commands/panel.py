@@ -32,7 +32,7 @@ def panel(
     cut short. Alarms are shown with what happened and what to do. Leaving the panel silences it; a
     controller in charge then ramps down after five seconds.
 
-    [bold]Example:[/bold] utank-hil panel configs/ships/thesis_first.yaml --bus can0
+    **Example:** utank-hil panel configs/ships/thesis_first.yaml --bus can0
     """
     version = load(vessel, Vessel).version
     station = Station.OPERATOR_2 if second else Station.OPERATOR

@@ -33,7 +33,7 @@ def report(
 
     Verdict, tables, pictures, alarms, deadlines, and where the results come from.
 
-    [bold]Example:[/bold] utank-hil report out
+    **Example:** utank-hil report out
     """
     page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
     try:

@@ -34,7 +34,7 @@ def reproduce(
     Printed numbers stand beside ours with the deviation and its reason. All of it is on one page,
     gallery.html, which needs nothing else. All figures take some minutes.
 
-    [bold]Example:[/bold] utank-hil reproduce 2.7 3.9 4.12 --out out/thesis
+    **Example:** utank-hil reproduce 2.7 3.9 4.12 --out out/thesis
     """
     try:
         entries = chosen(figures or [])

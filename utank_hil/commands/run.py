@@ -94,7 +94,7 @@ def run(
     fault that is latched at the end, or a lost bus, has an exit code of its own
     (docs/exit-codes.md).
 
-    [bold]Example:[/bold] utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
+    **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
     loaded = load(config, ControllerConfig)
     law = admit(loaded, config)
