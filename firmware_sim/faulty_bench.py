@@ -94,6 +94,7 @@ class FaultyBench:
             estimating=self._estimating,
             sink=self._sink,
             sink_every=self._sink_every,
+            commissioned=True,
         )
 
     @property

@@ -383,6 +383,7 @@ def _controller(
         statistics=statistics,
         sink=log.write,
         sink_every=RECORD_TICKS,
+        commissioned=True,
     )
     return node, log
 

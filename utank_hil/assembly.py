@@ -141,7 +141,7 @@ def build_controller_node(
     sink: Callable[[FloatArray], None] | None = None,
     sink_every: int = 1,
     event_sink: EventSink | None = None,
-    commissioned: bool = True,
+    commissioned: bool = False,
     monitored: bool = True,
 ) -> ControllerNode:
     """Build the controller node of a configuration.
@@ -159,7 +159,8 @@ def build_controller_node(
     statistics, sink, sink_every, event_sink
         As `ControllerNode` takes them.
     commissioned : bool
-        Whether it may be armed. On a bench it may: the ship there is made of the same files.
+        Whether it may be armed: a commissioning was passed, or it is on a bench, whose ship is
+        made of the same files.
     monitored : bool
         Whether it has monitors.
     """
@@ -245,7 +246,12 @@ def build_commissioning_node(
     built = BuiltLaw(lambda: law, ("roll_rad",), closes_loop=False, commands=commands)
     # a monitor would end the pulses at what they are there to show, before they can say which it is
     node = build_controller_node(
-        config, built, statistics=statistics, event_sink=event_sink, monitored=False
+        config,
+        built,
+        statistics=statistics,
+        event_sink=event_sink,
+        commissioned=True,  # to be commissioned she has to be armed
+        monitored=False,
     )
     return CommissioningNode(
         node,

@@ -136,7 +136,7 @@ def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Ent
     rows: list[FloatArray] = []
     with recorded_config(FrameLog(LOG).head) as config:
         node = build_controller_node(
-            config, build_law(config), sink=lambda row: rows.append(row.copy())
+            config, build_law(config), commissioned=True, sink=lambda row: rows.append(row.copy())
         )
     for kind, _, _, number, time_ns, data in entries:
         if kind == Kind.RECEIVED:

@@ -63,7 +63,9 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
     assert scenario.vessel == config.vessel
     ship = build_ship_side(scenario, 1, (TimedAction(2.0, Action.ARM),))
     rows: list[FloatArray] = []
-    node = build_controller_node(config, sink=lambda row: rows.append(row.copy()))
+    node = build_controller_node(
+        config, commissioned=True, sink=lambda row: rows.append(row.copy())
+    )
     lockstep = Lockstep([*ship.nodes, node])
     lockstep.run_until(30 * SECOND_NS)
     assert node.mode is Mode.ACTIVE
@@ -79,7 +81,9 @@ def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s
     script = PASSIVE_SCRIPT if config is None else scenario.operator
     roll_rad: list[float] = []
     at = SIGNALS.index("roll_rad")
-    node = build_controller_node(controller, sink=lambda row: roll_rad.append(row[at]))
+    node = build_controller_node(
+        controller, commissioned=True, sink=lambda row: roll_rad.append(row[at])
+    )
     lockstep = Lockstep([*build_ship_side(scenario, scenario.seed, script).nodes, node])
     lockstep.run_until(duration_s * SECOND_NS)
     assert node.mode is (Mode.PASSIVE if config is None else Mode.ACTIVE)

@@ -233,7 +233,8 @@ class FaultBench:
         self.config = scenario.controllers[controller]
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
         self.sensors, self.drive, self.panel, self.controller = (
-            Failing(node) for node in (*self.ship.nodes, build_controller_node(self.config))
+            Failing(node)
+            for node in (*self.ship.nodes, build_controller_node(self.config, commissioned=True))
         )
         self.heard = Listener()
         self.lockstep = Lockstep(
@@ -246,7 +247,7 @@ class FaultBench:
 
     def restarted_controller(self) -> ControllerNode:
         """A new controller, as after a restart of its process."""
-        return build_controller_node(self.config)
+        return build_controller_node(self.config, commissioned=True)
 
     @property
     def node(self) -> ControllerNode:

@@ -11,7 +11,7 @@ from quay import ARM_S, another_ship, commissioned, controller, still_water
 from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
-from utank_hil.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Fault, Mode, PumpCommand, SensorTank, Switch
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime import Lockstep
@@ -21,6 +21,9 @@ from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.runtime.commissioning.pulses import plan_pulses
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry import event_text
+from utank_hil.telemetry.bus_records import RECORD
+from utank_hil.telemetry.node_tap import NodeTap
+from utank_hil.telemetry.replay import entries_of, replay
 
 NAVAL = controller("naval_constrained_gpc")
 LEVELS = ("port_level_m", "starboard_level_m")
@@ -212,9 +215,12 @@ def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so(
     events: list[AlarmEvent | RetuningEvent] = []
     scenario = still_water(NAVAL)
     ship = build_ship_side(scenario, 1, scenario.operator)
-    node = build_controller_node(
-        NAVAL, commissioned=False, event_sink=lambda event, start_ns: events.append(event)
+    log: list[bytes] = []
+    # nothing is said of a commissioning
+    controller = build_controller_node(
+        NAVAL, event_sink=lambda event, start_ns: events.append(event)
     )
+    node = NodeTap(controller, lambda records, now_ns: log.append(records))
     Lockstep([*ship.nodes, node]).run_until(round((ARM_S + 2.0) * SECOND))
     assert ship.panel.status is not None
     assert (ship.panel.status.mode, ship.panel.status.fault) == (
@@ -223,3 +229,8 @@ def test_arming_is_refused_until_it_was_passed_and_the_bus_and_the_alarm_say_so(
     )
     assert [alarm.code for alarm in ship.panel.alarms] == [Fault.NOT_COMMISSIONED]
     assert "utank-hil commission" in event_text(events[0])
+    law = build_law(NAVAL)
+    blocks = [np.frombuffer(b"".join(log), RECORD)]
+    assert replay(entries_of(blocks), NAVAL, law, commissioned=False).exact
+    armed = replay(entries_of(blocks), NAVAL, law)
+    assert armed.first is not None

@@ -222,7 +222,7 @@ def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
 def test_a_bench_without_faults_has_the_frames_of_the_plain_one() -> None:
     heard: list[tuple[int, str, Frame]] = []
     ship = build_ship_side(storm(), 1, (TimedAction(1.0, Action.ARM),))
-    node = build_controller_node(storm().controllers["gpc"], law())
+    node = build_controller_node(storm().controllers["gpc"], law(), commissioned=True)
     Lockstep([*ship.nodes, node], trace=lambda *each: heard.append(each)).run_until(
         round(END_S * SECOND)
     )

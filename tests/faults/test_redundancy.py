@@ -54,7 +54,7 @@ class Bench:
 
     def __init__(self, redundancy: Redundancy = BOTH) -> None:
         self.ship: ShipSide = build_ship_side(scenario(redundancy), 1, ARMED)
-        self.node = build_controller_node(config(redundancy))
+        self.node = build_controller_node(config(redundancy), commissioned=True)
         self.failing = {node.name: Failing(node) for node in (*self.ship.nodes, self.node)}
         self.lockstep = Lockstep([*self.failing.values()])
         self.degraded: set[Fault] = set()
@@ -238,7 +238,7 @@ def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
 def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
     switch: Switch | None,
 ) -> None:
-    node = build_controller_node(config())
+    node = build_controller_node(config(), commissioned=True)
     transmitter = CATALOGUE.transmitter(HardwiredInputs)
     shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
     for tick in range(3):

@@ -70,7 +70,9 @@ class Voyage:
     def __init__(self, retuner: Retuner | None, script: tuple[TimedAction, ...] = SCRIPT) -> None:
         self.config = adaptive_config()
         ship = build_ship_side(storm(), 1, script)
-        self.node: ControllerNode = build_controller_node(self.config, retuner=retuner)
+        self.node: ControllerNode = build_controller_node(
+            self.config, commissioned=True, retuner=retuner
+        )
         self.heard = Listener()
         self.statuses: list[tuple[int, ControllerStatus]] = []
         self._status = CATALOGUE.receiver(ControllerStatus)

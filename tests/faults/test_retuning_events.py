@@ -35,7 +35,11 @@ def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
             writer.write(event, start_ns)
 
         node = build_controller_node(
-            config, retuner=retuner, sink=lambda row: times_s.append(row[0]), event_sink=tell
+            config,
+            commissioned=True,
+            retuner=retuner,
+            sink=lambda row: times_s.append(row[0]),
+            event_sink=tell,
         )
         lockstep = Lockstep([*build_ship_side(storm(), 1, SCRIPT).nodes, node])
         lockstep.run_until(60 * SECOND)

@@ -43,7 +43,7 @@ class Bench:
     def __init__(self, without: tuple[str, ...]) -> None:
         self.ship = build_ship_side(STORM, 1, (TimedAction(1.0, Action.ARM),))
         self.kept = self.ship.without(without)
-        self.controller = build_controller_node(STORM.controllers["gpc"])
+        self.controller = build_controller_node(STORM.controllers["gpc"], commissioned=True)
         # the panel's node is OPERATOR in the DBC
         foreign = {
             "sensors": ForeignSensors("sensors"),
@@ -220,7 +220,7 @@ def test_a_valve_of_another_maker_throttles_the_emulated_tank() -> None:
     ship.plant.set_valve_loss = losses.append  # type: ignore[method-assign]
     foreign = ForeignValve("valve")
     foreign.versions = (load_catalogue().version, scenario.vessel.version)
-    controller = build_controller_node(scenario.controllers["on_off"])
+    controller = build_controller_node(scenario.controllers["on_off"], commissioned=True)
     lockstep = Lockstep([*ship.without(("valve",)), foreign, controller])
     assert scenario.vessel.valve is not None
     loss_at = partial(scenario.vessel.valve.loss, scenario.vessel.tank)

@@ -37,7 +37,7 @@ def test_ship_that_is_told_everything_does_the_same() -> None:
         assert all(isinstance(node, Selective) for node in (ship.sensors, ship.drive))
         nodes = [HearsEverything(node) if told_everything else node for node in ship.nodes]
         trace: list[tuple[int, str, Frame]] = []
-        controller = build_controller_node(scenario.controllers["gpc"])
+        controller = build_controller_node(scenario.controllers["gpc"], commissioned=True)
         run = Lockstep([*nodes, controller], trace=lambda *row, to=trace: to.append(row))
         run.run_until(5 * SECOND_NS)
         traces.append(trace)

@@ -33,7 +33,9 @@ class Bench:
         self.plant: Plant = ship.plant
         self.rows: list[np.ndarray] = []
         self.controller: ControllerNode = build_controller_node(
-            scenario.controllers[controller], sink=lambda row: self.rows.append(row.copy())
+            scenario.controllers[controller],
+            commissioned=True,
+            sink=lambda row: self.rows.append(row.copy()),
         )
         self.identifiers: set[int] = set()
         self.lockstep = Lockstep(

@@ -98,7 +98,7 @@ class ControllerBench:
             self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
-            ControllerSettings(VERSION, level_limit_m=VESSEL.tank.level_limit_m),
+            ControllerSettings(VERSION, level_limit_m=VESSEL.tank.level_limit_m, commissioned=True),
             CATALOGUE,
             statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),

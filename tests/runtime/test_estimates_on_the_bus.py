@@ -87,6 +87,7 @@ def test_an_estimate_is_shown_wherever_people_look(limit_m: float | None) -> Non
     events: list[RetuningEvent | AlarmEvent] = []
     node = build_controller_node(
         config,
+        commissioned=True,
         estimating=desk,
         sink=lambda row: rows.append(row.copy()),
         event_sink=lambda event, _start_ns: events.append(event),

@@ -21,6 +21,7 @@ HEALTHY = Observations(
     drive_age_ms=0,
     echo_age_ms=0,
     panel_age_ms=0,
+    commissioned=True,
 )
 
 
@@ -396,7 +397,7 @@ def test_whatever_ends_active_ends_arming(
 def test_arming_is_refused_without_a_commissioning_and_ends_when_it_is_missing() -> None:
     bench = Bench()
     bench.tick()
-    supervisor = bench.tick(**ARMING, commissioned=False)
+    supervisor = bench.tick(**ARMING, commissioned=Observations().commissioned)
     assert (supervisor.mode, supervisor.fault) == (Mode.STANDBY, Fault.NOT_COMMISSIONED)
     assert not supervisor.arming
     assert not supervisor.drive_wanted

@@ -93,6 +93,7 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
         (retuner,) = process.desks
         node = build_controller_node(
             config,
+            commissioned=True,
             retuner=retuner,
             statistics=statistics,
             sink=lambda row: rows.append(row[[0, SIGNALS.index("pressure_command_pa")]]),

@@ -58,7 +58,7 @@ class Timed:
 def slice_speed(scenario: Scenario, seconds: int) -> float:
     """Ship seconds per processor second of the whole slice."""
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
-    controller = build_controller_node(next(iter(scenario.controllers.values())))
+    controller = build_controller_node(next(iter(scenario.controllers.values())), commissioned=True)
     lockstep = Lockstep([*ship.nodes, controller])
     lockstep.run_until(WARM_UP_S * 10**9)
     begin = time.process_time()
@@ -69,7 +69,9 @@ def slice_speed(scenario: Scenario, seconds: int) -> float:
 def controller_costs_us(scenario: Scenario, seconds: int) -> tuple[list[float], list[float]]:
     """Cost of each controller tick, the frames it heard before included, and of each frame."""
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
-    timed = Timed(build_controller_node(next(iter(scenario.controllers.values()))))
+    timed = Timed(
+        build_controller_node(next(iter(scenario.controllers.values())), commissioned=True)
+    )
     lockstep = Lockstep([*ship.nodes, timed])
     lockstep.run_until(WARM_UP_S * 10**9)
     timed.ticks_ns.clear()

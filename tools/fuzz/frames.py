@@ -185,7 +185,7 @@ class Session:
             ]
         side = build_ship_side(loaded, seed, tuple(script))
         assert side.drive is not None
-        self.node = build_controller_node(config, law)
+        self.node = build_controller_node(config, law, commissioned=True)
         self.drive = side.drive
         self._counts, self._burst, self._hushed = counts, burst, hushed
         if hushed:

@@ -288,7 +288,11 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
             wanted=True,
         )  # fmt: skip
         controller = build_controller_node(
-            config, law, retuner=desks.retuner, estimating=desks.estimating
+            config,
+            law,
+            commissioned=True,
+            retuner=desks.retuner,
+            estimating=desks.estimating,
         )
         node = NodeTap(controller, sink.write, desks.taps)
         script = tuple(TimedAction(*timed) for timed in case.script)

@@ -34,6 +34,7 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
                 law,
                 retuner=log.head["retuner"],
                 estimating=log.head.get("estimating", False),
+                commissioned=log.head.get("commissioned", True),
             )
     except (FrameLogError, ReplayHeadError) as error:
         return str(error)

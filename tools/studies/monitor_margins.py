@@ -85,7 +85,7 @@ def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[st
     retuner, estimating = (
         work and SimulatedRetuner(work[0], scenario.retuner_latency_s) for work in works_of(config)
     )
-    node = build_controller_node(config, retuner=retuner, estimating=estimating)
+    node = build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
     onlooker = Onlooker(node)
     ship = build_ship_side(scenario, seed, scenario.operator)
     lockstep = Lockstep([*ship.nodes, node, onlooker], SimulatedBus(bit_rate=config.bit_rate))

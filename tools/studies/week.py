@@ -137,7 +137,7 @@ def sail(
     ships = scenario.vessel.ship, scenario.sailing_ship
     plant: Any = side.plant
     plant._ship_at = lambda time_s: ships[int(time_s / cargo_s) % 2]  # again and again
-    node = build_controller_node(config, retuner=retuner)
+    node = build_controller_node(config, commissioned=True, retuner=retuner)
     timed, sensors = Timed(node), Mutable(side.sensors)
     others = [each for each in side.nodes if each is not side.sensors]
     lockstep = Lockstep([sensors, *others, timed])

@@ -71,6 +71,7 @@ def replay(
                     law,
                     retuner=recording.head["retuner"],
                     estimating=recording.head.get("estimating", False),
+                    commissioned=recording.head.get("commissioned", True),
                 )
             cut = recording.cut
     except (OSError, ValueError) as error:

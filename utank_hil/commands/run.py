@@ -133,6 +133,7 @@ def run(
                 options=context.params,
                 retuner=retunes,
                 estimating=estimates,
+                commissioned=not refused,
             )
             recording = RunRecording(
                 folder,

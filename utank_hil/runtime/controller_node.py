@@ -71,6 +71,8 @@ class ControllerSettings:
     ----------
     configuration_version : int
         Hash of the ship's data, to be equal on all nodes before arming.
+    commissioned : bool
+        Whether a commissioning was passed with this configuration; else arming is refused.
     command_timeout_s : float
         Sent with every command: the drive stops on its own after so long a silence.
     bit_rate : int
@@ -79,16 +81,14 @@ class ControllerSettings:
         Level at which a reservoir is full or empty, to tell what is no measurement.
     redundancy : Redundancy
         What else the ship has.
-    commissioned : bool
-        Whether a commissioning was passed with this configuration; else arming is refused.
     """
 
     configuration_version: int
+    commissioned: bool
     command_timeout_s: float = 0.05
     bit_rate: int = 250_000
     level_limit_m: float = math.inf
     redundancy: Redundancy = NO_REDUNDANCY
-    commissioned: bool = True
 
 
 class ControllerNode:

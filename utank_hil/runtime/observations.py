@@ -124,7 +124,7 @@ class Observations:
     claimed_twice: bool = False
     versions_match: bool = True
     panel_matches: bool = True
-    commissioned: bool = True
+    commissioned: bool = False
     bus_load: float = 0.0
     protection_valid: bool = True
     high_level: bool = False

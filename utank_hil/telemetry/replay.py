@@ -145,6 +145,7 @@ def replay(
     *,
     retuner: bool = False,
     estimating: bool = False,
+    commissioned: bool = True,
 ) -> ReplayResult:
     """Hand recorded entries to a new controller and compare what it sends.
 
@@ -157,6 +158,8 @@ def replay(
         Of the configuration.
     retuner, estimating : bool
         Whether the controller had a retuner, and an estimator of sea and ship.
+    commissioned : bool
+        Whether it could be armed.
     """
     answers, estimates = RecordedRetuner(), RecordedRetuner()
     statistics = LoopStatistics()
@@ -166,6 +169,7 @@ def replay(
         retuner=answers if retuner else None,
         estimating=estimates if estimating else None,
         statistics=statistics,
+        commissioned=commissioned,
     )
     result = ReplayResult()
     comparison = _Comparison(result)

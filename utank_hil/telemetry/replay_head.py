@@ -38,6 +38,7 @@ def replay_head(
     options: Mapping[str, Any],
     retuner: bool,
     estimating: bool,
+    commissioned: bool = True,
     seed: int | None = None,
 ) -> dict[str, Any]:
     """Describe a run so that it can be replayed elsewhere; ready for `json.dumps`.
@@ -55,21 +56,24 @@ def replay_head(
         Of the command.
     retuner, estimating : bool
         Whether the controller has a retuner, and an estimator of sea and ship.
+    commissioned : bool
+        Whether it could be armed.
     seed : int, optional
         Of waves and noise, where they are simulated.
 
     Returns
     -------
     dict
-        ``about`` (`utank_hil.provenance`), ``retuner``, ``estimating``, ``packages``,
-        ``catalogue`` (its version), ``law`` (every number of it), ``files`` (content of the data
-        files).
+        ``about`` (`utank_hil.provenance`), ``retuner``, ``estimating``, ``commissioned``,
+        ``packages``, ``catalogue`` (its version), ``law`` (every number of it), ``files`` (content
+        of the data files).
     """
     about = describe(command, config, folder, options=options, seed=seed)
     return {
         "about": about,
         "retuner": retuner,
         "estimating": estimating,
+        "commissioned": commissioned,
         "packages": _packages(),
         "catalogue": load_catalogue().version,
         "law": law_values.encoded(law_values.law_values(law.controller())),
