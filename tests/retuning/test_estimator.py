@@ -104,6 +104,38 @@ def test_a_failure_changes_nothing_and_is_asked_again():
     assert motion.estimator.figures.of_sea is Verdict.RECORD_SHORT
 
 
+def test_why_no_estimates_come_is_known_from_the_first_failure_until_one_comes():
+    motion = Motion(ToyRetuner(GOOD))
+    motion.run(61.0)
+    assert motion.estimator.trouble == ""
+    motion.desk.reply = Refusal(("the retuner was killed", "by signal 9"))
+    motion.run(60.0)
+    assert motion.estimator.trouble == "the retuner was killed; by signal 9"
+    motion.desk.reply = Refusal(("another reason",))
+    motion.run(60.0)
+    assert motion.estimator.trouble.startswith("the retuner was killed")
+    motion.desk.reply = GOOD
+    motion.run(60.0)
+    assert motion.estimator.trouble == ""
+
+
+@pytest.mark.parametrize("answered_before", [True, False])
+def test_a_process_that_says_nothing_is_in_trouble_when_its_estimates_are_outdated(
+    answered_before: bool,
+):
+    motion = Motion(ToyRetuner(GOOD))
+    if answered_before:
+        motion.run(61.0)
+    motion.desk.alive = False
+    motion.run(60.0 * OUTDATED - 1)
+    assert motion.estimator.trouble == ""
+    motion.run(2.0)
+    assert motion.estimator.trouble.startswith("nothing was heard for 180 s")
+    motion.desk.alive = True
+    motion.run(62.0)
+    assert motion.estimator.trouble == ""
+
+
 def test_metacentric_height_is_that_of_free_water_and_total_weight():
     # a tank is a free surface of two reservoirs: its water shifts until the levels are level
     solid = replace(CONFIGURED, stiffness_nm_rad=1e9)

@@ -23,6 +23,7 @@ from utank_hil.retuning import (
     Answer,
     EstimateSettings,
     MotionEstimate,
+    Refusal,
     RetuningEvent,
     ShipFigures,
 )
@@ -43,13 +44,14 @@ class Desk:
     """Answers at once."""
 
     alive: bool = True
+    replies: tuple[Answer, ...] = (FOUND,)
     records: list[FloatArray] = field(default_factory=list)
 
     def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
         self.records.append(record)
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        return FOUND
+        return self.replies[min(number, len(self.replies)) - 1]
 
 
 class Listener:
@@ -114,3 +116,23 @@ def test_an_estimate_is_shown_wherever_people_look(limit_m: float | None) -> Non
     assert "3.20 m, 9.1 s" in said[0].reasons[0]
     alarms = [event.code for event in events if isinstance(event, AlarmEvent)]
     assert (Fault.STABILITY_LOW in alarms) == (limit_m == 9.3)
+
+
+def test_a_failure_of_the_estimates_is_an_event_once_and_so_is_its_end() -> None:
+    chosen = load_config(STORM, Scenario)
+    config = chosen.controllers["gpc"]
+    config = config.model_copy(update={"sea_estimate": EstimateSettings(every_s=30.0)})
+    killed = Refusal(("the retuner was killed by signal 9, and was restarted",))
+    events: list[RetuningEvent | AlarmEvent] = []
+    node = build_controller_node(
+        config,
+        estimating=Desk(replies=(killed, killed, FOUND)),
+        event_sink=lambda event, _start_ns: events.append(event),
+    )
+    ship_side = build_ship_side(chosen, 1, ())
+    Lockstep([*ship_side.nodes, node]).run_until(128_000_000_000)
+    failed, back, usual = [each for each in events if isinstance(each, RetuningEvent)]
+    assert failed.reasons == (f"no estimates of sea and ship: {killed.reasons[0]}",)
+    assert back.reasons[0] == "there are estimates of sea and ship again"
+    assert "3.20 m, 9.1 s" in back.reasons[1]
+    assert "3.20 m, 9.1 s" in usual.reasons[0]

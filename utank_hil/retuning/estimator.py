@@ -17,6 +17,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 from utank_hil.parameters import Positive, Range, range_problems, refuse
+from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import MotionEstimate
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.retuner import Retuner
@@ -179,6 +180,8 @@ class Estimator:
     ----------
     latest : MotionEstimate or None
     figures : EstimateFigures
+    trouble : str
+        Why no estimates come, as it was first known; empty while they do.
     """
 
     def __init__(
@@ -204,6 +207,9 @@ class Estimator:
         self._due_ns: int | None = None
         self._asked_ns: int | None = None
         self._sea_ns = self._ship_ns = 0
+        self._heard_ns = 0
+        self.trouble = ""
+        self._news: list[str] = []
         self.latest: MotionEstimate | None = None
         self.figures = EstimateFigures()
 
@@ -231,6 +237,7 @@ class Estimator:
         self._history.add(pressure_pa, self._motion, fresh=fresh)
         if self._due_ns is None:
             self._due_ns = now_ns + self._every_ns
+            self._heard_ns = now_ns
         came = None
         if self._asked_ns is not None:
             came = self._look(self._asked_ns, now_ns)
@@ -240,17 +247,33 @@ class Estimator:
             self._asked_ns = now_ns
             record = self._history.record(self._history.capacity)
             self._desk.submit(self._number, np.vstack([self._known, record]), now_ns)
+        silent_ns = now_ns - self._heard_ns
+        if silent_ns > OUTDATED * self._every_ns:
+            self._fail(
+                f"nothing was heard for {silent_ns * 1e-9:.0f} s of the process that estimates: "
+                "it is dead, hangs or is too busy"
+            )
         self._grow_old(now_ns)
         return came
+
+    def take_news(self) -> tuple[str, ...]:
+        """What people are to be told since the last call."""
+        news, self._news = tuple(self._news), []
+        return news
 
     def _look(self, asked_ns: int, now_ns: int) -> MotionEstimate | None:
         """Look for the answer."""
         answer = self._desk.answer(self._number, now_ns)
         if answer is None:
             return None
-        self._asked_ns = None
-        if not isinstance(answer, MotionEstimate):  # the worker failed, and said so on its own
+        self._asked_ns, self._heard_ns = None, now_ns
+        if not isinstance(answer, MotionEstimate):
+            reasons = answer.reasons if isinstance(answer, Refusal) else ("it is no estimate",)
+            self._fail("; ".join(reasons))
             return None
+        if self.trouble:
+            self.trouble = ""
+            self._news.append("there are estimates of sea and ship again")
         self.latest, self._sea_ns = answer, asked_ns
         figures, waves, ship = self.figures, answer.waves, answer.ship
         figures.of_sea, figures.of_ship = answer.of_sea, answer.of_ship
@@ -263,7 +286,13 @@ class Estimator:
             figures.roll_period_s = ship.roll_period_s
             figures.roll_period_deviation_s = ship.period_deviation * ship.roll_period_s
             self._judge_stability(ship.stiffness_nm_rad, ship.stiffness_deviation)
+        self._news += figures.words()
         return answer
+
+    def _fail(self, reason: str) -> None:
+        if not self.trouble:
+            self.trouble = reason
+            self._news.append(f"no estimates of sea and ship: {reason}")
 
     def _judge_stability(self, stiffness_nm_rad: float, deviation: float) -> None:
         figures = self.figures

@@ -376,14 +376,13 @@ class ControllerNode:
             (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m),
             fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
         )
-        if estimate is None:
-            return
-        seen.gm_low = self.estimated.gm_low
-        if self._retuning is not None:
-            self._retuning.note(estimate)
-        if self._event_sink is not None:
-            words = self.estimated.words()
-            self._event_sink(RetuningEvent(now_ns, self.retuning_state, words), self.start_ns)
+        if estimate is not None:
+            seen.gm_low = self.estimated.gm_low
+            if self._retuning is not None:
+                self._retuning.note(estimate)
+        news = estimator.take_news()
+        if news and self._event_sink is not None:
+            self._event_sink(RetuningEvent(now_ns, self.retuning_state, news), self.start_ns)
 
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
