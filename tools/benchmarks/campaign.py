@@ -6,9 +6,6 @@ Processor time of one process, the least of some turns: other work on the machin
 What workers cost beyond their cases is in `tools.studies.campaign_kills`.
 """
 
-import argparse
-import json
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -23,6 +20,7 @@ from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.study import Case, LoadedStudy, load_study
 from firmware_sim.campaign.summary import summary
 from firmware_sim.campaign.work import run_batch
+from tools.printing import command_line, show
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 TURNS = 3
@@ -96,11 +94,7 @@ def of_cases(bench: Bench, count: int) -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    arguments = parser.parse_args()
+    arguments = command_line(__doc__).parse_args()
     order, horizon = (
         "controllers.gpc.law.predictor.order",
         "controllers.constrained_gpc.law.horizon",
@@ -132,7 +126,7 @@ def main() -> None:
             },
             "cases": {str(count): of_cases(bench, count) for count in (1000, 10_000)},
         }
-    sys.stdout.write(json.dumps(found, indent=None if arguments.json else 1) + "\n")
+    show(found, arguments)
 
 
 if __name__ == "__main__":

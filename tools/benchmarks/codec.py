@@ -8,8 +8,6 @@ CPU time is measured, not wall time, and the two are measured in turn: on a busy
 rounds of the slower one would be preempted more often, which would flatter the faster.
 """
 
-import argparse
-import json
 import math
 from collections.abc import Callable
 from time import thread_time_ns
@@ -17,6 +15,7 @@ from typing import Any
 
 from cantools.database.can import Database, Message
 
+from tools.printing import command_line, show
 from utank_hil.canbus import (
     ControlWord,
     DriveState,
@@ -110,28 +109,14 @@ def measure(dbc: Message, message: Any) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print a table, or one JSON object."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--json", action="store_true", help="one JSON object on standard output")
-    arguments = parser.parse_args()
+    """Measure and print."""
+    arguments = command_line(__doc__).parse_args()
     database = Database()
     database.add_dbc_file(DBC_PATH)
     results = {
         name: measure(database.get_message_by_name(name), message) for name, message in EXAMPLES
     }
-    if arguments.json:
-        print(json.dumps(results))
-        return
-    print("microseconds of CPU time a frame, CRC included; ratio: cantools / ours")
-    print(
-        f"{'':16}{'encode':>8}{'cantools':>10}{'ratio':>7}{'decode':>10}{'cantools':>10}{'ratio':>7}"
-    )
-    for name, r in results.items():
-        print(
-            f"{name:16}{r['encode_us']:8.2f}{r['cantools_encode_us']:10.2f}"
-            f"{r['encode_ratio']:6.1f}x{r['decode_us']:10.2f}{r['cantools_decode_us']:10.2f}"
-            f"{r['decode_ratio']:6.1f}x"
-        )
+    show(results, arguments)
 
 
 if __name__ == "__main__":

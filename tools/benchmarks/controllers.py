@@ -10,8 +10,6 @@ what was there before, and the bytes that it leaves behind (both mean of 200 ste
 of the constrained law compares with others says tools/peers.
 """
 
-import argparse
-import json
 import math
 import sys
 import time
@@ -20,9 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
+from tools.printing import command_line, show
 from tools.studies.trial_setup import shipped
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.arrays import FloatArray
@@ -212,43 +209,16 @@ def measure(steps: int) -> dict[str, dict[str, float]]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--steps", type=int, default=5000, help="of each controller (%(default)s)")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a table")
     arguments = parser.parse_args()
     if arguments.steps < 100:
         parser.error("--steps must be 100 or more: fewer have no 99th percentile")
-    results = measure(arguments.steps)
-    if arguments.json:
-        sys.stdout.write(json.dumps(results) + "\n")
-        return
-    table = Table(title=f"One step of each controller, {arguments.steps} steps")
-    for heading in (
-        "",
-        "p50\nµs",
-        "p99\nµs",
-        "max\nµs",
-        "p50 over\nfloor µs",
-        "bytes\nheld",
-        "bytes\nkept",
-    ):
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
-    floor = results[FLOOR]["p50_us"]
-    for name, cost in results.items():
-        table.add_row(
-            name,
-            *(f"{cost[key]:.1f}" for key in ("p50_us", "p99_us", "max_us")),
-            f"{cost['p50_us'] - floor:.1f}",
-            *(f"{cost[key]:.0f}" for key in ("held_bytes", "kept_bytes")),
-        )
-    console = Console(width=100)
-    console.print(table)
+    show(measure(arguments.steps), arguments)
     with real_time_scheduling() as report:
         refused = [each for each in report.measures if not each.granted]
     for each in refused:
-        console.print(f"measured without {each.name}: {each.detail}")
+        sys.stderr.write(f"measured without {each.name}: {each.detail}\n")
 
 
 if __name__ == "__main__":

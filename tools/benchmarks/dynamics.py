@@ -11,9 +11,7 @@ One core each, the same ship, tank and sea:
 Then how a batch grows from 1 to 100,000 ships on all cores, with its memory.
 """
 
-import argparse
 import ctypes
-import json
 import math
 import os
 import resource
@@ -28,10 +26,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate, simulate_batch
 
@@ -276,8 +273,7 @@ def first_calls() -> dict[str, float]:
 
 def main() -> int:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser = command_line(__doc__)
     parser.add_argument("--components", type=int, default=64, help="components of the sea")
     parser.add_argument("--ships", type=int, default=100_000, help="largest batch")
     arguments = parser.parse_args()
@@ -291,21 +287,7 @@ def main() -> int:
         "scaling": scaling(sizes, arguments.components),
         **first_calls(),
     }
-    if arguments.json:
-        print(json.dumps(result))
-        return 0
-    console = Console()
-    for title, rows in (("One core", comparison), ("Batches, all cores", result["scaling"])):
-        table = Table(title=title)
-        for name in rows[0]:
-            table.add_column(name)
-        for row in rows:
-            table.add_row(*(f"{x:.3g}" if isinstance(x, float) else str(x) for x in row.values()))
-        console.print(table)
-    for components, of in result["ratio_to_c"].items():
-        speeds = ", ".join(f"{ratio:.2f} of {name}" for name, ratio in of.items())
-        console.print(f"{components} components: {speeds}")
-    console.print(f"import {result['import_s']:.2f} s, first call {result['first_call_s']:.2f} s")
+    show(result, arguments)
     return 0
 
 

@@ -6,8 +6,6 @@ accuracy, beside published packages.
 Example: OPENBLAS_NUM_THREADS=1 .venv/bin/python -m tools.benchmarks.identification --quick
 """
 
-import argparse
-import json
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -19,30 +17,14 @@ from scipy.linalg import cho_factor, cho_solve
 
 from tools.peers.identification_records import (
     SAMPLE_TIME_S,
-    SEAS,
-    SHIP,
     SLOW,
-    TANK,
     record,
-    respond,
-    response,
-    sampled_plant,
 )
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import RecursiveArx, okid
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import fit
-
-__all__ = [
-    "SAMPLE_TIME_S",
-    "SEAS",
-    "SHIP",
-    "TANK",
-    "record",
-    "respond",
-    "response",
-    "sampled_plant",
-]
 
 
 def best_of(repeats: int, *tasks: Callable[[], object]) -> list[float]:
@@ -137,7 +119,7 @@ def growth(quick: bool) -> list[dict[str, Any]]:
     rows = []
     for order, samples in cases:
         u, y = record(samples)
-        task = partial(okid, u, y, order)
+        task = partial(okid, u, y, order, sample_time_s=SAMPLE_TIME_S)
         row = {
             "order": order,
             "samples": samples,
@@ -169,43 +151,14 @@ def recursive() -> list[dict[str, Any]]:
     return rows
 
 
-def table(rows: list[dict[str, Any]]) -> None:
-    """Print rows under the first one's keys."""
-    keys = list(rows[0])
-    cells = [
-        [f"{r[k]:.3g}" if isinstance(r.get(k), float) else str(r.get(k, "-")) for k in keys]
-        for r in rows
-    ]
-    widths = [max(map(len, column), default=0) for column in zip(keys, *cells, strict=True)]
-    for line in [keys, *cells]:
-        print("  ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)))
-    print()
-
-
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser = command_line(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and shorter measurements")
     arguments = parser.parse_args()
-    first = speed(arguments.quick)
-    rows = {"growth": growth(arguments.quick), "recursive": recursive()}
-    if arguments.json:
-        print(json.dumps({"speed": first, **rows}))
-        return
-    print("OKID, order 200, 2,500 samples, two outputs")
-    table([{"": name, "time ms": t} for name, t in first["time_ms"].items()])
-    print(
-        f"lstsq / okid {first['lstsq_over_okid']:.1f}, with a slow pump "
-        f"{first['lstsq_over_okid_slow_pump']:.1f}"
-    )
-    print("relative error", {k: f"{v:.1e}" for k, v in first["relative_error"].items()})
-    print("memory MB", {k: round(v, 1) for k, v in first["memory_mb"].items()}, "\n")
-    for name, measured in rows.items():
-        print(name)
-        table(measured)
+    quick = arguments.quick
+    found = {"speed": speed(quick), "growth": growth(quick), "recursive": recursive()}
+    show(found, arguments)
 
 
 if __name__ == "__main__":

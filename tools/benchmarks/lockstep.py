@@ -7,12 +7,11 @@ random frames, without codec, protection, control or ship. Times are the process
 thread that never waits, and what else the machine does is not its cost.
 """
 
-import argparse
-import json
 import random
 import time
 from collections.abc import Iterable
 
+from tools.printing import command_line, show
 from utank_hil.canbus.frame import Frame
 from utank_hil.runtime import Lockstep
 
@@ -63,9 +62,8 @@ def measure(ship_seconds: int, traffic: dict[str, list[tuple[int, int]]]) -> tup
 
 def main() -> None:
     """Measure with the traffic and without, and print what each frame and tick costs."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--seconds", type=int, default=300, help="ship time of a run")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     silence: dict[str, list[tuple[int, int]]] = {name: [] for name in TRAFFIC}
     # The fastest of several is the least disturbed.
@@ -77,11 +75,7 @@ def main() -> None:
         "microseconds_per_frame": 1e6 * (whole_s - silent_s) / frames,
         "microseconds_per_tick": 1e6 * silent_s / (len(TRAFFIC) * 100 * arguments.seconds),
     }
-    if arguments.json:
-        print(json.dumps(result))
-    else:
-        for name, value in result.items():
-            print(f"{name.replace('_', ' '):26} {value:10.2f}")
+    show(result, arguments)
 
 
 if __name__ == "__main__":

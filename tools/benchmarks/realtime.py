@@ -9,8 +9,6 @@ absolute numbers are the machine's. Three times: alone, beside as many busy proc
 processors, and beside a retuner at work.
 """
 
-import argparse
-import json
 import os
 import subprocess
 import sys
@@ -21,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.frame import Frame
 from utank_hil.retuning import Answer, RetunerProcess
@@ -121,25 +120,14 @@ def compared(turns: int) -> dict[str, Any]:
 
 def main() -> None:
     """Measure both in turns in each situation, and print percentiles and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--seconds", type=int, default=10, help="turns of a second for each")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     found = {}
     for situation, beside in SITUATIONS.items():
         with beside():
             found[situation] = compared(arguments.seconds)
-    if arguments.json:
-        print(json.dumps(found))
-        return
-    print(*found["alone"]["scheduling"], sep="\n")
-    for situation, rows in found.items():
-        print(f"\n{situation + ', microseconds':30}{'p50':>10}{'p99':>10}{'p99.9':>10}{'max':>10}")
-        for title in ("bare lateness", "loop lateness", "loop tick duration"):
-            print(f"{title:30}" + "".join(f"{rows[title][name] / 1000:10.1f}" for name in SHOWN))
-        ratios = rows["loop to bare"]
-        print(f"{'loop to bare':30}" + "".join(f"{ratios[name]:10.2f}" for name in SHOWN))
-        print(f"overruns: {rows['overruns']} of {rows['ticks']} ticks")
+    show(found, arguments)
 
 
 if __name__ == "__main__":

@@ -12,8 +12,6 @@ The costs of the controller's single steps are measured after that, in a plain l
 ship, with the retuner's process at work beside it.
 """
 
-import argparse
-import json
 import math
 import sys
 import time
@@ -25,6 +23,7 @@ from scipy.stats import binomtest, chi2
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import RetuningState
@@ -213,9 +212,8 @@ def interval(count: int) -> tuple[float, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = command_line(__doc__)
     parser.add_argument("--turns", type=int, default=8, help="half of them with retuning")
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     if arguments.turns < 2:
         parser.error("--turns must be 2 or more: one with retuning and one without")
@@ -249,13 +247,7 @@ def main() -> None:
     # small: so many more overruns with retuning would be unlikely if it did nothing
     result["comparison"] = {"chance_of_so_many_with_retuning": float(chance)}
     result["costs_us"] = costs(scenario.controllers[CONTROLLER], REPEATS)
-    if arguments.json:
-        print(json.dumps(result))
-        return
-    for name, values in result.items():
-        print(name)
-        for key, value in values.items():
-            print(f"  {key:36}{value:12.4g}")
+    show(result, arguments)
 
 
 if __name__ == "__main__":

@@ -6,18 +6,13 @@ time of this process, so that other work on the machine counts less.
 Example: .venv/bin/python -m tools.benchmarks.slice --seconds 120
 """
 
-import argparse
-import json
-import sys
 import time
 from pathlib import Path
 from statistics import median
 
-from rich.console import Console
-from rich.table import Table
-
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Frame
 from utank_hil.compiled import in_use
@@ -86,12 +81,9 @@ def _in_order_us(costs_ns: list[int]) -> list[float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--seconds", type=int, default=120, help="of ship time in each round")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     scenario = load_config(STORM, Scenario)
     linear = scenario.model_copy(update={"plant": "linear"})
@@ -112,25 +104,7 @@ def main() -> None:
         "tick_p99_us": ticks[len(ticks) * 99 // 100],
         "tick_p99_share_of_period": ticks[len(ticks) * 99 // 100] / 10e3,
     }
-    if arguments.json:
-        sys.stdout.write(json.dumps(result) + "\n")
-        return
-    compiled = "compiled" if in_use() else "not compiled: `make compiled` doubles it"
-    table = Table(title=f"The whole slice in lockstep, {compiled}")
-    table.add_column("")
-    table.add_column("value", justify="right")
-    table.add_row("ship seconds per processor second (aim 400)", f"{median(speeds):.0f}")
-    table.add_row(f"  the fastest of {len(speeds)} rounds", f"{max(speeds):.0f}")
-    table.add_row(
-        "  its speed against a linear plant", f"{result['speed_against_linear_plant']:.3f}"
-    )
-    table.add_row("controller, one frame heard, p50", f"{result['frame_p50_us']:.1f} µs")
-    table.add_row("controller tick and its frames, p50", f"{result['tick_p50_us']:.0f} µs")
-    table.add_row("controller tick and its frames, p99", f"{result['tick_p99_us']:.0f} µs")
-    table.add_row(
-        "  p99 as a share of the 10 ms period", f"{result['tick_p99_share_of_period']:.2%}"
-    )
-    Console().print(table)
+    show(result, arguments)
 
 
 if __name__ == "__main__":

@@ -3,14 +3,13 @@
 python -m tools.benchmarks.telemetry [--json]
 """
 
-import argparse
-import json
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
+from tools.printing import command_line, show
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RingReader, RingWriter, read_recording, write_recording
 
@@ -51,17 +50,9 @@ def recording() -> dict[str, float]:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    arguments = parser.parse_args()
+    arguments = command_line(__doc__).parse_args()
     found = {"ring": ring(), "an hour of three runs": recording()}
-    if arguments.json:
-        print(json.dumps(found))
-        return
-    for name, figures in found.items():
-        print(f"{name}: " + ", ".join(f"{key} {value:.2f}" for key, value in figures.items()))
+    show(found, arguments)
 
 
 if __name__ == "__main__":
