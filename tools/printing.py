@@ -4,7 +4,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from rich.console import Console
@@ -76,7 +76,7 @@ def _has_rows(value: Any) -> bool:
     return bool(value) and (rows or isinstance(value, Mapping))
 
 
-def _table(title: str, rows: list[Row]) -> Table:
+def _table(title: str, rows: Sequence[Row]) -> Table:
     flat = [dict(_flat(row)) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
     table = Table(title=escape(title), title_justify="left")

@@ -10,12 +10,10 @@ accepted is designed too, or refused with a `ParameterError`. Anything else is a
 names the seed's number and keeps the text.
 """
 
-import argparse
 import copy
 import json
 import random
 import shutil
-import sys
 import tempfile
 import time
 import warnings
@@ -28,6 +26,7 @@ import yaml
 
 from firmware_sim.scenario import Scenario
 from tools.evidence.sources import ROOT
+from tools.printing import command_line, show
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.configuration.files import ConfigError, ConfigProblem
@@ -172,12 +171,11 @@ def fuzz(number: int, seed: int, *, laws: bool = False, keep: Path | None = None
 
 def main() -> None:
     """Fuzz, and print the counts."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--number", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--laws", action="store_true", help="design the laws, too")
     parser.add_argument("--keep", type=Path, help="file for the text of a failure")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     begin = time.perf_counter()
     counts = fuzz(arguments.number, arguments.seed, laws=arguments.laws, keep=arguments.keep)
@@ -185,11 +183,7 @@ def main() -> None:
         "configurations": arguments.number, "seed": arguments.seed, "failures": 0,
         "seconds": round(time.perf_counter() - begin, 1), "counts": dict(sorted(counts.items())),
     }  # fmt: skip
-    if arguments.json:
-        sys.stdout.write(json.dumps(result) + "\n")
-    else:
-        for name, value in result.items():
-            sys.stdout.write(f"{name:14} {value}\n")
+    show(result, arguments)
 
 
 if __name__ == "__main__":

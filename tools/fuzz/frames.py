@@ -16,11 +16,7 @@ senders do not hear of it, so that the others are met under pressure too. The sa
 same frames: a failure names seed and session, which `--seed` and `--session` run again.
 """
 
-import argparse
-import json
-import math
 import random
-import sys
 import time
 import warnings
 from collections import Counter, deque
@@ -33,6 +29,7 @@ from cantools.database.can import Database
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Frame, Mode, PumpCommand, load_catalogue
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
@@ -293,11 +290,10 @@ def fuzz(frames: int, seed: int, session: int = 0) -> Counter[str]:
 
 def main() -> None:
     """Fuzz, and print the counts."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--frames", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--session", type=int, default=0, help="begin with this one")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     begin = time.perf_counter()
     counts = fuzz(arguments.frames, arguments.seed, arguments.session)
@@ -306,12 +302,7 @@ def main() -> None:
         "frames": arguments.frames, "seed": arguments.seed, "failures": 0,
         "seconds": round(seconds, 1), "counts": dict(sorted(counts.items())),
     }  # fmt: skip
-    if arguments.json:
-        sys.stdout.write(json.dumps(result) + "\n")
-        return
-    for name, count in sorted(counts.items()):
-        sys.stdout.write(f"{name:12} {count}\n")
-    sys.stdout.write(f"{arguments.frames} frames in {math.ceil(seconds)} s, no claim broken\n")
+    show(result, arguments)
 
 
 if __name__ == "__main__":

@@ -14,12 +14,9 @@ from a ship of 40 % more stiffness and half the damping.
 Example: make peers && .cache/peers/bin/python -m tools.peers.compare_identification --seeds 2
 """
 
-import argparse
 import contextlib
 import dataclasses
 import io
-import json
-import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -29,7 +26,6 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from tools.peers.identification_records import (
     MEASURED,
@@ -44,6 +40,7 @@ from tools.peers.identification_records import (
 )
 from tools.peers.memory import peak_mb
 from tools.peers.published_identification import PUBLISHED, Identify
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.identification import era, find_disturbance_frequencies, okid, refine
 from utank_hil.identification.ship_fit import fit_ship
@@ -154,51 +151,17 @@ def compare(seeds: int, progress: Progress) -> list[dict[str, Any]]:
     return rows
 
 
-def show(rows: list[dict[str, Any]], console: Console) -> None:
-    """Print a table for each kind of data."""
-    for data in ROWS:
-        table = Table(title=data, title_justify="left", min_width=100)
-        table.add_column("", no_wrap=True)
-        for heading in ("roll", "level", "ms", "MB"):
-            table.add_column(heading, justify="right", no_wrap=True)
-        table.add_column("best setting", no_wrap=True)
-        table.add_column("roll at first", justify="right", no_wrap=True)
-        for row in (row for row in rows if row["data"] == data):
-            if "failed" in row:
-                table.add_row(row["method"], "", "", "", "", row["failed"])
-                continue
-            first = row["tried"][0].get("roll_error", np.inf)
-            errors = (row["roll_error"], row["level_error"], first)
-            roll, level, other = (f"{e:.0e}" if e < 1e-6 else f"{e:.2%}" for e in errors)
-            table.add_row(
-                row["method"],
-                roll,
-                level,
-                f"{row['time_ms']:,.0f}",
-                f"{row['memory_mb']:.0f}",
-                row["setting"],
-                other if len(row["tried"]) > 1 else "",
-            )
-        console.print(table)
-
-
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="records of each kind")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     if arguments.seeds < 1:
         parser.error("--seeds must be 1 or more")
     warnings.simplefilter("ignore")  # of the packages
     with Progress(console=Console(stderr=True), transient=True) as progress:
         rows = compare(arguments.seeds, progress)
-    if arguments.json:
-        sys.stdout.write(json.dumps({"seeds": arguments.seeds, "rows": rows}) + "\n")
-        return
-    show(rows, Console(width=110))
+    show({"seeds": arguments.seeds, "rows": rows}, arguments)
 
 
 if __name__ == "__main__":

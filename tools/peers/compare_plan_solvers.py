@@ -9,16 +9,12 @@ the least of a few rounds, programme by programme; the error is the largest of t
 Example: make peers && .cache/peers/bin/python -m tools.peers.compare_plan_solvers --seconds 60
 """
 
-import argparse
-import json
-import sys
 import warnings
 from collections.abc import Callable
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from tools.peers.do_mpc_plan import DoMpc
 from tools.peers.plan_programmes import (
@@ -31,6 +27,7 @@ from tools.peers.plan_programmes import (
 )
 from tools.peers.plan_solvers import SOLVERS, Quadprog
 from tools.peers.turns import Costs, in_turns, percentiles_us
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.control.constrained.law import ConstrainedLaw
 
@@ -95,33 +92,11 @@ def compare(
     }
 
 
-def show(results: dict[str, dict[str, float]], console: Console) -> None:
-    """Print a table."""
-    first = results[PROJECT]
-    table = Table(title=f"{first['programmes']} programmes of {first['unknowns']} unknowns, µs")
-    table.add_column("", no_wrap=True)
-    for heading in ("p50", "p99", "max", "p50 / ours", "error, Pa", "unsolved"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for name, row in results.items():
-        error = row["largest_error_pa"]
-        table.add_row(
-            name,
-            *(f"{row[key]:,.0f}" for key in ("p50_us", "p99_us", "max_us")),
-            f"{row['p50_us'] / first['p50_us']:,.1f}",
-            f"{error:,.0f}" if error >= 1 else f"{error:.0e}",
-            str(row["unsolved"]),
-        )
-    console.print(table)
-
-
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--seconds", type=float, default=120.0, help="of the storm")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     if arguments.rounds < 1 or not arguments.seconds > 0:
         parser.error("--rounds must be 1 or more and --seconds positive")
@@ -132,11 +107,7 @@ def main() -> None:
             name: compare(every_sample, arguments.seconds, arguments.rounds, progress)
             for name, every_sample in (("shipped knots", False), ("every sample", True))
         }
-    if arguments.json:
-        sys.stdout.write(json.dumps(results) + "\n")
-        return
-    for rows in results.values():
-        show(rows, Console(width=100))
+    show(results, arguments)
 
 
 if __name__ == "__main__":

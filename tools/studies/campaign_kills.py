@@ -33,6 +33,7 @@ from firmware_sim.campaign.simulations import Row
 from firmware_sim.campaign.store import Store
 from firmware_sim.campaign.study import LoadedStudy, load_study
 from firmware_sim.campaign.work import Batch, run_batch
+from tools.printing import command_line, show
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 TALLY = "CAMPAIGN_TALLY"
@@ -217,13 +218,10 @@ def warm(batch: Batch) -> None:
 
 def main() -> None:
     """Run the study, or be a driver of it."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--fast", type=int, default=10_000, help="cases, %(default)s")
     parser.add_argument("--bus", type=int, default=200, help="cases, %(default)s")
     parser.add_argument("--kills", type=int, default=20, help="of workers, %(default)s")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--drive", nargs=2, type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.drive:
@@ -244,8 +242,7 @@ def main() -> None:
             found["killed"][simulation] = disturbed(study, out, kills, restarts)
             found["scaling"][simulation] = scaled(folder, simulation)
             sys.stderr.write(json.dumps(found) + "\n")  # should the rest fail
-    text = json.dumps(found, indent=None if arguments.json else 1)
-    sys.stdout.write(text + "\n")
+    show(found, arguments)
 
 
 if __name__ == "__main__":

@@ -18,16 +18,13 @@ is the share of time in which the limiter gives the clipped law less than it ask
 
 import argparse
 import dataclasses
-import json
 import math
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich.table import Table
 
+from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -39,10 +36,9 @@ from tools.studies.trial_setup import (
     run_shown,
     seeds_of,
     shipped,
-    table_console,
 )
-from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
-from utank_hil.analysis.motion.confidence import Interval, mean_interval
+from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip
+from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ConstrainedDesign, PumpLimits
@@ -199,80 +195,6 @@ def as_json(outcome: Outcome) -> dict[str, object]:
     }
 
 
-def percent(interval: Interval) -> str:
-    """A share with its interval."""
-    mean = round(100 * interval.mean, 1) + 0.0  # no "-0.0"
-    return f"{mean:.1f} ± {100 * interval.half_width:.1f}"
-
-
-def roll_table(outcomes: list[Outcome], title: str) -> Table:
-    """How much each rolls, and what planning is worth."""
-    table = Table(title=title)
-    headings = (
-        "sea and pump",
-        "Hs m",
-        "Tp s",
-        "passive\n°",
-        "GPC_ROLL\n°",
-        "clipped\n°",
-        "constrained\n°",
-        "below\nclipped %",
-        "below\nGPC_ROLL %",
-    )
-    for heading in headings:
-        first = heading == headings[0]
-        table.add_column(heading, justify="left" if first else "right", no_wrap=True)
-    for outcome in outcomes:
-        rolls = {
-            name: math.degrees(outcome.figures(name, "roll_rms_rad").mean())
-            for name in (PASSIVE, GPC, CLIPPED, CONSTRAINED)
-        }
-        table.add_row(
-            outcome.case.name,
-            f"{outcome.case.sea.hs_m:.2f}",
-            f"{outcome.case.sea.tp_s:.1f}",
-            *(f"{roll:.3f}" for roll in rolls.values()),
-            percent(mean_interval(outcome.below(CLIPPED))),
-            percent(mean_interval(outcome.below(GPC))),
-        )
-    return table
-
-
-def limit_table(outcomes: list[Outcome]) -> Table:
-    """Where the pump and the level are at their limits."""
-    table = Table(title="Limits: means over the seeds, highest level of all")
-    headings = (
-        "sea and pump",
-        "clipped\nheld\nback %",
-        "level\npeak m\nGPC",
-        "\n\nclipped",
-        "\nclipped\nlate",
-        "\nconst-\nrained",
-        "pressure\nRMS kPa\nGPC",
-        "\n\nclipped",
-        "\nconst-\nrained",
-        "roll\nclipped\nlate °",
-    )
-    for heading in headings:
-        first = heading == headings[0]
-        table.add_column(heading, justify="left" if first else "right", no_wrap=True)
-    for outcome in outcomes:
-        table.add_row(
-            outcome.case.name,
-            f"{100 * outcome.figures(CLIPPED, 'held_back').mean():.1f}",
-            *(
-                f"{outcome.figures(name, 'level_peak_m').max():.2f}"
-                for name in (GPC, CLIPPED, CLIPPED_LATE, CONSTRAINED)
-            ),
-            *(
-                f"{outcome.figures(name, 'pressure_rms_pa').mean() / 1e3:.1f}"
-                for name in (GPC, CLIPPED, CONSTRAINED)
-            ),
-            f"{math.degrees(outcome.figures(CLIPPED_LATE, 'roll_rms_rad').mean()):.3f}",
-        )
-    return table
-
-
 def draw(outcomes: list[Outcome], path: Path, title: str) -> Path:
     """Paired differences with their intervals, case below case."""
     with picture(path, title, (9.0, 1.6 + 0.45 * len(outcomes))) as figure:
@@ -307,20 +229,10 @@ def main() -> None:
         outcomes = run(arguments)
     except ValueError as error:
         made.error(str(error))
-    title = f"{arguments.seeds} seeds of {arguments.seconds:g} s"
-    say: Callable[..., None] = table_console().print
-    if arguments.json:
-        sys.stdout.write(json.dumps({"cases": [as_json(outcome) for outcome in outcomes]}) + "\n")
-    else:
-        say(roll_table(outcomes, f"Constrained against clipped GPC, {title}"))
-        say(limit_table(outcomes))
+    show({"cases": [as_json(outcome) for outcome in outcomes]}, arguments)
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        path = draw(
-            outcomes, arguments.out / "campaign.png", "What planning within limits is worth"
-        )
-        if not arguments.json:
-            say(f"picture: {path}")
+        draw(outcomes, arguments.out / "campaign.png", "What planning within limits is worth")
 
 
 if __name__ == "__main__":

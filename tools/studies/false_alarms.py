@@ -10,7 +10,6 @@ on. A Gumbel distribution is fitted to the hourly maxima; its tail beyond 1 is t
 alarms. The aim is one in 1000 hours.
 """
 
-import argparse
 import json
 import math
 import sys
@@ -20,12 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.stats import gumbel_r
 
 from firmware_sim.scenario import Scenario
 from tools.evidence.sources import ROOT, digest_of, imported
+from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.runtime.panel import Action, TimedAction
@@ -114,10 +112,9 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
 
 def main() -> int:
     """Sail what is missing, and print the rates."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--hours", type=int, default=50, help="of each law in each sea")
     parser.add_argument("--law", action="append", help="only this one; may be given again")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     laws = sorted(file.stem for file in (ROOT / "configs/controllers").glob("*.yaml"))
     rows = [
@@ -125,16 +122,7 @@ def main() -> int:
         for name in options.law or laws
         for sea, scenario in hours(name)
     ]
-    if options.json:
-        json.dump({"aim_per_hour": AIM_PER_HOUR, "runs": rows}, sys.stdout)
-        return 0
-    table = Table("law", "sea", "hours", "found in hours", "worst", "1000 h")
-    for row in rows:
-        worst = 1e3 * row["rate_per_hour"].get(row["worst"], 0.0)
-        found = ", ".join(f"{name} {count}" for name, count in row["found_in_hours"].items())
-        cells = (row["law"], row["sea"], str(row["hours"]), found, row["worst"], f"{worst:.3g}")
-        table.add_row(*cells)
-    Console().print(table)
+    show({"aim_per_hour": AIM_PER_HOUR, "runs": rows}, options)
     return 0
 
 

@@ -15,18 +15,16 @@ confidence interval, and the passive roll that the model itself would have:
 
 import argparse
 import dataclasses
-import json
 import math
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import nnls
 
+from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
     measured_hour,
@@ -34,7 +32,6 @@ from tools.studies.trial_setup import (
     parser,
     seeds_of,
     shipped,
-    table_console,
 )
 from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.analysis.motion.confidence import mean_interval
@@ -226,33 +223,20 @@ def main() -> None:
         )
         for model in track(models, "models", console=Console(stderr=True))
     }
-    if arguments.json:
-        summary = {
-            "ahead_s": [ahead * design().sample_time_s for ahead in AHEAD],
-            "passive_roll_rms_deg": true_deg,
-            "models": {
-                model.name: {
-                    "error_shares": shares[model.name].tolist(),
-                    "passive_roll_rms_deg": math.degrees(model.passive_roll_rms_rad()),
-                }
-                for model in models
-            },
-        }
-        sys.stdout.write(json.dumps(summary) + "\n")
-        return
-    table = Table(title=f"Error of the roll's forecast, share of its RMS, {arguments.seeds} seeds")
-    table.add_column("sea in the predictor", no_wrap=True)
-    for ahead in AHEAD:
-        table.add_column(f"{ahead * design().sample_time_s:.1f} s", justify="right", no_wrap=True)
-    table.add_column(f"passive roll °\n(true {true_deg:.2f})", justify="right", no_wrap=True)
-    for model in models:
-        cells = [mean_interval(column) for column in shares[model.name].T]
-        table.add_row(
-            model.name,
-            *(f"{cell.mean:.2f} ± {cell.half_width:.2f}" for cell in cells),
-            f"{math.degrees(model.passive_roll_rms_rad()):.2f}",
-        )
-    table_console().print(table)
+    summary = {
+        "ahead_s": [ahead * design().sample_time_s for ahead in AHEAD],
+        "passive_roll_rms_deg": true_deg,
+        "models": {
+            model.name: {
+                "error_shares": shares[model.name].tolist(),
+                "mean_error_shares": shares[model.name].mean(axis=0).tolist(),
+                "half_widths": [mean_interval(each).half_width for each in shares[model.name].T],
+                "passive_roll_rms_deg": math.degrees(model.passive_roll_rms_rad()),
+            }
+            for model in models
+        },
+    }
+    show(summary, arguments)
 
 
 if __name__ == "__main__":

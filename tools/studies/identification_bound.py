@@ -9,10 +9,7 @@ of order 40 fitted to another, long realisation. One bound is for any model of f
 other for inertia, stiffness, ship damping and tank damping.
 """
 
-import argparse
 import dataclasses
-import json
-import sys
 from collections.abc import Callable
 
 import control
@@ -33,6 +30,7 @@ from tools.peers.identification_records import (
     response_error,
     sampled_plant,
 )
+from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.identification import era, okid, refine
@@ -151,12 +149,9 @@ def matrices(system: control.StateSpace) -> Matrices:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--records", type=int, default=12)
     parser.add_argument("--samples", type=int, default=2500, help="of each record, 0.2 s apart")
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     if arguments.records < 1 or arguments.samples < 1000:
         parser.error("--records must be 1 or more and --samples 1000 or more")
@@ -172,12 +167,7 @@ def main() -> None:
         for name, error in errors.items():
             squares.setdefault(name, []).append(error**2)
     rows = {name: np.sqrt(np.mean(values, axis=0)).tolist() for name, values in squares.items()}
-    if arguments.json:
-        sys.stdout.write(json.dumps(rows) + "\n")
-        return
-    print(f"{'':24}roll    level")
-    for name, (roll, level) in rows.items():
-        print(f"{name:22}{roll:6.1%}  {level:7.1%}")
+    show(rows, arguments)
 
 
 if __name__ == "__main__":

@@ -12,16 +12,12 @@
 * index: the performance index of Fig. 3.10 relative to that of DPC (roll).
 """
 
-import argparse
-import json
 import math
-import sys
 from collections.abc import Callable
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
+from tools.printing import command_line, show
 from tools.studies.trial_setup import entrant, shipped
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import Margins, margins
@@ -58,28 +54,6 @@ from utank_hil.dynamics.linear import STATES, coupled_model
 from utank_hil.thesis.ships import AS_PRINTED, FITTED, GREATER
 
 Rows = dict[str, dict[str, float]]
-# how each column is written
-COLUMNS = {
-    "peak of S": ".2f",
-    "S 20 ms late": ".2f",
-    "gain from": ".2f",
-    "gain to": ".2f",
-    "phase margin °": ".0f",
-    "delay margin s": ".3f",
-    "law's pole": ".3f",
-    "worst pole": ".4f",
-    "list, no washout": ".2f",
-    "frequency ratio": ".3f",
-    "damping ratio": ".3f",
-    "greatest roll per static": ".2f",
-    "roll damping N m s": ".3g",
-    "tank damping": ".3f",
-    "16 roll-only": ".2g",
-    "8 on u and roll": ".2g",
-    "4 on tank angle": ".2g",
-    **dict.fromkeys((*PRINTED, "LQR"), ".3f"),
-    "DPC (roll) itself": ".3g",
-}
 SHIPPED = {
     "GPC_ROLL": "gpc",
     "DPC_ROLL_LEVEL": "dpc",
@@ -221,56 +195,21 @@ def index_rows() -> Rows:
     return found
 
 
-TABLES: dict[str, tuple[str, Callable[[], Rows]]] = {
-    "margins": ("What the laws stand", margin_rows),
-    "passive": ("Passive optimum", passive_rows),
-    "printed": ("Largest deviation from the printed coefficients", printed_rows),
-    "index": ("Performance index relative to DPC (roll)", index_rows),
+TABLES: dict[str, Callable[[], Rows]] = {
+    "margins": margin_rows,
+    "passive": passive_rows,
+    "printed": printed_rows,
+    "index": index_rows,
 }
-
-
-def table_of(title: str, rows: Rows) -> Table:
-    """Rows for a terminal."""
-    present = {column for row in rows.values() for column in row}
-    columns = [column for column in COLUMNS if column in present]
-    table = Table(title=title)
-    table.add_column("", no_wrap=True)
-    for column in columns:
-        table.add_column(column, justify="right")
-    for name, row in rows.items():
-        table.add_row(name, *(written(column, row.get(column)) for column in columns))
-    return table
-
-
-def written(column: str, value: float | None) -> str:
-    """A value in the form of its column."""
-    if value is None:
-        return ""
-    return format(value, COLUMNS[column]) if math.isfinite(value) else "any"
 
 
 def main() -> None:
     """Print the tables that were asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("table", nargs="?", choices=TABLES, help="all if left out")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
     arguments = parser.parse_args()
     wanted = [arguments.table] if arguments.table else list(TABLES)
-    found = {name: TABLES[name][1]() for name in wanted}
-    if arguments.json:
-        finite = {
-            name: {
-                row: {key: value if math.isfinite(value) else None for key, value in cells.items()}
-                for row, cells in rows.items()
-            }
-            for name, rows in found.items()
-        }
-        sys.stdout.write(json.dumps(finite) + "\n")
-        return
-    for name, rows in found.items():
-        Console(width=110).print(table_of(TABLES[name][0], rows))
+    show({name: TABLES[name]() for name in wanted}, arguments)
 
 
 if __name__ == "__main__":

@@ -8,14 +8,12 @@ short and steep seas. The self-tuned law is given each sea's spectrum; the last 
 law without it. Share is the part of the way from the passive tank to the clairvoyant bound.
 """
 
-import json
 import math
-import sys
 from typing import Final
 
 import numpy as np
-from rich.table import Table
 
+from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -25,7 +23,6 @@ from tools.studies.trial_setup import (
     run_shown,
     seeds_of,
     shipped,
-    table_console,
 )
 from utank_hil.analysis.loop.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
@@ -108,14 +105,7 @@ def main() -> None:
         found[name] = {"passive_deg": math.degrees(passive)} | {
             law: (passive - rolls[law]) / (passive - best) for law in LAWS
         }
-    if arguments.json:
-        sys.stdout.write(json.dumps({"seconds": arguments.seconds, "seas": found}) + "\n")
-        return
-    table = Table("sea", "passive °", *(f"{law} %" for law in LAWS))
-    for name, row in found.items():
-        shares = (f"{100 * row[law]:.0f}" for law in LAWS)
-        table.add_row(name, f"{row['passive_deg']:.3f}", *shares)
-    table_console().print(table)
+    show({"seconds": arguments.seconds, "seas": found}, arguments)
 
 
 if __name__ == "__main__":

@@ -9,14 +9,12 @@ are printed beside the shipped ones. Takes about 20 minutes on two cores.
 """
 
 import dataclasses
-import json
 import math
-import sys
 from dataclasses import dataclass
 
 import numpy as np
-from rich.table import Table
 
+from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -26,7 +24,6 @@ from tools.studies.trial_setup import (
     run_shown,
     seeds_of,
     shipped,
-    table_console,
 )
 from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
@@ -122,9 +119,6 @@ def main() -> None:
         vessel, laws = vessel_with(error), entrants(error)
         trials += [Trial(hour, seed, vessel, laws, arguments.seconds) for seed in seeds]
     results = iter(run_shown(trials))
-    table = Table(title=f"Roll RMS below the passive tank's, %, {len(seeds)} seeds")
-    for heading in ("error", "passive °", *LAWS):
-        table.add_column(heading, justify="left" if heading == "error" else "right", no_wrap=True)
     summary = {}
     for error in ERRORS:
         of_error = [next(results) for _ in seeds]
@@ -134,22 +128,7 @@ def main() -> None:
             "passive_roll_rms_deg": passive,
             "below_passive": {name: share._asdict() for name, share in shares.items()},
         }
-        for suffix in ("", REDESIGNED):
-            cells = [shares.get(name + suffix) for name in LAWS]
-            if None not in cells:
-                table.add_row(
-                    error.name + suffix,
-                    f"{passive:.2f}",
-                    *(
-                        f"{100 * cell.mean:.1f} ± {100 * cell.half_width:.1f}"
-                        for cell in cells
-                        if cell is not None
-                    ),
-                )
-    if arguments.json:
-        sys.stdout.write(json.dumps(summary) + "\n")
-    else:
-        table_console().print(table)
+    show(summary, arguments)
 
 
 if __name__ == "__main__":

@@ -7,19 +7,15 @@ In lockstep, with bus, nodes, sensors, retuning and the scenario's operator. One
 gain's margin is its distance from 1 over the distance at which it is found.
 """
 
-import argparse
-import json
 import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
 from firmware_sim.run import SECOND_NS
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, works_of
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ConfigError, load_config
@@ -104,13 +100,12 @@ def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[st
 
 def main() -> int:
     """Run the study."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("scenarios", type=Path, nargs="+")
     length = parser.add_mutually_exclusive_group(required=True)
     length.add_argument("--hours", type=float)
     length.add_argument("--minutes", type=float)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     seconds = options.hours * 3600 if options.hours else options.minutes * 60
     try:
@@ -122,23 +117,7 @@ def main() -> int:
         for scenario in scenarios
         for name in scenario.controllers
     ]
-    if options.json:
-        json.dump({"runs": runs}, sys.stdout)
-        return 0
-    names = list(dict.fromkeys(name for run in runs for name in run["largest"]))  # type: ignore[attr-defined]
-    table = Table("scenario", "controller", *names, "found, s", "end")
-    for run in runs:
-        largest, found_s = run["largest"], run["found_s"]
-        assert isinstance(largest, dict)
-        assert isinstance(found_s, dict)
-        table.add_row(
-            str(run["scenario"]),
-            str(run["controller"]),
-            *(f"{largest[name]:.2f}" if name in largest else "" for name in names),
-            ", ".join(f"{name} {at_s:.0f}" for name, at_s in found_s.items()),
-            f"{run['mode']} {run['fault']}",
-        )
-    Console().print(table)
+    show({"runs": runs}, options)
     return 0
 
 

@@ -11,19 +11,16 @@
 Thesis 4.5 is `utank-hil reproduce contest`. Takes about five minutes on one core.
 """
 
-import argparse
 import dataclasses
-import json
 import math
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
 
+from tools.printing import command_line, show
 from tools.studies.trial_setup import STORM_HOUR, measured_hour, shipped
 from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.analysis.capsize.survival import controlled_run
@@ -240,39 +237,21 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-TABLES: dict[str, tuple[str, Callable[[], Rows], str]] = {
-    "growth": ("Feedback linearization, growth of the loop", growth_rows, ".4f"),
-    "storm": ("Feedback linearization in the storm hour", storm_rows, ".2f"),
-    "valves": ("Roll RMS with valves", valve_rows, ".4f"),
-    "stimulation": ("Stimulation: roll amplitude over wanted", stimulation_rows, ".3f"),
+TABLES: dict[str, Callable[[], Rows]] = {
+    "growth": growth_rows,
+    "storm": storm_rows,
+    "valves": valve_rows,
+    "stimulation": stimulation_rows,
 }
 
 
 def main() -> None:
     """Print the tables that were asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("table", nargs="?", choices=TABLES, help="all if left out")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
     arguments = parser.parse_args()
     wanted = [arguments.table] if arguments.table else list(TABLES)
-    found = {name: TABLES[name][1]() for name in wanted}
-    if arguments.json:
-        sys.stdout.write(json.dumps(found) + "\n")
-        return
-    for name, rows in found.items():
-        title, _, form = TABLES[name]
-        columns = list(dict.fromkeys(column for row in rows.values() for column in row))
-        table = Table(title=title)
-        table.add_column("", no_wrap=True)
-        for column in columns:
-            table.add_column(column, justify="right")
-        for label, row in rows.items():
-            table.add_row(
-                label, *(format(row[column], form) if column in row else "" for column in columns)
-            )
-        Console(width=110).print(table)
+    show({name: TABLES[name]() for name in wanted}, arguments)
 
 
 if __name__ == "__main__":

@@ -6,24 +6,18 @@ The three are judged over the same time of the same waves: from 60 s after the (
 over, or after the refusal, to the end. In lockstep, so the same seed prints the same figures.
 """
 
-import argparse
-import json
-import math
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
 from firmware_sim.bench import jobs_of
 from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.run import Job, Run, run_lockstep
 from firmware_sim.scenario import Scenario
+from tools.printing import command_line, show
 from tools.studies.trial_setup import designed
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.canbus import RetuningState
@@ -31,10 +25,6 @@ from utank_hil.configuration import ConfigError
 from utank_hil.control import BuiltLaw
 
 WORKERS = 2
-HEADINGS = (
-    "seed", "controller", "begun\ns", "period\nfound s", "passive", "law as\nit was", "retuned",
-    "less", "ended in",
-)  # fmt: skip
 
 
 class Unwatched:
@@ -120,36 +110,11 @@ def voyages(seed: int, runs: list[Run], settle_s: float) -> Iterator[Voyage]:
         )
 
 
-def table_of(scenario: Scenario, found: list[Voyage]) -> Table:
-    """The figures for people."""
-    table = Table(title=f"{scenario.name}, roll RMS in degrees")
-    for heading in HEADINGS:
-        left = heading in ("controller", "ended in")
-        table.add_column(heading, justify="left" if left else "right")
-    for one in found:
-        table.add_row(
-            str(one.seed),
-            one.controller,
-            "" if one.begun_s is None else f"{one.begun_s:.0f}",
-            "" if one.period_s is None else f"{one.period_s:.2f}",
-            *(
-                f"{math.degrees(roll):.2f}"
-                for roll in (one.passive_rad, one.as_it_was_rad, one.retuned_rad)
-            ),
-            f"{1 - one.retuned_rad / one.as_it_was_rad:.1%}",
-            one.ended if one.period_s is not None else "; ".join((one.ended, *one.reasons)),
-        )
-    return table
-
-
 def main() -> None:
     """Sail and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("scenario", type=Path)
     parser.add_argument("--seeds", type=int, nargs="+", help="instead of the scenario's one")
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     try:
         scenario, laws = designed(arguments.scenario)
@@ -162,10 +127,7 @@ def main() -> None:
         found: list[Voyage] = []
         for seed in seeds:
             found += voyages(seed, [next(runs) for _ in jobs[seed]], scenario.settle_s)
-    if arguments.json:
-        sys.stdout.write(json.dumps([asdict(one) for one in found]) + "\n")
-    else:
-        Console(width=max(120, Console().width)).print(table_of(scenario, found))
+    show([asdict(one) for one in found], arguments)
 
 
 if __name__ == "__main__":

@@ -7,22 +7,20 @@ tank. The record is cut into parts; each is told as the retuner's process does i
 moment that the bench's waves had in the same part. An hour takes 20 s and a part one or two.
 """
 
-import argparse
-import json
 import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import COLUMNS, RECORD_S, run_lockstep
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
+from tools.printing import command_line, show
 from tools.studies.trial_setup import CONFIGS
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Verdict
@@ -177,62 +175,46 @@ def smooth(spectrum: SlopeSpectrum) -> SlopeSpectrum:
     return replace(spectrum, density=np.convolve(spectrum.density, window, "same"))
 
 
-def table_of(parts: list[Part]) -> Table:
-    """Bias and scatter, by law, sea and length."""
-    table = Table(title="error, mean ± scatter, %")
-    headings = (
-        "law", "min", "sea", "parts", "told\nsea", "told\nship", "moment\nRMS", "stated", "Hs",
-        "Tp", "density\ndB", "stiffness\nwhere told", "stated", "period\nwhere told",
-    )  # fmt: skip
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    keys = sorted({(each.law, each.minutes, each.sea) for each in parts})
-    for law, minutes, sea in keys:
+def errors(parts: list[Part]) -> list[dict[str, Any]]:
+    """Mean error and scatter by law, length and sea; the ship's where its verdict is good."""
+    rows = []
+    for law, minutes, sea in sorted({(each.law, each.minutes, each.sea) for each in parts}):
         group = [p for p in parts if (p.law, p.minutes, p.sea) == (law, minutes, sea)]
-        told = [each for each in group if each.of_ship == Verdict.GOOD.name]
-        table.add_row(
-            law,
-            f"{minutes:g}",
-            sea,
-            str(len(group)),
-            str(sum(each.of_sea == Verdict.GOOD.name for each in group)),
-            str(len(told)),
-            _spread([each.moment for each in group]),
-            f"{100 * np.mean([each.stated for each in group]):.1f}",
-            _spread([each.height for each in group]),
-            _spread([each.peak for each in group]),
-            f"{np.mean([each.spectrum_db for each in group]):.1f}",
-            _spread([each.stiffness for each in told]),
-            f"{100 * np.mean([p.stiffness_deviation for p in told]):.1f}" if told else "",
-            _spread([each.period for each in told]),
-        )
-    return table
+        good = [each for each in group if each.of_ship == Verdict.GOOD.name]
+        row: dict[str, Any] = {"law": law, "minutes": minutes, "sea": sea, "parts": len(group)}
+        row["sea_good"] = sum(each.of_sea == Verdict.GOOD.name for each in group)
+        row["ship_good"] = len(good)
+        for name in ("moment", "stated", "height", "peak", "spectrum_db"):
+            row |= _spread(name, group)
+        for name in ("stiffness", "stiffness_deviation", "period"):
+            row |= _spread(name, good)
+        rows.append(row)
+    return rows
 
 
-def _spread(values: list[float]) -> str:
-    return f"{100 * np.mean(values):+.1f} ± {100 * np.std(values):.1f}" if values else ""
+def _spread(name: str, parts: list[Part]) -> dict[str, float]:
+    values = [getattr(each, name) for each in parts]
+    if not values:
+        return {}
+    return {name: float(np.mean(values)), f"{name}_scatter": float(np.std(values))}
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the study; see the module's description."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = command_line(__doc__)
     parser.add_argument("--minutes", type=float, nargs="+", default=[10.0, 20.0, 60.0])
     parser.add_argument("--hours", type=int, default=1, help="seeds of each case")
     parser.add_argument(
         "--seas", nargs="+", choices=(*MEASURED, *MODELS), default=[*MEASURED, *MODELS]
     )
     parser.add_argument("--periods", type=float, nargs="+", default=[*PERIODS_S])
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     chosen = parser.parse_args(arguments)
     parts: list[Part] = []
     for sea in chosen.seas:
         for period_s in chosen.periods:
             parts += parts_of(sea, period_s, chosen.hours, chosen.minutes)
             print(f"{sea}, {period_s:g} s", file=sys.stderr)
-    if chosen.json:
-        print(json.dumps([each.__dict__ for each in parts]))
-    else:
-        Console(width=160).print(table_of(parts))
+    show({"errors": errors(parts), "parts": [each.__dict__ for each in parts]}, chosen)
     return 0
 
 

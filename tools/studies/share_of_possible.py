@@ -16,13 +16,11 @@ minutes on two cores.
 
 import argparse
 import dataclasses
-import json
 import math
-import sys
 
 import numpy as np
-from rich.table import Table
 
+from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -34,7 +32,6 @@ from tools.studies.trial_setup import (
     run_shown,
     seeds_of,
     shipped,
-    table_console,
 )
 from utank_hil.analysis.loop.causal_bound import CausalBound, CausalProblem, causal_bound
 from utank_hil.analysis.loop.robustness import robustness
@@ -154,35 +151,6 @@ def rows(
     return found
 
 
-def table_of(found: dict[str, dict[str, float]], title: str) -> Table:
-    """The rows for a terminal."""
-    table = Table(title=title)
-    for heading in (
-        "",
-        "roll RMS °",
-        "share %",
-        "of the\ncausal %",
-        "level\npeak m",
-        "pressure\nRMS kPa",
-        "power\npeak MW",
-        "peak sen-\nsitivity",
-    ):
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
-    for name, row in found.items():
-        cells = [name, f"{row['roll_rms_deg']:.3f}", *[""] * 6]
-        if "share" in row:
-            cells[2] = f"{100 * row['share']:.1f} ± {100 * row['share_half_width']:.1f}"
-            cells[3] = f"{100 * row['share_of_causal']:.0f}"
-        if "pressure_rms_pa" in row:
-            cells[5] = f"{row['pressure_rms_pa'] / 1e3:.1f}"
-            cells[6] = f"{row['power_peak_w'] / 1e6:.2f}"
-            cells[7] = f"{row['peak_sensitivity']:.2f}"
-        if "level_peak_m" in row:
-            cells[4] = f"{row['level_peak_m']:.2f}"
-        table.add_row(*cells)
-    return table
-
-
 def arguments_of_command_line() -> argparse.Namespace:
     """Read and check them."""
     made = parser(__doc__, seeds=8, first_seed=1)
@@ -211,12 +179,8 @@ def main() -> None:
         ]
     )
     found = rows(laws, results, best_causal(bound, arguments))
-    if arguments.json:
-        summary = {"seeds": arguments.seeds, "seconds": arguments.seconds, "rows": found}
-        sys.stdout.write(json.dumps(summary) + "\n")
-    else:
-        title = f"Share of the possible, {arguments.seeds} seeds of {arguments.seconds:g} s"
-        table_console().print(table_of(found, title))
+    summary = {"seeds": arguments.seeds, "seconds": arguments.seconds, "rows": found}
+    show(summary, arguments)
 
 
 if __name__ == "__main__":

@@ -6,26 +6,20 @@ Each ship of the table goes from her dimensions to a bench of `--duration` secon
 would take her; those for which no tank can be are told with the reason.
 """
 
-import argparse
-import json
 import math
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
-
-from rich.console import Console
-from rich.table import Table
 
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.figures import figures
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter import FILES, SCENARIO, make_starter
 from firmware_sim.starter_ship import StarterShip
+from tools.printing import command_line, show
 from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_cost
 from utank_hil.commands.gate import admit
-from utank_hil.commands.tables import print_table
 from utank_hil.configuration import load_config
 
 PATROL: Final = StarterShip("patrol vessel", 63, 9.5, 1900, 0.9, 9.5)
@@ -85,49 +79,13 @@ def on_the_bench(ship: StarterShip, hs_m: float | None, duration_s: float) -> di
     }
 
 
-def table_of(rows: list[dict[str, Any]]) -> Table:
-    """The figures for a terminal."""
-    table = Table(title="Starter projects on the bench, roll RMS in °")
-    for heading in (
-        "", "roll\nperiod s", "water\nt", "of\nGM", "pump\nkPa", "pump\nkW", "sea\nm, s",
-        "no\ntank", "passive", "active", "below\npassive", "in\ncharge",
-    ):  # fmt: skip
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
-    for row in rows:
-        if "no_tank" in row:
-            continue
-        table.add_row(
-            row["ship"],
-            f"{row['roll_period_s']:.1f}",
-            f"{row['water_t']:.1f}",
-            f"{row['stability_taken']:.0%}",
-            f"{row['max_pressure_pa'] / 1e3:.3g}",
-            f"{row['max_power_w'] / 1e3:.0f}",
-            f"{row['sea']['hs_m']:g}, {row['sea']['tp_s']:g}",
-            *(f"{row[f'{name}_deg']:.2f}" for name in ("no_tank", "passive", "active")),
-            f"{row['below_passive']:.0%}",
-            f"{row['active_share']:.0%}",
-        )
-    return table
-
-
 def main() -> None:
     """Run the benches and print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--duration", type=float, default=900.0, help="seconds (%(default)s)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     rows = [on_the_bench(ship, hs_m, options.duration) for ship, hs_m in SHIPS]
-    if options.json:
-        sys.stdout.write(json.dumps({"duration_s": options.duration, "ships": rows}) + "\n")
-        return
-    console = Console()
-    print_table(console, table_of(rows))
-    for row in rows:
-        if "no_tank" in row:
-            console.print(f"{row['ship']}: no tank: {row['no_tank']}", soft_wrap=True)
+    show({"duration_s": options.duration, "ships": rows}, options)
 
 
 if __name__ == "__main__":

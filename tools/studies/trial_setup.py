@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from firmware_sim.scenario import Scenario
+from tools.printing import command_line
 from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, run_trials
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig, load_config
@@ -25,7 +26,6 @@ from utank_hil.sea import Spectrum, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 STORM_HOUR = "2019-02-10T05:40"
-TABLE_WIDTH = 118
 
 
 def shipped(name: str) -> ControllerConfig:
@@ -83,9 +83,7 @@ def limited(config: ControllerConfig, limits: PumpLimits) -> ControllerConfig:
 
 def parser(text: str | None, *, seeds: int, first_seed: int) -> argparse.ArgumentParser:
     """Command line with the arguments that all such tools take."""
-    made = argparse.ArgumentParser(
-        description=text, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    made = command_line(text)
     made.add_argument(
         "--seeds", type=int, default=seeds, help="realisations of each sea, 2 or more (%(default)s)"
     )
@@ -95,7 +93,6 @@ def parser(text: str | None, *, seeds: int, first_seed: int) -> argparse.Argumen
     made.add_argument(
         "--seconds", type=float, default=3600.0, help="length of each run (%(default)s)"
     )
-    made.add_argument("--json", action="store_true", help="one JSON object instead of tables")
     return made
 
 
@@ -124,8 +121,3 @@ def run_shown(trials: Sequence[Trial]) -> list[dict[str, TrialFigures]]:
             sys.exit("interrupted")
         except BrokenProcessPool:
             sys.exit("a process of the trials was ended from outside: run the command again")
-
-
-def table_console() -> Console:
-    """Console for tables, wide enough for them wherever they go."""
-    return Console(width=TABLE_WIDTH)

@@ -8,14 +8,10 @@ operator resets and arms again; every four hours the cargo is moved and a retuni
 hour is a sample. The verdict compares the last quarter of the samples with the second quarter.
 """
 
-import argparse
 import gc
-import json
-import math
 import os
 import random
 import resource
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -26,6 +22,7 @@ from typing import Any
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
+from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import Frame
 from utank_hil.configuration import load_config
@@ -208,21 +205,13 @@ def verdict(samples: list[Sample]) -> dict[str, float | bool]:
 
 def main() -> None:
     """Sail, and print the verdict and the samples."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = command_line(__doc__)
     parser.add_argument("--days", type=float, default=7.0)
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     samples, counts = sail(arguments.days * 86400, 3600.0)
-    found = verdict(samples)
-    if arguments.json:
-        rows = [[round(value, 3) for value in vars(each).values()] for each in samples]
-        head = list(vars(samples[0]))
-        result = {"verdict": found, "counts": dict(counts), "samples": {"head": head, "rows": rows}}
-        sys.stdout.write(json.dumps(result) + "\n")
-        return
-    for each in samples[:: math.ceil(len(samples) / 24)]:
-        sys.stdout.write(f"{each}\n")
-    sys.stdout.write(f"{dict(counts)}\n{found}\n")
+    rows = [[round(value, 3) for value in vars(each).values()] for each in samples]
+    table = {"head": list(vars(samples[0])), "rows": rows}
+    show({"verdict": verdict(samples), "counts": dict(counts), "samples": table}, arguments)
 
 
 if __name__ == "__main__":

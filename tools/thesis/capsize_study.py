@@ -11,19 +11,17 @@ some minutes on two cores, most of them for the thresholds.
 """
 
 import argparse
-import json
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress, TaskID
-from rich.table import Table
 
+from tools.printing import command_line, show
 from utank_hil.analysis import (
     CapsizeMap,
     Probability,
@@ -151,59 +149,9 @@ def maps(
     ]
 
 
-def range_of(case: Case) -> str:
-    """Least and greatest threshold over the phase in kN m."""
-    finite = [value for value in case.threshold_nm if value is not None]
-    if not finite:
-        return "none"
-    least = f"{min(finite) / 1e3:.1f}"
-    most = f"{max(finite) / 1e3:.1f}" if len(finite) == len(case.threshold_nm) else "none"
-    return least if least == most else f"{least} to {most}"
-
-
-def threshold_table(cases: list[Case], arguments: argparse.Namespace, name: str) -> Table:
-    """Least and greatest threshold over the phase, a column for each damping."""
-    bare, *tanks = cases
-    table = Table(
-        title=f"{name}: thresholds in kN m at {arguments.wave_rad_s:g} rad/s",
-        caption=f"least to greatest, phases of the wave: {arguments.phases}\n"
-        f"without a tank {range_of(bare)}\n"
-        f"none: above {arguments.highest_nm / 1e3:g}",
-    )
-    table.add_column("Lz in m", justify="right", no_wrap=True)
-    for damping in arguments.damping:
-        table.add_column(f"damping\nratio {damping:g}", justify="right", no_wrap=True)
-    for lz in arguments.lz_m:
-        table.add_row(f"{lz:g}", *(range_of(case) for case in tanks if case.lz_m == lz))
-    return table
-
-
-def probability_table(
-    found: dict[str, Probability], arguments: argparse.Namespace, name: str
-) -> Table:
-    """Estimates with their confidence intervals."""
-    table = Table(
-        title=f"{name}: capsized within {SEA_S / 60:g} min, JONSWAP\n"
-        f"Hs {arguments.hs_m:g} m, Tp {arguments.tp_s:g} s"
-    )
-    for heading in ("", "ships", "capsized", "probability", "95 % confidence"):
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
-    for ship, each in found.items():
-        table.add_row(
-            ship,
-            str(each.ships),
-            str(each.capsized),
-            f"{each.estimate:.1%}",
-            f"{each.low:.1%} to {each.high:.1%}",
-        )
-    return table
-
-
 def parse() -> tuple[argparse.ArgumentParser, argparse.Namespace]:
     """Read the command line; counts must be positive."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("vessel", nargs="?", type=Path, default=PATTI_B)
     parser.add_argument("--wave-rad-s", type=float, default=0.6, help="%(default)s")
     parser.add_argument(
@@ -216,7 +164,6 @@ def parse() -> tuple[argparse.ArgumentParser, argparse.Namespace]:
     parser.add_argument("--tp-s", type=float, default=10.5, help="of the sea, %(default)s")
     parser.add_argument("--seas", type=int, default=1000, help="how many, %(default)s")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the picture")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
     arguments = parser.parse_args()
     for key in ("wave_rad_s", "highest_nm", "phases", "hs_m", "tp_s", "seas"):
         if not (math.isfinite(getattr(arguments, key)) and getattr(arguments, key) > 0):
@@ -249,8 +196,8 @@ def main() -> None:
         f"{vessel.name}: safe starts in calm water, and in a wave moment of "
         f"{wave_nm / 1e3:.0f} kN m at {arguments.wave_rad_s:g} rad/s",
     )
-    if arguments.json:
-        figures: dict[str, Any] = {
+    show(
+        {
             "vessel": vessel.name,
             "phases_deg": phases_deg(model, arguments.phases),
             "thresholds": [case._asdict() for case in cases],
@@ -259,13 +206,9 @@ def main() -> None:
             "amplitude_nm": drawn[0].amplitude_nm.tolist(),
             "erosion": {each.name: each.area.tolist() for each in drawn},
             "picture": str(path),
-        }
-        sys.stdout.write(json.dumps(figures) + "\n")
-        return
-    console = Console(width=100)
-    console.print(threshold_table(cases, arguments, vessel.name))
-    console.print(probability_table(found, arguments, vessel.name))
-    console.print(f"picture: {path}", highlight=False)
+        },
+        arguments,
+    )
 
 
 if __name__ == "__main__":
