@@ -14,7 +14,7 @@ from rich.table import Table
 from utank_hil.commands.tables import print_table
 
 WIDTH: Final = 160  # of what goes to a file
-LISTED: Final = 8  # a cell with more values than these says how many there are
+LISTED: Final = 12  # a cell with more values than these says how many there are
 
 Row = Mapping[str, Any]
 

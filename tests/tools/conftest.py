@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from tools.studies import trial_setup
 from utank_hil.analysis.loop.sea_trial import run_trial
 
 
@@ -33,8 +34,9 @@ def tool(
     def run(name: str, *arguments: str) -> Ended:
         module = importlib.import_module(f"tools.{name}")
         monkeypatch.setattr("sys.argv", [name, *arguments])
-        if hasattr(module, "run_shown"):
-            monkeypatch.setattr(module, "run_shown", lambda trials: list(map(run_trial, trials)))
+        monkeypatch.setattr(
+            trial_setup, "run_trials", lambda trials, _: list(map(run_trial, trials))
+        )
         try:
             code = module.main() or 0
         except SystemExit as ended:

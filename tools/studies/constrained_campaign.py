@@ -16,17 +16,18 @@ is the share of time in which the limiter gives the clipped law less than it ask
     python -m tools.studies.constrained_campaign --only "roll period" --horizon-s 30
 """
 
-import argparse
 import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
+    chosen,
     entrant,
     expecting,
     limited,
@@ -38,7 +39,7 @@ from tools.studies.trial_setup import (
     shipped,
 )
 from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip
-from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ConstrainedDesign, PumpLimits
@@ -53,47 +54,27 @@ KNOT_GROWTH = 0.15  # beyond the shipped knots, the distance between two is this
 
 @dataclass(frozen=True)
 class Case:
-    """A sea and a pump.
+    """A sea, and the limits of the pump."""
 
-    Attributes
-    ----------
-    name : str
-    sea : Spectrum
-    pressure_pa, power_w : float
-        Limits of the pump.
-    """
-
-    name: str
     sea: Spectrum
     pressure_pa: float = 50e3
     power_w: float = math.inf
 
 
-def cases() -> list[Case]:
+def cases() -> dict[str, Case]:
     """Seas from where the pump is never at a limit to where it mostly is."""
     storm = measured_hour(STORM_HOUR)
-    return [
-        Case("swell, 9 Feb 12:40", measured_hour("2019-02-09T12:40")),
-        Case("short sea, 10 Feb 00:40", measured_hour("2019-02-10T00:40")),
-        Case("short sea, JONSWAP", jonswap(5.0, 8.0)),
-        Case("long swell, JONSWAP", jonswap(4.0, 16.0)),
-        Case("at the roll period, JONSWAP", jonswap(4.0, 12.5)),
-        Case("storm hour, 10 Feb 05:40", storm),
-        Case("storm hour, pump of 25 kPa", storm, pressure_pa=25e3),
-        Case("storm hour, pump of 1 MW", storm, power_w=1e6),
-        Case("greater storm, JONSWAP", jonswap(6.5, 11.5)),
-    ]
-
-
-def chosen(text: str) -> list[Case]:
-    """The cases whose names hold a text."""
-    found = [case for case in cases() if text in case.name]
-    if not found:
-        raise ValueError(
-            f"--only {text!r} is in no case's name; there are "
-            + "; ".join(case.name for case in cases())
-        )
-    return found
+    return {
+        "swell, 9 Feb 12:40": Case(measured_hour("2019-02-09T12:40")),
+        "short sea, 10 Feb 00:40": Case(measured_hour("2019-02-10T00:40")),
+        "short sea, JONSWAP": Case(jonswap(5.0, 8.0)),
+        "long swell, JONSWAP": Case(jonswap(4.0, 16.0)),
+        "at the roll period, JONSWAP": Case(jonswap(4.0, 12.5)),
+        "storm hour, 10 Feb 05:40": Case(storm),
+        "storm hour, pump of 25 kPa": Case(storm, pressure_pa=25e3),
+        "storm hour, pump of 1 MW": Case(storm, power_w=1e6),
+        "greater storm, JONSWAP": Case(jonswap(6.5, 11.5)),
+    }
 
 
 def entrants(case: Case, horizon_s: float | None) -> tuple[Entrant, ...]:
@@ -135,73 +116,41 @@ def reaching(config: ControllerConfig, horizon_s: float) -> ControllerConfig:
     return config.model_copy(update={"law": longer})
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """All realisations of a case.
-
-    Attributes
-    ----------
-    case : Case
-    runs : dict
-        Figures by name, one for each seed.
-    """
-
-    case: Case
-    runs: dict[str, list[TrialFigures]]
-
-    def figures(self, name: str, field: str) -> FloatArray:
-        """One figure of one entrant, seed by seed."""
-        return np.array([getattr(run, field) for run in self.runs[name]])
-
-    def below(self, rival: str) -> FloatArray:
-        """Share by which the constrained law's roll RMS is less than a rival's, seed by seed."""
-        shares: FloatArray = 1 - self.figures(CONSTRAINED, "roll_rms_rad") / self.figures(
-            rival, "roll_rms_rad"
-        )
-        return shares
+def figures(runs: list[dict[str, TrialFigures]], name: str, field: str) -> FloatArray:
+    """One figure of one entrant, seed by seed."""
+    return np.array([getattr(run[name], field) for run in runs])
 
 
-def run(arguments: argparse.Namespace) -> list[Outcome]:
-    """Run every case with every seed."""
-    vessel = TrialShip(shipped("constrained_gpc").plant)
-    wanted, seeds = chosen(arguments.only), seeds_of(arguments)
-    trials = []
-    for case in wanted:
-        laws = entrants(case, arguments.horizon_s)
-        trials += [Trial(case.sea, seed, vessel, laws, arguments.seconds) for seed in seeds]
-    results = iter(run_shown(trials))
-    outcomes = []
-    for case in wanted:
-        of_case = [next(results) for _ in seeds]
-        outcomes.append(
-            Outcome(case, {name: [one[name] for one in of_case] for name in of_case[0]})
-        )
-    return outcomes
+def below(runs: list[dict[str, TrialFigures]], rival: str) -> Interval:
+    """Share by which the constrained law's roll RMS is less than a rival's."""
+    ours, theirs = (figures(runs, name, "roll_rms_rad") for name in (CONSTRAINED, rival))
+    return mean_interval(1 - ours / theirs)
 
 
-def as_json(outcome: Outcome) -> dict[str, object]:
-    """Everything of a case, seed by seed, and the paired differences."""
-    sea = outcome.case.sea
+def outcome(name: str, case: Case, runs: list[dict[str, TrialFigures]]) -> dict[str, Any]:
+    """Means of a case, the paired differences, and everything seed by seed."""
     return {
-        "name": outcome.case.name,
-        "hs_m": sea.hs_m,
-        "tp_s": sea.tp_s,
-        "pressure_pa": outcome.case.pressure_pa,
-        "power_w": outcome.case.power_w if math.isfinite(outcome.case.power_w) else None,
-        "runs": {
-            name: [dataclasses.asdict(run) for run in runs] for name, runs in outcome.runs.items()
+        "name": name,
+        "hs_m": case.sea.hs_m,
+        "tp_s": case.sea.tp_s,
+        "pressure_pa": case.pressure_pa,
+        "power_w": case.power_w,
+        "roll_rms_deg": {
+            law: math.degrees(figures(runs, law, "roll_rms_rad").mean()) for law in runs[0]
         },
-        "below": {rival: mean_interval(outcome.below(rival))._asdict() for rival in RIVALS},
+        "below": {rival: below(runs, rival)._asdict() for rival in RIVALS},
+        "runs": {law: [dataclasses.asdict(run[law]) for run in runs] for law in runs[0]},
     }
 
 
-def draw(outcomes: list[Outcome], path: Path, title: str) -> Path:
+def draw(outcomes: list[dict[str, Any]], path: Path) -> None:
     """Paired differences with their intervals, case below case."""
+    title = "What planning within limits is worth"
     with picture(path, title, (9.0, 1.6 + 0.45 * len(outcomes))) as figure:
         axes = figure.add_subplot()
         places = np.arange(len(outcomes))[::-1]
         for rival, color, shift in ((CLIPPED, COLORS[1], 0.12), (GPC, COLORS[2], -0.12)):
-            intervals = [mean_interval(outcome.below(rival)) for outcome in outcomes]
+            intervals = [Interval(**outcome["below"][rival]) for outcome in outcomes]
             axes.errorbar(
                 [100 * one.mean for one in intervals],
                 places + shift,
@@ -212,10 +161,9 @@ def draw(outcomes: list[Outcome], path: Path, title: str) -> Path:
                 label=f"below {rival}",
             )
         axes.axvline(0.0, color=COLORS[0], linewidth=1.0)
-        axes.set_yticks(places, [outcome.case.name for outcome in outcomes])
+        axes.set_yticks(places, [outcome["name"] for outcome in outcomes])
         axes.set_xlabel("Roll RMS of the constrained law below its rival's (%), 95 % interval")
         figure.legend(loc="outside lower left", ncols=2, frameon=False)
-    return path
 
 
 def main() -> None:
@@ -225,14 +173,22 @@ def main() -> None:
     made.add_argument("--only", default="", help="run the cases whose names hold this text")
     made.add_argument("--horizon-s", type=float, help="length of the plans (12 as shipped)")
     arguments = parsed(made)
+    vessel, trials = TrialShip(shipped("constrained_gpc").plant), {}
     try:
-        outcomes = run(arguments)
+        wanted = chosen(cases(), arguments.only)
+        for name, case in wanted.items():
+            laws = entrants(case, arguments.horizon_s)
+            trials[name] = [
+                Trial(case.sea, seed, vessel, laws, arguments.seconds)
+                for seed in seeds_of(arguments)
+            ]
     except ValueError as error:
         made.error(str(error))
-    show({"cases": [as_json(outcome) for outcome in outcomes]}, arguments)
+    outcomes = [outcome(name, wanted[name], runs) for name, runs in run_shown(trials).items()]
+    show({"cases": outcomes}, arguments)
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        draw(outcomes, arguments.out / "campaign.png", "What planning within limits is worth")
+        draw(outcomes, arguments.out / "campaign.png")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import numpy as np
 from tools.printing import show
 from tools.studies.trial_setup import (
     STORM_HOUR,
+    chosen,
     entrant,
     measured_hour,
     parsed,
@@ -83,20 +84,18 @@ def main() -> None:
     made = parser(__doc__, seeds=2, first_seed=1)
     made.add_argument("--only", default="", help="run the seas whose names hold this text")
     arguments = parsed(made)
-    chosen = {name: sea for name, sea in seas().items() if arguments.only in name}
-    if not chosen:
-        made.error(f"--only {arguments.only!r} is in no sea's name: {'; '.join(seas())}")
-    vessel, bound = TrialShip(shipped("gpc").plant), shipped("constrained_gpc").limits
-    trials = []
-    for sea in chosen.values():
+    try:
+        wanted = chosen(seas(), arguments.only)
+    except ValueError as error:
+        made.error(str(error))
+    vessel, bound, trials = TrialShip(shipped("gpc").plant), shipped("constrained_gpc").limits, {}
+    for name, sea in wanted.items():
         laws = entrants(sea)
-        trials += [
+        trials[name] = [
             Trial(sea, seed, vessel, laws, arguments.seconds, bound) for seed in seeds_of(arguments)
         ]
-    results = iter(run_shown(trials))
     found: dict[str, dict[str, float]] = {}
-    for name in chosen:
-        runs = [next(results) for _ in seeds_of(arguments)]
+    for name, runs in run_shown(trials).items():
         rolls = {
             each: float(np.mean([run[each].roll_rms_rad for run in runs]))
             for each in (PASSIVE, CLAIRVOYANT, *LAWS)

@@ -113,21 +113,21 @@ def below_passive(results: list[dict[str, TrialFigures]]) -> dict[str, Interval]
 def main() -> None:
     """Run all seeds with all errors and print the table."""
     arguments = parsed(parser(__doc__, seeds=8, first_seed=401))
-    hour, seeds = measured_hour(STORM_HOUR), seeds_of(arguments)
-    trials = []
+    hour, trials = measured_hour(STORM_HOUR), {}
     for error in ERRORS:
         vessel, laws = vessel_with(error), entrants(error)
-        trials += [Trial(hour, seed, vessel, laws, arguments.seconds) for seed in seeds]
-    results = iter(run_shown(trials))
-    summary = {}
-    for error in ERRORS:
-        of_error = [next(results) for _ in seeds]
-        passive = math.degrees(np.mean([one[PASSIVE].roll_rms_rad for one in of_error]))
-        shares = below_passive(of_error)
-        summary[error.name] = {
-            "passive_roll_rms_deg": passive,
-            "below_passive": {name: share._asdict() for name, share in shares.items()},
+        trials[error.name] = [
+            Trial(hour, seed, vessel, laws, arguments.seconds) for seed in seeds_of(arguments)
+        ]
+    summary = {
+        name: {
+            "passive_roll_rms_deg": math.degrees(
+                np.mean([one[PASSIVE].roll_rms_rad for one in found])
+            ),
+            "below_passive": {law: share._asdict() for law, share in below_passive(found).items()},
         }
+        for name, found in run_shown(trials).items()
+    }
     show(summary, arguments)
 
 

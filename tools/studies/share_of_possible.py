@@ -172,12 +172,11 @@ def main() -> None:
     )
     laws = entrants(bound)
     hour, vessel = measured_hour(STORM_HOUR), TrialShip(planned.plant)
-    results = run_shown(
-        [
-            Trial(hour, seed, vessel, tuple(laws), arguments.seconds, bound)
-            for seed in seeds_of(arguments)
-        ]
-    )
+    trials = [
+        Trial(hour, seed, vessel, tuple(laws), arguments.seconds, bound)
+        for seed in seeds_of(arguments)
+    ]
+    results = run_shown({"storm": trials})["storm"]
     found = rows(laws, results, best_causal(bound, arguments))
     summary = {"seeds": arguments.seeds, "seconds": arguments.seconds, "rows": found}
     show(summary, arguments)

@@ -7,9 +7,10 @@ import argparse
 import dataclasses
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import Progress
@@ -26,6 +27,7 @@ from utank_hil.sea import Spectrum, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 STORM_HOUR = "2019-02-10T05:40"
+Case = TypeVar("Case")
 
 
 def shipped(name: str) -> ControllerConfig:
@@ -111,13 +113,29 @@ def seeds_of(arguments: argparse.Namespace) -> range:
     return range(arguments.first_seed, arguments.first_seed + arguments.seeds)
 
 
-def run_shown(trials: Sequence[Trial]) -> list[dict[str, TrialFigures]]:
-    """Run trials with a progress bar on standard error; ends the program on Ctrl-C."""
+def run_shown(cases: Mapping[str, Sequence[Trial]]) -> dict[str, list[dict[str, TrialFigures]]]:
+    """Figures of each case's trials; a progress bar on standard error, Ctrl-C ends the program."""
+    trials = [trial for case in cases.values() for trial in case]
     with Progress(console=Console(stderr=True)) as bar:
         task = bar.add_task(f"{len(trials)} trials", total=1.0)
         try:
-            return run_trials(trials, lambda done: bar.update(task, completed=done))
+            found = iter(run_trials(trials, lambda done: bar.update(task, completed=done)))
         except KeyboardInterrupt:
             sys.exit("interrupted")
         except BrokenProcessPool:
             sys.exit("a process of the trials was ended from outside: run the command again")
+    return {name: [next(found) for _ in case] for name, case in cases.items()}
+
+
+def chosen(cases: Mapping[str, Case], text: str) -> dict[str, Case]:
+    """The cases whose names hold a text.
+
+    Raises
+    ------
+    ValueError
+        If none does.
+    """
+    found = {name: case for name, case in cases.items() if text in name}
+    if not found:
+        raise ValueError(f"--only {text!r} is in no case's name; there are {'; '.join(cases)}")
+    return found
