@@ -56,7 +56,7 @@ def _show(title: str, figures: Any, console: Console) -> None:
     if title and single and not rows:
         console.print(escape(title), style="italic")
     for name in single:
-        console.print(escape(f"{name.replace('_', ' ')}: {_cell(figures[name])}"), soft_wrap=True)
+        console.print(escape(f"{name}: {_cell(figures[name])}"), soft_wrap=True)
     if rows:
         print_table(console, _table(title, rows))
     for name, each in parts.items():
@@ -81,7 +81,7 @@ def _table(title: str, rows: Sequence[Row]) -> Table:
     columns = list(dict.fromkeys(name for row in flat for name in row))
     table = Table(title=escape(title), title_justify="left")
     for name in columns:
-        table.add_column(escape(name.replace("_", " ")), justify="right" if name else "left")
+        table.add_column(escape(name), justify="right" if name else "left")
     for row in flat:
         table.add_row(*(_cell(row.get(name)) for name in columns))
     return table
