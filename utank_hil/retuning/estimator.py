@@ -248,7 +248,7 @@ class Estimator:
             record = self._history.record(self._history.capacity)
             self._desk.submit(self._number, np.vstack([self._known, record]), now_ns)
         silent_ns = now_ns - self._heard_ns
-        if silent_ns > OUTDATED * self._every_ns:
+        if silent_ns > OUTDATED * self._every_ns and not self.trouble:
             self._fail(
                 f"nothing was heard for {silent_ns * 1e-9:.0f} s of the process that estimates: "
                 "it is dead, hangs or is too busy"
@@ -290,7 +290,7 @@ class Estimator:
         return answer
 
     def _fail(self, reason: str) -> None:
-        if not self.trouble:
+        if not self.trouble:  # said once
             self.trouble = reason
             self._news.append(f"no estimates of sea and ship: {reason}")
 
