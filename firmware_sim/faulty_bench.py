@@ -44,6 +44,8 @@ class FaultyBench:
         Of a controller that retunes itself; its law can't be made to fail.
     estimating : Retuner, optional
         Who estimates sea and ship.
+    commissioned : bool
+        Whether the controller may be armed.
 
     Attributes
     ----------
@@ -67,11 +69,13 @@ class FaultyBench:
         sink_every: int = 1,
         retuner: Retuner | None = None,
         estimating: Retuner | None = None,
+        commissioned: bool = True,
     ) -> None:
         self._law = law or build_law(config)
         self._config, self._trace, self._seed = config, trace, seed
         self._sink, self._sink_every = sink, sink_every
         self._retuner, self._estimating = retuner, estimating
+        self._commissioned = commissioned
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
         self.breakable: BreakableLaw | None = None
         self._controller = FaultyNode(self._new_controller())
@@ -94,7 +98,7 @@ class FaultyBench:
             estimating=self._estimating,
             sink=self._sink,
             sink_every=self._sink_every,
-            commissioned=True,
+            commissioned=self._commissioned,
         )
 
     @property

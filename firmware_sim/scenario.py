@@ -254,7 +254,13 @@ class Scenario(Section):
 
     def _fault_problems(self) -> list[Problem]:
         """Faults of nodes that there are not."""
-        missing = {"drive": self.vessel.pump is None, "valve": self.vessel.valve is None}
+        vessel = self.vessel
+        missing = {
+            "drive": vessel.pump is None,
+            "valve": vessel.valve is None,
+            "sensors_2": not vessel.redundancy.second_motion_sensor,
+            "hardwired": not vessel.redundancy.hardwired_inputs,
+        }
         problems = [
             (f"faults.{place}", f"can't be: the vessel has no {name}")
             for place, fault in enumerate(self.faults)

@@ -96,7 +96,11 @@ def faults(
         for row in chosen
         if len(outcomes[row.id]) == seeds
     ]
-    not_run = {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
+    not_run = {
+        each.id: f"{each.fault}: shown by {each.elsewhere}"
+        for each in loaded.shown_elsewhere(names)
+    }
+    not_run |= {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
     to_run = [row for row in live if row.does]
     if bus is None:
         not_run |= {row.id: "needs a live bus: --bus" for row in to_run}

@@ -11,6 +11,7 @@ from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
 from utank_hil.parameters import Finite, NotNegative, Positive, refuse
 from utank_hil.runtime.panel import TimedAction
+from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 
 
 def _fault_name(name: str) -> str:
@@ -22,11 +23,12 @@ def _fault_name(name: str) -> str:
 FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
-Reaction = Literal["stop", "ramp", "halve", "note", "none", "refuse", "drive"]
+Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]
 REACTIONS: Final[dict[Reaction, str]] = {
     "stop": "zero pressure at once, latched",
     "ramp": "ramp to zero, latched",
     "halve": "half the pressure, with an alarm",
+    "alarm": "an alarm; control goes on",
     "note": "discarded or counted; control goes on",
     "none": "not told from a sound ship; control goes on",
     "refuse": "not armed",
@@ -56,23 +58,43 @@ class Setup(Section):
     controller : str
     wind_moment_nm : float
         Heels her from the moment of the fault on.
+    redundancy : Redundancy
+        What she has beside what the scenario's vessel has.
+    commissioned : bool
+        Whether the controller may be armed.
     """
 
     scenario: Scenario
     controller: str
     wind_moment_nm: Finite = 0.0
+    redundancy: Redundancy = NO_REDUNDANCY
+    commissioned: bool = True
+
+    @property
+    def equipped(self) -> Scenario:
+        """The scenario with all that the ship has."""
+        scenario = self.scenario
+        if self.redundancy == NO_REDUNDANCY:
+            return scenario
+        vessel = scenario.vessel.model_copy(update={"redundancy": self.redundancy})
+        controllers = {
+            name: config.model_copy(update={"vessel": vessel})
+            for name, config in scenario.controllers.items()
+        }
+        return scenario.model_copy(update={"vessel": vessel, "controllers": controllers})
 
     @property
     def config(self) -> ControllerConfig:
         """The controller's."""
-        return self.scenario.controllers[self.controller]
+        return self.equipped.controllers[self.controller]
 
     def scenario_of(self, fault_s: float) -> Scenario:
         """The scenario with the wind."""
+        scenario = self.equipped
         if not self.wind_moment_nm:
-            return self.scenario
+            return scenario
         wind = {"actual_ship": {"wind_moment_nm": self.wind_moment_nm}, "actual_from_s": fault_s}
-        return self.scenario.model_copy(update=wind)
+        return scenario.model_copy(update=wind)
 
     @model_validator(mode="after")
     def _known(self) -> "Setup":
@@ -198,8 +220,16 @@ class Campaign(Section):
         """Rows whose name, or what they meet, begins with one of the names; all without any."""
 
         def matches(row: Row | LiveRow) -> bool:
-            return not names or any(own.startswith(tuple(names)) for own in (row.id, *row.meets))
+            return any(_begins(own, names) for own in (row.id, *row.meets))
 
         return [row for row in self.rows if matches(row)], [
             row for row in self.live if matches(row)
         ]
+
+    def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
+        """Requirements of these names, or all, that tests show and no row does."""
+        return [each for each in self.requirements if each.elsewhere and _begins(each.id, names)]
+
+
+def _begins(own: str, names: Sequence[str]) -> bool:
+    return not names or own.startswith(tuple(names))

@@ -1,5 +1,6 @@
 """The live rows: faults of processes and of a CAN interface, with the deployed programs."""
 
+import math
 import signal
 import socket
 import struct
@@ -9,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,9 +32,15 @@ START_S: Final = 180.0
 """In an emulated kernel imports take long."""
 DRIVEN_PA: Final = 5e3
 WATCHED_S: Final = 3.0
+RESTED_S: Final = 1.0
+_RECENT_S: Final = 0.5
 _LOOK_S: Final = 0.002
 _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
 """An error frame that says bus-off, as a kernel's driver hands it on."""
+
+
+Later = tuple[float, Callable[[], None]] | None
+"""What is still to be done so many s after the fault."""
 
 
 class LiveError(Exception):
@@ -58,6 +66,7 @@ class LiveBench:
         self._port = SocketCanPort(bus, [self._status.can_id, self._drive.can_id])
         self.mode: Mode | None = None
         self.fault = ""
+        self._status_s = -math.inf
         self.state: DriveState | None = None
         self.pressure_pa = 0.0
         programs = Path(sys.executable).parent
@@ -93,7 +102,7 @@ class LiveBench:
             if frame.can_id == self._status.can_id:
                 status = self._status.accept(frame)
                 if status is not None:
-                    self.mode = status.mode
+                    self.mode, self._status_s = status.mode, time.monotonic()
                     self.fault = "" if status.fault is None else status.fault.name
             elif (drive := self._drive.accept(frame)) is not None:
                 self.state, self.pressure_pa = drive.state, drive.pressure_pa
@@ -119,13 +128,21 @@ class LiveBench:
         if self.state is not DriveState.OPERATION_ENABLED:
             raise LiveError(f"the drive went off by itself: {self.state!r}, fault {self.fault}")
 
-    def watch(self) -> tuple[float | None, float | None]:
+    @property
+    def in_charge(self) -> bool:
+        """Whether the controller says so at present."""
+        return self.mode is Mode.ACTIVE and time.monotonic() - self._status_s < _RECENT_S
+
+    def watch(self, later: Later = None) -> tuple[float | None, float | None]:
         """Look on; ms until the controller faults, and until the drive no longer is enabled."""
         began_s = time.monotonic()
         found: float | None = None
         zero: float | None = None
         while (since_s := time.monotonic() - began_s) < WATCHED_S:
             self.look()
+            if later is not None and since_s >= later[0]:
+                later[1]()
+                later = None
             if found is None and self.mode is Mode.FAULT:
                 found = round(1e3 * since_s, 1)
             if zero is None and self.state is not DriveState.OPERATION_ENABLED:
@@ -133,36 +150,68 @@ class LiveBench:
         return found, zero
 
 
-def controller_killed(bench: LiveBench) -> None:
+def controller_killed(bench: LiveBench) -> Later:
     """SIGKILL the controller."""
     bench.controller.kill()
+    return None
 
 
-def controller_stopped(bench: LiveBench) -> None:
+def controller_stopped(bench: LiveBench) -> Later:
     """SIGSTOP the controller."""
     bench.controller.send_signal(signal.SIGSTOP)
+    return None
 
 
-def controller_hung_up(bench: LiveBench) -> None:
+def controller_stopped_for_a_second(bench: LiveBench) -> Later:
+    """SIGSTOP the controller, and SIGCONT when its drive has long been off."""
+    bench.controller.send_signal(signal.SIGSTOP)
+    return RESTED_S, partial(bench.controller.send_signal, signal.SIGCONT)
+
+
+def controller_hung_up(bench: LiveBench) -> Later:
     """SIGHUP the controller."""
     bench.controller.send_signal(signal.SIGHUP)
+    return None
 
 
-def ship_killed(bench: LiveBench) -> None:
+def controller_terminated(bench: LiveBench) -> Later:
+    """SIGTERM the controller, as a service manager does."""
+    bench.controller.terminate()
+    return None
+
+
+def ship_killed(bench: LiveBench) -> Later:
     """SIGKILL the ship's side, sensors and drive with it."""
     bench.ship.kill()
+    return None
 
 
-def bus_off(bench: LiveBench) -> None:
+def ship_stopped_for_a_second(bench: LiveBench) -> Later:
+    """SIGSTOP the ship's side, and SIGCONT when the controller has long faulted."""
+    bench.ship.send_signal(signal.SIGSTOP)
+    return RESTED_S, partial(bench.ship.send_signal, signal.SIGCONT)
+
+
+def bus_off(bench: LiveBench) -> Later:
     """Send an error frame that says bus-off."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
         raw.bind((bench.bus,))
         raw.send(_BUS_OFF)
+    return None
 
 
-ACTIONS: Final[dict[str, Callable[[LiveBench], None]]] = {
+ACTIONS: Final[dict[str, Callable[[LiveBench], Later]]] = {
     each.__name__: each
-    for each in (controller_killed, controller_stopped, controller_hung_up, ship_killed, bus_off)
+    for each in (
+        controller_killed,
+        controller_stopped,
+        controller_stopped_for_a_second,
+        controller_hung_up,
+        controller_terminated,
+        ship_killed,
+        ship_stopped_for_a_second,
+        bus_off,
+    )
 }
 
 
@@ -190,9 +239,10 @@ def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
     with _bench(bus) as bench:
         try:
             bench.wait_in_charge()
-            ACTIONS[row.does](bench)
-            found, zero = bench.watch()
+            found, zero = bench.watch(ACTIONS[row.does](bench))
             code = bench.fault
+            if bench.in_charge:
+                problems.append("in charge again in the end")
         except LiveError as error:
             problems.append(str(error))
     judged = found if row.judged == "found" else zero

@@ -62,7 +62,7 @@ class Outcome:
     ----------
     row : str
     seed : int
-    found_ms, halved_ms, noted_ms, zero_ms : float or None
+    found_ms, halved_ms, noted_ms, alarm_ms, zero_ms : float or None
     mode, code : str
         In the end, and the fault that was latched or shown.
     alarms : tuple of str
@@ -86,6 +86,7 @@ class Outcome:
     found_ms: float | None = None
     halved_ms: float | None = None
     noted_ms: float | None = None
+    alarm_ms: float | None = None
     zero_ms: float | None = None
     mode: str = ""
     code: str = ""
@@ -176,6 +177,7 @@ class Sea:
             trace=log,
             sink=recorder if self._recorded else None,
             sink_every=SAMPLE_TICKS,
+            commissioned=self._setup.commissioned,
         )
         recorder.bench = bench
         return Underway(bench, log, recorder)
@@ -227,7 +229,7 @@ class Sea:
         bench, log = underway.bench, underway.log
         start_ns = bench.lockstep.now_ns
         refused = bench.ship.refused_commands
-        watch = Watch(bench, row.operator, row.counts_from)
+        watch = Watch(bench, row.operator, row.counts_from, row.codes)
         bench.place(row.faults)
         bench.join([watch])
         watched_ns = start_ns + round(row.followed_s * SECOND_NS)
@@ -282,6 +284,7 @@ class Sea:
             after(watch.found_ns),
             after(watch.halved_ns),
             after(watch.noted_ns),
+            after(watch.alarm_ns),
             after(zero_ns),
             "",
             watch.code.name,

@@ -130,6 +130,7 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
         "stop": outcome.found_ms,
         "ramp": outcome.found_ms,
         "halve": outcome.halved_ms,
+        "alarm": outcome.alarm_ms,
         "note": outcome.noted_ms,
         "drive": outcome.zero_ms,
         "none": None,
@@ -159,9 +160,9 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
             limit_ms = found_ms + (STOP_ZERO_MS if row.reaction == "stop" else RAMP_ZERO_MS)
         if zero_ms > limit_ms:
             yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
-    if row.reaction in ("halve", "note", "none") and outcome.mode != "ACTIVE":
+    if row.reaction in ("halve", "alarm", "note", "none") and outcome.mode != "ACTIVE":
         yield f"ended in {outcome.mode}, {outcome.code}"
-    if row.reaction in ("note", "none") and outcome.halved_ms is not None:
+    if row.reaction in ("alarm", "note", "none") and outcome.halved_ms is not None:
         yield "halved the pressure"
     if row.reaction == "refuse" and outcome.was_active:
         yield "was armed"

@@ -1,6 +1,6 @@
 """What happens on the bench after a fault: a node that looks on, and a log of the bus."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from itertools import pairwise, zip_longest
 from typing import Any
 
@@ -66,12 +66,14 @@ class Watch:
         Buttons to press, at times after the first tick.
     counts_from : mapping of str to float
         As in `Row`.
+    codes : collection of str
+        As in `Row`.
 
     Attributes
     ----------
-    active_ns, found_ns, halved_ns, noted_ns : int or None
+    active_ns, found_ns, halved_ns, noted_ns, alarm_ns : int or None
         When the controller was first in charge; latched a fault; halved the pressure; rejected,
-        missed or discarded anything.
+        missed or discarded anything; raised an alarm of `codes`.
     over_ns : int or None
         When what `counts_from` asks for was first so, or last became so for the pressure.
     pressed_ns : int
@@ -95,6 +97,7 @@ class Watch:
         bench: FaultyBench,
         operator: Iterable[TimedAction] = (),
         counts_from: Mapping[Any, float] | None = None,
+        codes: Collection[str] = (),
     ) -> None:
         self._bench = bench
         self._script = sorted(operator, key=lambda timed: timed.time_s)
@@ -107,6 +110,8 @@ class Watch:
         self.found_ns: int | None = None
         self.halved_ns: int | None = None
         self.noted_ns: int | None = None
+        self.alarm_ns: int | None = None
+        self._codes = {Fault[name] for name in codes}
         self.pressed_ns = now_ns - TICK_NS
         self.code = Fault.NONE
         self.alarms: set[Fault] = set()
@@ -157,6 +162,8 @@ class Watch:
             self.noted_ns = now_ns
         if now_ns % (10 * TICK_NS) == 0:
             self.alarms |= node.alarms.codes
+            if self.alarm_ns is None and self.alarms & self._codes:
+                self.alarm_ns = now_ns
         ship = self._bench.ship
         if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
             ship.valve is not None and ship.valve.following

@@ -21,6 +21,8 @@ NODE_OF: Final = {
     Address.DRIVE: "drive",
     Address.VALVE: "valve",
     Address.OPERATOR: "panel",
+    Address.SENSORS_2: "sensors_2",
+    Address.HARDWIRED: "hardwired",
     Address.CONTROLLER: "controller",
 }
 """Name of the emulated node at an address."""

@@ -11,7 +11,7 @@ NOT_AVAILABLE = 255
 
 #: Declared, so that finding them needs no other catalogue. A row for one takes it from here.
 RESERVED = {
-    Fault.COUNTER_FROZEN, Fault.BUS_DEGRADED,
+    Fault.COUNTER_FROZEN,
 }  # fmt: skip
 
 

@@ -498,6 +498,16 @@ FAULTS: Final = (
         ),
     ),
     _row(
+        Fault.BUS_DEGRADED,
+        "Frames are lost on the CAN bus, though not so many in succession that it ends the run.",
+        "Check the cable, its plugs and termination, gateways between the nodes, and the load.",
+        _found(
+            Reaction.WARN,
+            "over 1% of a message's frames missing by its counter, five too many",
+            Finding.FRAMES_LOST,
+        ),
+    ),
+    _row(
         Fault.OVERRUN,
         "The controller's loop ran too late.",
         "Stop other work on the computer and give the controller real-time scheduling.",

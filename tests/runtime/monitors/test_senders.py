@@ -18,14 +18,20 @@ class Counted:
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
 
 
-def first_found(heard: int, lost: int, cycle_ms: int = 10, seconds: float = 5.0) -> float | None:
+def first_found(
+    heard: float,
+    lost: float,
+    cycle_ms: int = 10,
+    seconds: float = 5.0,
+    what: Finding = Finding.SECOND_SENDER | Finding.NODE_SILENT,
+) -> float | None:
     """When a stream is found that hears and loses so many frames every ten cycles."""
     counted = Counted(cycle_ms * 1_000_000)
     senders = Senders([Stream(counted, silent_s=1.0)], 1700.0)
     for k in range(1, round(seconds / STEP_S) + 1):
         share = k * STEP_S / (10 * cycle_ms * 1e-3)
         counted.heard, counted.lost = int(heard * share), int(lost * share)
-        if senders.update(0, STEP_S):
+        if senders.update(0, STEP_S) & what:
             return k * STEP_S
     return None
 
@@ -33,6 +39,34 @@ def first_found(heard: int, lost: int, cycle_ms: int = 10, seconds: float = 5.0)
 def test_message_at_its_cycle_is_left_alone_lost_frames_or_not() -> None:
     for heard in (10, 7, 5):
         assert first_found(heard, 10 - heard) is None
+
+
+@pytest.mark.parametrize(
+    ("share", "cycle_ms", "within_s"),
+    [(0.05, 10, 1.6), (0.02, 10, 6.0), (0.05, 100, 16.0), (0.009, 10, None), (0.0, 10, None)],
+)
+def test_more_than_one_frame_of_a_hundred_lost_is_found(
+    share: float, cycle_ms: int, within_s: float | None
+) -> None:
+    found_s = first_found(
+        10 * (1 - share), 10 * share, cycle_ms, seconds=60.0, what=Finding.FRAMES_LOST
+    )
+    assert (found_s is None) is (within_s is None)
+    assert found_s is None or within_s is None or 0.6 * within_s <= found_s <= within_s
+
+
+def test_frames_lost_once_are_left_alone_and_a_loss_that_ended_is_forgotten() -> None:
+    counted = Counted()
+    senders = Senders([Stream(counted)], 1700.0)
+    found = []
+    for k in range(1, 400):
+        counted.heard = 10 * k
+        # five at once, and later 50 % for a while
+        counted.lost = 0 if k < 10 else 5 if k < 100 else 5 + 5 * min(k - 100, 50)
+        found.append(bool(senders.update(0, STEP_S) & Finding.FRAMES_LOST))
+    assert not any(found[:100])
+    assert all(found[103:150])
+    assert not any(found[260:])
 
 
 @pytest.mark.parametrize(("cycle_ms", "within_s"), [(10, 0.31), (20, 0.41), (100, 1.7)])

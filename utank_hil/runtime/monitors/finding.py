@@ -29,3 +29,4 @@ class Finding(IntFlag):
     SENSORS_DISAGREE = auto()
     SENSORS_UNCLEAR = auto()
     DAMAGED = auto()
+    FRAMES_LOST = auto()
