@@ -147,8 +147,11 @@ class PumpDrive:
         return 0.0 if toward_zero else abs(pressure_pa - setpoint_pa)
 
     def _reach_pa(self, now_ns: int) -> float:
-        """Farthest step that the time since the last command and the grace that is left allow."""
-        since_s = (now_ns - self._accepted_ns) * NANOSECONDS
+        """Farthest step that the time since the last command and the grace that is left allow.
+
+        No longer than that command was good for: a silence before it was enabled makes no room.
+        """
+        since_s = min(now_ns - self._accepted_ns, self._timeout_ns) * NANOSECONDS
         return self._limits.pressure_rate_pa_s * since_s + self._credit_pa
 
     def tick(self, now_ns: int) -> Iterable[Frame]:

@@ -16,6 +16,7 @@ from utank_hil.canbus import (
     ControlWord,
     DriveFault,
     DriveState,
+    DriveStatus2,
     Frame,
     Heartbeat,
     NodeState,
@@ -224,6 +225,86 @@ def test_set_point_never_moves_faster_than_the_rate_and_a_tick_in_all(
             assert abs(end_pa - begin_pa) <= free_pa + allowed_pa + 1e-6
             if begin_pa * end_pa >= 0:
                 assert abs(end_pa) - abs(begin_pa) <= allowed_pa + 1e-6
+
+
+@pytest.mark.parametrize("silent_s", [0.2, 10.0])
+def test_a_silence_before_it_was_enabled_gives_no_room_for_a_step(silent_s: float) -> None:
+    bench = DriveBench(start_ns=START_NS)
+    bench.ticks(2)
+    for word in ENABLE[:2]:
+        bench.command(0.0, word)
+        bench.ticks(2)
+    bench.ticks(round(silent_s / 0.01))  # only an enabled drive minds
+    bench.command(25e3, ENABLE[2])
+    bench.tick()
+    assert bench.drive.refused == 1
+    assert bench.drive.setpoint_pa == 0.0
+
+
+def test_the_pressure_limit_holds_for_a_step_that_the_rate_allows() -> None:
+    limit_pa = DriveLimits().pressure_pa
+    for sign in (1, -1):
+        bench = armed(sign * limit_pa)
+        bench.command(sign * (limit_pa + 8.0))
+        assert bench.drive.refused == 1
+        assert bench.drive.setpoint_pa == sign * limit_pa
+
+
+@pytest.mark.parametrize("end", ["silence", "quick stop", "disable voltage", "fault"])
+def test_whatever_ends_it_no_set_point_is_left(end: str) -> None:
+    bench = armed(20e3)
+    assert bench.drive.setpoint_pa == 20e3
+    assert bench.drive.enabled
+    if end == "silence":
+        bench.ticks(6)
+    elif end == "fault":
+        bench.drive.fail(DriveFault.OVERCURRENT)
+    else:
+        bench.command(20e3, ControlWord[end.upper().replace(" ", "_")])
+    bench.tick()
+    assert bench.drive.setpoint_pa == 0.0
+    assert not bench.drive.enabled
+
+
+@pytest.mark.parametrize("wrong", ["refused", "out of sequence"])
+def test_only_a_good_command_enables(wrong: str) -> None:
+    bench = DriveBench()
+    bench.ticks(2)
+    for word in ENABLE[:2]:
+        bench.command(0.0, word)
+        bench.ticks(2)
+    if wrong == "out of sequence":
+        for _ in range(4):
+            bench.commands.frame(PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05))
+    bench.command(math.nan if wrong == "refused" else 0.0, ENABLE[2])
+    bench.ticks(2)
+    assert bench.told.state is DriveState.SWITCHED_ON
+
+
+def test_a_drive_that_is_switched_off_by_itself_is_in_no_fault() -> None:
+    bench = armed()
+    bench.drive.fail(DriveFault.NONE)
+    bench.command(20e3)
+    bench.ticks(20)
+    assert bench.told.state is DriveState.SWITCH_ON_DISABLED
+    assert bench.status_2 is not None
+    assert bench.status_2.fault is DriveFault.NONE
+
+
+def test_status_2_comes_every_100_ms_and_warns_of_refused_commands_only() -> None:
+    bench = armed()
+    sent = []
+    for _ in range(30):
+        bench.command(60e3 if len(sent) == 1 else 20e3)
+        bench.tick()
+        sent += [f for f in bench.frames if f.can_id == CATALOGUE.codec(DriveStatus2).can_id]
+    assert len(sent) == 3
+    warned = [CATALOGUE.codec(DriveStatus2).decode(frame.data) for frame in sent]
+    assert [each.command_warning for each in warned if each is not None] == [False, True, False]
+    for each in warned:
+        assert each is not None
+        warnings = each.temperature_warning, each.voltage_warning, each.sensor_warning
+        assert not any(warnings)
 
 
 def test_many_frames_in_a_moment_have_one_tick_of_grace_together() -> None:
