@@ -72,6 +72,37 @@ def test_stop_counts_from_any_station(taken: bool) -> None:
         assert bench.node.mode is Mode.STANDBY
 
 
+def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_arming() -> None:
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(stop=True)
+    bench.run(290)  # the next frame of the second station comes 110 ms after the edge
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    for _ in range(100):
+        bench.tick()
+        assert not bench.node.supervisor.arming
+        assert bench.node.mode is Mode.STANDBY
+    bench.second_is(stop=False)
+    bench.order_is(arm=False)
+    bench.run(300)
+    bench.order_is(arm=True)
+    bench.run(300)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_a_station_that_went_silent_with_its_stop_held_stops_nobody_for_ever() -> None:
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(400)
+    bench.second_is(stop=True)
+    bench.second = None
+    bench.run(1500)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(300)
+    assert bench.node.mode is Mode.ACTIVE
+
+
 def test_command_is_taken_without_a_bump_and_given_back() -> None:
     bench = active_bench()
     bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True)

@@ -7,6 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.runtime import judging
 from utank_hil.runtime.faults import FAULTS, Condition, Reaction
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.observations import MILLISECOND_NS, Observations
@@ -439,6 +440,17 @@ def test_whatever_ends_active_is_latched_during_the_ramp_after_disarming(
     assert supervisor.demand is (Demand.RAMP if reaction is Reaction.RAMP else Demand.ZERO)
 
 
+@pytest.mark.parametrize("disarmed", [False, True])
+def test_a_stop_in_the_tick_of_a_fault_that_ramps_is_not_lost(disarmed: bool) -> None:
+    bench = disarmed_bench() if disarmed else armed_bench()
+    before = RAMPING if disarmed else ACTIVE
+    bench.tick(**before)
+    supervisor = bench.tick(**{**before, "motion_age_ms": 50, "stop": True})
+    assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, Fault.MOTION_SILENT)
+    assert supervisor.demand is Demand.ZERO
+    assert not supervisor.drive_wanted
+
+
 def test_drive_that_drops_out_during_the_ramp_after_disarming_is_found() -> None:
     bench = disarmed_bench()
     for _ in range(5):
@@ -673,10 +685,14 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[Observat
 
 DEGRADING = ("DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "SENSORS_DISAGREE")
 
+WARNING = ("FRAMES_LOST",)
+
 
 @pytest.mark.parametrize("finding", list(Finding), ids=lambda finding: str(finding.name))
 def test_each_finding_of_the_monitors_does_something(finding: Finding) -> None:
     bench = armed_bench()
     supervisor = bench.tick(**ACTIVE, found=int(finding))
     assert supervisor.degraded is (finding.name in DEGRADING)
-    assert (supervisor.mode is Mode.FAULT) is (finding.name not in DEGRADING)
+    assert (supervisor.mode is Mode.FAULT) is (finding.name not in (*DEGRADING, *WARNING))
+    warned = judging.all_warning(replace(HEALTHY, found=int(finding)), SafetyLimits())
+    assert bool(warned) is (finding.name in WARNING)

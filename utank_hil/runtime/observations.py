@@ -191,7 +191,7 @@ class Observer:
         seen.tick_late_ms = late_ns / MILLISECOND_NS
         seen.overruns_in_ten = self._late_history.bit_count()
         # first of all: who is in command may change
-        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = stations.take()
+        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = stations.take(now_ns)
         seen.requested_mode = stations.requested_mode
         motions = inbox.motions
         if motions is not None:

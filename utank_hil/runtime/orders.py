@@ -105,6 +105,11 @@ class Orders:
         asked = order.mode_request
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
+    def holds_stop(self, now_ns: int) -> bool:
+        """Whether the stop bit is set in the last accepted frame, and that is not long ago."""
+        last = self.last
+        return last is not None and last.stop and now_ns - self.heard_ns <= self._gap_ns
+
     def take(self) -> Wishes:
         """Return what was ordered since the last call."""
         last = self.last

@@ -50,11 +50,11 @@ class Stations:
         """When the last accepted frame of the station in command came."""
         return self._leads.heard_ns
 
-    def take(self) -> Wishes:
+    def take(self, now_ns: int) -> Wishes:
         """Return what was ordered since the last call; a stop of any station counts."""
         wishes = self._leads.take()
         if not self._watches.news:
-            return wishes
+            return wishes._replace(stop=True) if self._watches.holds_stop(now_ns) else wishes
         takes_command = self._watches.takes_command
         other = self._watches.take()
         stop = wishes.stop or other.stop

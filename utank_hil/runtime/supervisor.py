@@ -194,7 +194,7 @@ class Supervisor:
         self.mode = Mode.FAULT
         self.fault = fault
         self._arming_since_ns = None
-        stop = condition.reaction is Reaction.STOP
+        stop = condition.reaction is Reaction.STOP or seen.stop
         self.demand = Demand.ZERO if stop else Demand.RAMP
         self.drive_wanted = not stop
         self._ramp(seen, now_ns)
