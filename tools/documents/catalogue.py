@@ -96,10 +96,8 @@ def cycle(message: Message) -> str:
 
 def load_rows(messages: list[Message]) -> str:
     """Worst case of the bus load, for the nodes that most ships have and for all there may be."""
-    sent = [message for message in messages if "Reserved" not in str(message.comment)]
-    valve = [
-        m for m in sent if m.senders[0] in ("CONTROLLER", "DRIVE", "SENSORS", "OPERATOR", "VALVE")
-    ]
+    nodes_of_most = ("CONTROLLER", "DRIVE", "SENSORS", "OPERATOR", "VALVE")
+    valve = [message for message in messages if message.senders[0] in nodes_of_most]
     pump = [message for message in valve if "VALVE" not in message.name]
     rows = []
     for nodes, listed in (

@@ -11,7 +11,8 @@ from utank_hil.tick import TICK_NS, TICK_S
 
 MILLISECOND_NS: Final = 1_000_000
 LOAD_WINDOW_NS: Final = 100 * TICK_NS
-# an eight-byte frame with a 29-bit identifier has 131 bits and 3 of pause; random data add about 9
+# an eight-byte frame with a 29-bit identifier has 131 bits with its pause; stuffing adds 10 to the
+# frames of this bus in the mean and 29 at most
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
 HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
