@@ -19,6 +19,7 @@ from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import SocketCanPort
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.provenance import describe
 from utank_hil.retuning import (
     Retuner,
     RetuningEvent,
@@ -38,6 +39,7 @@ from utank_hil.runtime import (
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RingWriter
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
@@ -268,8 +270,8 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
     _load_kernel(job)
     ship, truth, truth_log = _ship(job)
     statistics = LoopStatistics()
-    with retuner_process(job.controller) as desks:
-        controller, log = _controller(job, *desks, statistics)
+    with retuner_process(job.controller) as desks, _ring(job) as ring:
+        controller, log = _controller(job, *desks, statistics, ring)
         loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
     rows = _side_by_side(log.rows, truth_log.rows)
     return Run(
@@ -296,8 +298,8 @@ def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
-    with retuner_process(job.controller) as desks:
-        controller, log = _controller(job, *desks, statistics)
+    with retuner_process(job.controller) as desks, _ring(job) as ring:
+        controller, log = _controller(job, *desks, statistics, ring)
         loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(
         log.rows,
@@ -373,19 +375,32 @@ def _controller(
     retuner: Retuner | None,
     estimating: Retuner | None,
     statistics: LoopStatistics | None = None,
+    ring: RingWriter | None = None,
 ) -> tuple[ControllerNode, MemoryLog]:
     log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+
+    def shown(row: FloatArray) -> None:
+        log.write(row)
+        if ring is not None:
+            ring.write(row)
+
     node = build_controller_node(
         job.controller,
         job.law,
         retuner=retuner,
         estimating=estimating,
         statistics=statistics,
-        sink=log.write,
+        sink=shown,
         sink_every=RECORD_TICKS,
         commissioned=True,
     )
     return node, log
+
+
+def _ring(job: Job) -> RingWriter:
+    """The ring of a run in real time, for `utank-hil monitor`."""
+    about = describe("bench", job.controller, Path.cwd(), options={"run": job.name}, seed=job.seed)
+    return RingWriter(SIGNALS, about=about)
 
 
 @contextmanager

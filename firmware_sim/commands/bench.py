@@ -26,6 +26,7 @@ from utank_hil.commands.common import (
 )
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
+from utank_hil.commands.monitor import watch
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.provenance import describe
@@ -151,7 +152,7 @@ def bench(
     if failures:
         fail("; ".join(failures))
     if view:
-        show(files["recording"])
+        watch(files["recording"])
     raise typer.Exit(exit_code(result))
 
 
@@ -170,16 +171,3 @@ def _about(
         return describe("bench", ran, out, options=given, seed=ran.seed)
     except OSError as error:
         fail(error)
-
-
-def show(source: Path | str) -> None:
-    """Open the viewer and wait until it is closed, or Ctrl-C."""
-    from utank_hil.telemetry import open_viewer
-
-    with open_viewer(source) as viewer:
-        if viewer.url is not None:
-            notes.print(f"Open {viewer.url} in a browser; Ctrl-C ends the viewer.", soft_wrap=True)
-        try:
-            viewer.wait()
-        except KeyboardInterrupt:
-            notes.print("viewer closed")

@@ -99,7 +99,7 @@ def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -
     file = tmp_path / "run-a.rrd"
     with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
         data = feed(frames, range(20))
-        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--given"]
+        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--head"]
         process = subprocess.Popen(
             [sys.executable, "-c", NO_RERUN, *words],
             stdin=subprocess.PIPE,
@@ -108,7 +108,7 @@ def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -
         )
         assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write('{"about": null, "head": {"about": {"x": 1}}}')
+        process.stdin.write('{"about": {"x": 1}}')
         process.stdin.close()
         assert process.stdout.readline() == '{"ready": 1}\n'
     with process.stdout as output:

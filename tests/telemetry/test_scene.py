@@ -5,15 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import write_recording
 from utank_hil.telemetry.highlight import highlight_s
 from utank_hil.telemetry.recording import _read_chunks
-from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size, turned
+from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size
 
 SIZE = SceneSize(width_m=17.0, height_m=5.0, lz_m=2.0, level_limit_m=4.0, pressure_pa=5e4)
 VESSEL = {
@@ -21,20 +19,6 @@ VESSEL = {
     "pump": {"max_pressure_pa": 5e4},
 }
 ABOUT = {"configuration": {"vessel": VESSEL}}
-
-
-@given(
-    roll=st.floats(-1.5, 1.5), y=st.floats(-10, 10), z=st.floats(-10, 10), extra=st.integers(1, 3)
-)
-def test_positive_roll_puts_starboard_down(roll: float, y: float, z: float, extra: int) -> None:
-    points = np.broadcast_to([[y, z]], (2, *(extra,) * (extra - 1), 1, 2))
-    found = turned(points, np.array([0.0, roll]))
-    np.testing.assert_allclose(found[0].reshape(-1, 2)[0], [y, z])
-    expected = [
-        y * math.cos(roll) - z * math.sin(roll),
-        y * math.sin(roll) + z * math.cos(roll),  # z is downwards
-    ]
-    np.testing.assert_allclose(found[1].reshape(-1, 2), [expected] * (found[1].size // 2))
 
 
 def test_water_stands_at_its_levels_in_the_reservoirs() -> None:
@@ -52,8 +36,9 @@ def test_water_stands_at_its_levels_in_the_reservoirs() -> None:
 
 def test_the_picture_holds_hull_and_limits_at_large_rolls() -> None:
     low, high = SIZE.height_range_m
+    cosine, sine = math.cos(0.15), math.sin(0.15)
     for points in (SIZE.hull(), SIZE.limits().reshape(-1, 2)):
-        at = turned(points[None], np.array([0.15]))[0]
+        at = points @ np.array([[cosine, sine], [-sine, cosine]])
         assert np.abs(at[:, 0]).max() < 1.15 * SIZE.reach_m
         assert low < at[:, 1].min() < at[:, 1].max() < high
 
@@ -84,14 +69,19 @@ def test_a_recording_has_pictures_in_time_and_words_on_a_change(tmp_path: Path) 
     file = tmp_path / "a.rrd"
     write_recording(file, SIGNALS, {"run": rows}, about=ABOUT)
     drawn = {
-        chunk.entity_path: chunk.num_rows
-        for chunk in _read_chunks(file, "LineStrips2D:strips")
+        chunk.entity_path.removeprefix("/1/run/scene/"): chunk.to_record_batch()
+        for component in ("Transform3D:rotation_axis_angle", "LineStrips2D:strips")
+        for chunk in _read_chunks(file, component)
         if not chunk.is_static
     }
-    assert set(drawn) == {
-        f"/1/run/scene/{name}" for name in ("hull", "twin", "duct", "water", "limits")
-    }
-    assert set(drawn.values()) == {round(20.0 / PERIOD_S)}
+    assert set(drawn) == {"ship", "twin", "ship/water"}
+    assert {batch.num_rows for batch in drawn.values()} == {round(20.0 / PERIOD_S)}
+    for name, signal in (("ship", "roll_rad"), ("twin", "twin_roll_rad")):
+        turns = drawn[name].column("Transform3D:rotation_axis_angle").flatten()
+        # about the axis into the picture: to the right and downwards, as positive roll is
+        assert turns.field("axis").to_pylist() == [[0.0, 0.0, 1.0]] * len(turns)
+        expected = rows[:: round(PERIOD_S / 0.05), SIGNALS.index(signal)]
+        np.testing.assert_allclose(turns.field("angle").to_numpy(), expected, atol=1e-7)
     words = [
         (time, text)
         for chunk in _read_chunks(file, "TextDocument:text")

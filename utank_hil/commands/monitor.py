@@ -1,54 +1,137 @@
 """``utank-hil monitor``: look at a recording, or at a controller that runs."""
 
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from utank_hil.commands.common import fail, notes
 
+if TYPE_CHECKING:
+    from utank_hil.telemetry import Viewer
+    from utank_hil.telemetry.live import LiveRun
+
 LIVE: Final = "rerun+http://"
 """How the address of a live stream begins."""
+_LOOK_S: Final = 0.25
+_NICENESS: Final = 5
 
 
 def monitor(
     source: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            help="A recording (.rrd), a bench's folder, or the address that `run --view` prints."
+            help="A recording (.rrd), a bench's folder, the process number of a run, or the "
+            "address of a stream.",
+            show_default="the controller or bench in real time that runs on this machine",
         ),
-    ],
+    ] = None,
 ) -> None:
     """Show ship, tank and alarms in the viewer: the first tab for the watch, others for engineers.
 
-    A recording opens where something happens: at the first fault, else where a new law was tried,
-    else at the largest roll. Without a display the viewer is served on loopback for a browser; from
-    another machine: ssh -L PORT:127.0.0.1:PORT SHIP, for both ports of the address.
+    Without a source it attaches to what runs on this machine, which does not notice. A recording
+    opens where something happens: at the first fault, else where a new law was tried, else at the
+    largest roll. Without a display the viewer is served on loopback for a browser; how to reach it
+    from another machine by ssh is printed.
 
-    **Example:** utank-hil monitor out/bench.rrd
+    **Example:** utank-hil monitor out
     """
+    if source is None or source.isdecimal():
+        _attach(None if source is None else int(source))
+    elif source.startswith(LIVE):
+        watch(source)
+    else:
+        _open(Path(source))
+
+
+def watch(
+    source: Path | str, at_s: float | None = None, send: Callable[[], bool] | None = None
+) -> None:
+    """Show a recording or a stream until the viewer is closed or Ctrl-C.
+
+    Parameters
+    ----------
+    source, at_s
+        As `open_viewer` takes them.
+    send : callable, optional
+        Sends what there is to see since the last call, and returns whether more may come.
+    """
+    from utank_hil.runtime import stop_on_signals
     from utank_hil.telemetry import open_viewer
+
+    with stop_on_signals() as stopped, ExitStack() as stack:
+        viewer = _said(stack.enter_context(open_viewer(source, at_s)))
+        while not stopped():
+            if send is not None and not send():
+                send = None
+                notes.print("the run has ended; the viewer keeps what it has got")
+            if not viewer.wait(_LOOK_S) or stopped():
+                continue
+            if not viewer.failed:
+                return
+            if viewer.url is not None:
+                fail("the viewer failed; what it says is above")
+            notes.print(
+                "[yellow]no window:[/yellow] the reason is above; a graphics driver for any "
+                "machine: apt-get install mesa-vulkan-drivers",
+                soft_wrap=True,
+            )
+            viewer = _said(stack.enter_context(open_viewer(source, at_s, window=False)))
+    notes.print("viewer closed")
+
+
+def _said(viewer: "Viewer") -> "Viewer":
+    """A viewer, after it was said where a browser finds it."""
+    if viewer.url is not None:
+        tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
+        notes.print(
+            f"Open {viewer.url} in a browser; Ctrl-C ends the viewer.\n"
+            f"From another machine first: ssh {tunnel} THIS_MACHINE",
+            soft_wrap=True,
+        )
+    return viewer
+
+
+def _open(file: Path) -> None:
+    """Show a recording, or that of a bench's folder."""
     from utank_hil.telemetry.highlight import highlight_s
 
-    at_s = None
-    shown: Path | str = source
-    if not source.startswith(LIVE):
-        file = Path(source)
-        shown = file = file / "bench.rrd" if file.is_dir() else file
-        if not file.is_file():
-            fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
-        try:
-            at_s = highlight_s(file)
-        except ValueError as error:
-            fail(error)
+    file = file / "bench.rrd" if file.is_dir() else file
+    if not file.is_file():
+        fail(f"{file}: is not there; give a recording, a bench's folder, or {LIVE}...")
     try:
-        viewer = open_viewer(shown, at_s)
+        at_s = highlight_s(file)
+    except ValueError as error:
+        fail(error)
+    watch(file, at_s)
+
+
+def _attach(pid: int | None) -> None:
+    """Show a run of this machine."""
+    from utank_hil.telemetry.live import LiveStream, live_runs
+
+    os.nice(_NICENESS)  # a loop may run here
+    try:
+        with LiveStream(_chosen(live_runs(), pid)) as stream:
+            watch(stream.url, send=stream.send)
     except OSError as error:
         fail(error)
-    with viewer:
-        if viewer.url is not None:
-            notes.print(f"Open {viewer.url} in a browser; Ctrl-C ends the viewer.", soft_wrap=True)
-        try:
-            viewer.wait()
-        except KeyboardInterrupt:
-            notes.print("viewer closed")
+
+
+def _chosen(runs: "list[LiveRun]", pid: int | None) -> "LiveRun":
+    """The run with a process number, or the only one."""
+    found = [run for run in runs if pid in (None, run.pid)]
+    if not found and pid is None:
+        fail(
+            "nothing runs here that this user may see. Start a controller: utank-hil run "
+            "CONFIG.yaml --bus can0; or a bench: utank-hil bench --realtime; or name a recording"
+        )
+    if not found:
+        fail(f"{pid}: is no controller or bench that runs here and that this user may see")
+    if len(found) > 1:
+        lines = "".join(f"\n  utank-hil monitor {run}" for run in found)
+        fail(f"several run here; choose one by its number:{lines}")
+    return found[0]

@@ -18,7 +18,7 @@ from utank_hil.telemetry.recorder import NEEDS_RERUN
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
-"""A recording goes on in another file after so long: 50 MB."""
+"""A recording goes on in another file after so long: 60 MB."""
 RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
 
 
@@ -53,13 +53,13 @@ class RecordingSummary:
 class RunRecording:
     """Ring and recorder of a run; the constructor returns when the recorder is ready, or failed.
 
+    Viewers read the ring, too (`utank_hil.telemetry.live`).
+
     Parameters
     ----------
-    folder : Path
+    folder : Path or None
         Made if it is not there. The file is named by the time, so that none is overwritten: the
-        recording of a run that crashed shows why.
-    live : bool
-        Serve viewers too.
+        recording of a run that crashed shows why. None for a ring without a recorder.
     events : str, optional
         Name of the run's ring of events, to be recorded beside the rows.
     about : mapping, optional
@@ -77,8 +77,7 @@ class RunRecording:
 
     def __init__(
         self,
-        folder: Path,
-        live: bool = False,
+        folder: Path | None,
         events: str | None = None,
         about: Mapping[str, Any] | None = None,
         head: Mapping[str, Any] | None = None,
@@ -88,6 +87,13 @@ class RunRecording:
         self._ring: RingWriter | None = None
         self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
+        try:
+            self._ring = RingWriter(SIGNALS, capacity=RING_ROWS, about=about)
+        except OSError as error:
+            self.summary.error = str(error)
+            return
+        if folder is None:
+            return
         reason = why_not_writable(folder)
         if reason is not None:
             self.summary.error = reason
@@ -98,15 +104,12 @@ class RunRecording:
             self.summary.error = str(error)
             return
         try:
-            self._ring = RingWriter(SIGNALS, capacity=RING_ROWS)
             if head is not None:
                 self._records = RingWriter(ROW, capacity=RING_ROWS)
             self._recorder = RecorderProcess(
                 self._ring.name,
                 files[0],
-                live=live,
                 events=events,
-                about=about,
                 rotation=Rotation(PART_S, keep_bytes),
                 frames=None if self._records is None else self._records.name,
                 head=head,
@@ -121,11 +124,6 @@ class RunRecording:
             self.summary.error = f"{NEEDS_RERUN}; there is the frame log alone"
         names = [str(file) if file.exists() else None for file in files]
         self.summary.file, self.summary.frames = (*names, None)[:2]
-
-    @property
-    def url(self) -> str | None:
-        """Where viewers find the live stream, if there is one."""
-        return None if self._recorder is None else self._recorder.url
 
     def write(self, row: FloatArray) -> None:
         """Take one row of telemetry; never waits, and does nothing without a recorder."""

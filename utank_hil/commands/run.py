@@ -1,11 +1,13 @@
 """``utank-hil run``: the deployed controller alone."""
 
 import json
+import os
+import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 from rich.console import Console
@@ -18,7 +20,6 @@ from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.common import (
-    OUT,
     Duration,
     Json,
     View,
@@ -37,6 +38,7 @@ from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.provenance import describe
 from utank_hil.runtime import (
     LoopStatistics,
     Node,
@@ -47,10 +49,12 @@ from utank_hil.runtime import (
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
-from utank_hil.telemetry import event_text, open_viewer
+from utank_hil.telemetry import event_text
 from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
+
+_COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 
 def run(
@@ -115,41 +119,41 @@ def run(
             fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
-        folder = OUT if out is None and view else out
         retunes, estimates = (work is not None for work in works_of(loaded))
         announcer = None
-        if retunes or estimates or folder is not None:
-            announcer = _announcer(config, loaded, folder)
+        if retunes or estimates or out is not None:
+            announcer = _announcer(config, loaded, out)
             stack.callback(announcer.stop)
             if announcer.error is not None:
                 notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
-        recording = None
-        if folder is not None:
+        head = None
+        if out is not None:
             head = replay_head(
                 "run",
                 loaded,
                 law,
-                folder,
+                out,
                 options=context.params,
                 retuner=retunes,
                 estimating=estimates,
                 commissioned=not refused,
             )
-            recording = RunRecording(
-                folder,
-                live=view,
-                events=None if announcer is None else announcer.ring,
-                about=head["about"],
-                head=head,
-                keep_bytes=None if keep is None else round(keep * 1e6),
+        recording = RunRecording(
+            out,
+            events=None if announcer is None else announcer.ring,
+            about=describe("run", loaded, Path.cwd(), options=context.params)
+            if head is None
+            else head["about"],
+            head=head,
+            keep_bytes=None if keep is None else round(keep * 1e6),
+        )
+        stack.callback(recording.stop)
+        if recording.summary.error is not None:
+            notes.print(
+                f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True
             )
-            stack.callback(recording.stop)
-            if recording.summary.error is not None:
-                notes.print(
-                    f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True
-                )
-            elif recording.url is not None:
-                _show(recording.url, stack)
+        if view:
+            _show(stack)
         retuner, estimating = stack.enter_context(retuner_process(loaded))
         if any(desk is not None and not desk.alive for desk in (retuner, estimating)):
             notes.print(
@@ -167,21 +171,20 @@ def run(
             if announcer is not None:
                 announcer.write(event, start_ns)
 
-        records = recording is not None and recording.keeps_records
-        desks = Tapped(retuner, estimating, wanted=records)
+        desks = Tapped(retuner, estimating, wanted=recording.keeps_records)
         node = build_controller_node(
             loaded,
             law,
             retuner=desks.retuner,
             estimating=desks.estimating,
             statistics=statistics,
-            sink=None if recording is None else recording.write,
+            sink=recording.write,
             event_sink=told,
             commissioned=not refused,
         )
 
         on_bus: Node = node
-        if recording is not None and records:
+        if recording.keeps_records:
             on_bus = NodeTap(node, recording.write_records, desks.taps)
 
         def ended() -> bool:
@@ -212,11 +215,11 @@ def run(
             "fallbacks": node.fallbacks,
             "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
             "loop": statistics.summary(),
-            "recording": None if recording is None else asdict(recording.summary),
+            "recording": None if out is None else asdict(recording.summary),
         }
         sys.stdout.write(json.dumps(summary) + "\n")
     else:
-        _print_summary(loaded.name, node, statistics, recording)
+        _print_summary(loaded.name, node, statistics, None if out is None else recording.summary)
     raise typer.Exit(code)
 
 
@@ -231,7 +234,7 @@ def _print_summary(
     name: str,
     node: ControllerNode,
     statistics: LoopStatistics,
-    recording: RunRecording | None,
+    recording: RecordingSummary | None,
 ) -> None:
     """What became of a run, for people."""
     console = Console(highlight=False)
@@ -247,9 +250,9 @@ def _print_summary(
     if node.fallbacks:
         console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:
-        _tell(console, recording.summary)
-        if recording.summary.file is not None and recording.summary.error is None:
-            lead_on(console, f"report {shown(Path(recording.summary.file))}")
+        _tell(console, recording)
+        if recording.file is not None and recording.error is None:
+            lead_on(console, f"report {shown(Path(recording.file))}")
 
 
 def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
@@ -265,15 +268,15 @@ def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> A
     return Announcer(IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config)), log)
 
 
-def _show(url: str, stack: ExitStack) -> None:
-    """Open a viewer until the run ends; the run goes on without one."""
+def _show(stack: ExitStack) -> None:
+    """Have a process of its own show this one until the run ends; the run goes on without it."""
+    command = [sys.executable, "-c", _COMMAND_LINE, "monitor", str(os.getpid())]
     try:
-        viewer = stack.enter_context(open_viewer(url))
+        process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.DEVNULL))
     except OSError as error:
         notes.print(f"[red]no viewer:[/red] {escape(str(error))}", soft_wrap=True)
         return
-    if viewer.url is not None:
-        notes.print(f"Open {viewer.url} in a browser.", soft_wrap=True)
+    stack.callback(process.terminate)
 
 
 def _tell(console: Console, recording: RecordingSummary) -> None:

@@ -141,6 +141,11 @@ class EventReader(Closing):
         self._ring.close()
 
 
+def is_event_ring(ring: RingReader) -> bool:
+    """Whether a ring is one of events."""
+    return ring.columns == _WORDS
+
+
 def event_text(event: Event) -> str:
     """Text of an event, such as `retuning REFUSED: the record is too short`."""
     if isinstance(event, AlarmEvent):

@@ -11,21 +11,26 @@ from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
 from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.event_ring import Event
-from utank_hil.telemetry.rerun_log import APPLICATION, RunLog, run_paths, time_index, write_about
+from utank_hil.telemetry.rerun_log import (
+    APPLICATION,
+    LIVE_RUN,
+    RunLog,
+    run_paths,
+    time_index,
+    write_about,
+)
 from utank_hil.telemetry.rotation import Rotation, bytes_of, part_of, remove_oldest
 from utank_hil.telemetry.scene import scene_size
-from utank_hil.telemetry.viewer import LOOPBACK
 
-LIVE_RUN: Final = "live"
-_LIVE_MEMORY: Final = "64MiB"  # history for a viewer that connects late; bounds the memory
 _FLUSH_TIMEOUT_S: Final = 5.0
+_SCENE_BATCH_S: Final = 60.0  # what a kill may lose of the pictures; the rows are there
 _GROWTH: Final = 1.05
 _RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
 _FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
 
 
 class RecordingParts(Closing):
-    """Writes a recording into one file after another, and to live viewers; each file is complete.
+    """Writes a recording into one file after another; each is complete.
 
     Parameters
     ----------
@@ -35,8 +40,6 @@ class RecordingParts(Closing):
         Names of a row's values.
     rotation : Rotation, optional
         Without it there is one file.
-    live_port : int, optional
-        Serve viewers on this loopback port as well.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`).
 
@@ -58,7 +61,6 @@ class RecordingParts(Closing):
         file: Path,
         columns: Sequence[str],
         rotation: Rotation | None = None,
-        live_port: int | None = None,
         about: Mapping[str, Any] | None = None,
     ) -> None:
         self._first = file
@@ -71,11 +73,6 @@ class RecordingParts(Closing):
         self._file = file
         self._recording: rr.RecordingStream | None = None
         self._begin(0)
-        self._live: rr.RecordingStream | None = None
-        self._live_log: RunLog | None = None
-        if live_port is not None:
-            sink = rr.GrpcServerSink(LOOPBACK, live_port, server_memory_limit=_LIVE_MEMORY)
-            self._live, self._live_log = self._open(sink, file.stem)
 
     def write(self, rows: FloatArray) -> None:
         """Append rows, shape (n, width), n above zero; begins the next file where it is time."""
@@ -87,36 +84,26 @@ class RecordingParts(Closing):
             self._begin(bytes_of(self._file))
             self._begin_s = begin_s
         self._rows += len(rows)
-        for log in self._logs():
-            log.write(rows)
+        self._log.write(rows)
 
     def write_events(self, events: Sequence[Event]) -> None:
         """Log events of retuning and alarms."""
-        for log in self._logs():
-            log.write_events(events)
+        self._log.write_events(events)
 
     def note(self, text: str) -> None:
         """Log a warning about the recording itself."""
-        for log in self._logs():
-            log.note(text)
+        self._log.note(text)
 
     def flush(self) -> None:
         """Bring it to the disk, so that a kill does not lose it."""
-        for recording in (self._recording, self._live):
-            if recording is not None:
-                # without a timeout it would wait forever on a full disk
-                recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+        if self._recording is not None:
+            # without a timeout it would wait forever on a full disk
+            self._recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
 
     def close(self) -> None:
         """Finish the last file; idempotent."""
-        if self._live is not None:
-            self._live.disconnect()
-            self._live = self._live_log = None
         if self._recording is not None:
             self._end()
-
-    def _logs(self) -> list[RunLog]:
-        return [self._log, *([] if self._live_log is None else [self._live_log])]
 
     def _begin(self, expected_bytes: int) -> None:
         """Begin the next file, which may grow as large as expected."""
@@ -127,26 +114,22 @@ class RecordingParts(Closing):
             remove_oldest(self._file, self._rotation.keep_bytes - room_bytes)
         _reserve_file(self._file)
         self._rows = 0
-        self._recording, self._log = self._open(rr.FileSink(self._file), self._file.stem)
-
-    def _open(
-        self, sink: rr.FileSink | rr.GrpcServerSink, name: str
-    ) -> tuple[rr.RecordingStream, RunLog]:
-        recording = rr.RecordingStream(APPLICATION, recording_id=name)
+        self._recording = recording = rr.RecordingStream(APPLICATION, recording_id=self._file.stem)
+        size = scene_size(self._columns, self._about)
         recording.set_sinks(
-            sink,
-            default_blueprint=make_blueprint(
-                self._columns, [LIVE_RUN], size=scene_size(self._columns, self._about)
-            ),
+            rr.FileSink(self._file),
+            default_blueprint=make_blueprint(self._columns, [LIVE_RUN], size=size),
         )
         if self._about is not None:
             write_about(recording, self._about)
-        return recording, RunLog(recording, run_paths([LIVE_RUN])[0], self._columns, self._about)
+        path = run_paths([LIVE_RUN])[0]
+        self._log = RunLog(recording, path, self._columns, self._about, _SCENE_BATCH_S)
 
     def _end(self) -> None:
         """Finish a file."""
         recording, self._recording = self._recording, None
         assert recording is not None
+        self._log.close()
         recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
         recording.disconnect()  # writes the footer; reports no error
         if not _is_finished(self._file):

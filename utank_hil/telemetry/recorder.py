@@ -1,4 +1,4 @@
-"""The recorder: a process that writes rows and events to a Rerun file and to live viewers.
+"""The recorder: a process that writes rows and events to a Rerun file.
 
 Beside it, it writes the frame log: what the controller was handed and what it answered. Where Rerun
 is not installed, that is all it writes.
@@ -32,7 +32,7 @@ from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLogWriter
 from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.rotation import Rotation
-from utank_hil.telemetry.viewer import free_tcp_port, live_url, rerun_environment
+from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
 NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
@@ -70,9 +70,7 @@ class RecorderReport:
 def record_ring(
     ring: str,
     file: Path,
-    live_port: int | None = None,
     events: str | None = None,
-    about: Mapping[str, Any] | None = None,
     rotation: Rotation | None = None,
     frames: str | None = None,
     head: Mapping[str, Any] | None = None,
@@ -85,12 +83,8 @@ def record_ring(
         Name of the ring.
     file : Path
         The `.rrd` file; overwritten.
-    live_port : int, optional
-        Serve viewers on this loopback port as well.
     events : str, optional
         Name of the ring of events (`EventWriter`) that belongs to it.
-    about : mapping, optional
-        Where it comes from (`utank_hil.provenance`).
     rotation : Rotation, optional
         Where it goes on in another file; without it there is one.
     frames : str, optional
@@ -115,7 +109,7 @@ def record_ring(
         if find_spec("rerun") is not None:
             from utank_hil.telemetry.parts import RecordingParts
 
-            parts = RecordingParts(file, reader.columns, rotation, live_port, about)
+            parts = RecordingParts(file, reader.columns, rotation, reader.about)
         log = None
         if frames is not None:
             if rotation is not None and parts is not None:
@@ -214,23 +208,14 @@ class RecorderProcess(Closing):
         Name of the ring.
     file : Path
         The `.rrd` file; overwritten.
-    live : bool
-        Serve viewers on a free loopback port.
     events : str, optional
         Name of the ring of events (`EventWriter`) that belongs to it.
-    about : mapping, optional
-        Where it comes from (`utank_hil.provenance`).
     rotation : Rotation, optional
         Where it goes on in another file; without it there is one.
     frames : str, optional
         Name of the ring of `bus_records`; they go into a frame log beside the file.
     head : mapping, optional
         Head of the frame log (`replay_head`).
-
-    Attributes
-    ----------
-    url : str or None
-        Where viewers find the live stream.
 
     Raises
     ------
@@ -242,36 +227,28 @@ class RecorderProcess(Closing):
         self,
         ring: str,
         file: Path,
-        live: bool = False,
         events: str | None = None,
-        about: Mapping[str, Any] | None = None,
         rotation: Rotation | None = None,
         frames: str | None = None,
         head: Mapping[str, Any] | None = None,
     ) -> None:
         if find_spec("rerun") is None and frames is None:
             raise RecorderError(NEEDS_RERUN)
-        given = {"about": about, "head": head} if about is not None or head is not None else None
         command = [sys.executable, "-m", __name__, "--ring", ring, "--file", str(file)]
         if events is not None:
             command += ["--events", events]
         if frames is not None:
             command += ["--frames", frames]
-        if given is not None:
-            command += ["--given"]
+        if head is not None:
+            command += ["--head"]
         if rotation is not None:
             command += ["--part-s", str(rotation.part_s)]
             if rotation.keep_bytes is not None:
                 command += ["--keep-bytes", str(rotation.keep_bytes)]
-        self.url: str | None = None
-        if live:
-            port = free_tcp_port()
-            command += ["--live-port", str(port)]
-            self.url = live_url(port)
         self._report: RecorderReport | None = None
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL if given is None else subprocess.PIPE,
+            stdin=subprocess.DEVNULL if head is None else subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=rerun_environment(),
             start_new_session=True,
@@ -279,7 +256,7 @@ class RecorderProcess(Closing):
         )
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError), self._process.stdin as content:
-                json.dump(given, content)  # where it has ended already, its reason follows
+                json.dump(head, content)  # where it has ended already, its reason follows
         output = self._process.stdout
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
@@ -329,26 +306,23 @@ def _main() -> None:
     parser = argparse.ArgumentParser(description="Record a telemetry ring into a Rerun file.")
     parser.add_argument("--ring", required=True, metavar="NAME")
     parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
-    parser.add_argument("--live-port", type=int, metavar="PORT", help="serve viewers on loopback")
     parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
     parser.add_argument("--frames", metavar="NAME", help="ring of the frame log's records")
-    parser.add_argument("--given", action="store_true", help="origins are JSON on standard input")
+    parser.add_argument("--head", action="store_true", help="JSON of it is on standard input")
     parser.add_argument("--part-s", type=float, help="begin another file after so long")
     parser.add_argument("--keep-bytes", type=int, help="remove the oldest files beyond so much")
     arguments = parser.parse_args()
-    given = json.load(sys.stdin) if arguments.given else {}
+    head = json.load(sys.stdin) if arguments.head else None
     os.environ.update(rerun_environment())
     os.nice(_NICENESS)
     try:
         report = record_ring(
             arguments.ring,
             arguments.file,
-            arguments.live_port,
             arguments.events,
-            given.get("about"),
             None if arguments.part_s is None else Rotation(arguments.part_s, arguments.keep_bytes),
             arguments.frames,
-            given.get("head"),
+            head,
         )
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:

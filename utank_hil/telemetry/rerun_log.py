@@ -27,6 +27,8 @@ APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 ABOUT: Final = "about"
 """Property of a recording that says where it comes from (`utank_hil.provenance`), as JSON."""
+LIVE_RUN: Final = "live"
+"""Name of a run while it goes on, and in what was recorded of it."""
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
@@ -72,6 +74,8 @@ class RunLog:
         Names of a row's values; `time_s` must be among them.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`); with the ship in it there is a scene.
+    scene_batch_s : float, optional
+        As in `Scene`; by default pictures are sent at once.
 
     Raises
     ------
@@ -85,10 +89,11 @@ class RunLog:
         path: str,
         columns: Sequence[str],
         about: Mapping[str, Any] | None = None,
+        scene_batch_s: float = 0.0,
     ) -> None:
         self._recording = recording
         size = scene_size(columns, about)
-        self._scene = None if size is None else Scene(recording, path, columns, size)
+        self._scene = None if size is None else Scene(recording, path, columns, size, scene_batch_s)
         self._path = path
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
@@ -117,6 +122,11 @@ class RunLog:
             self._write_state(time_ns, rows[:, self._state])
         if self._scene is not None:
             self._scene.write(rows)
+
+    def close(self) -> None:
+        """Send the pictures that are held; idempotent."""
+        if self._scene is not None:
+            self._scene.close()
 
     def _write_state(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
         """Log the state's name wherever mode or fault changes."""

@@ -18,7 +18,7 @@ from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
 PERIOD_S: Final = 0.2
-"""Between two pictures: a roll of some seconds moves smoothly, and an hour is 6 MB."""
+"""Between two pictures: a roll of some seconds moves smoothly."""
 WORDS_PERIOD_S: Final = 2.0
 NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
@@ -126,12 +126,11 @@ class SceneSize:
         strips[..., 1, 1] = (still - levels + line / 2)[:, :, None]
         return strips.reshape(len(port_m), 2 * _LINES, 2, 2)
 
-
-def turned(points: FloatArray, roll_rad: FloatArray) -> FloatArray:
-    """Points of the ship, shape (..., k, 2), at each roll, shape (n,): shape (n, ..., k, 2)."""
-    sine, cosine = np.sin(roll_rad), np.cos(roll_rad)
-    turn = np.array([[cosine, -sine], [sine, cosine]]).transpose(2, 0, 1)
-    return np.asarray(np.einsum("nij,n...j->n...i", turn, points))
+    def arrow(self, pressure_pa: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The pump's arrow along the duct: vectors and origins, shape (n, 2)."""
+        length = _ARROW * self.width_m * pressure_pa / self.pressure_pa
+        vectors = np.column_stack([length, np.zeros(len(length))])
+        return vectors, [0.0, self.lz_m] - vectors / 2
 
 
 class Scene:
@@ -145,73 +144,93 @@ class Scene:
     columns : sequence of str
         Names of a row's values.
     size : SceneSize
+    batch_s : float
+        Pictures are sent when there are so many seconds of them, the last ones by `close`: a chunk
+        of few costs a file more than its content.
     """
 
     def __init__(
-        self, recording: rr.RecordingStream, path: str, columns: Sequence[str], size: SceneSize
+        self,
+        recording: rr.RecordingStream,
+        path: str,
+        columns: Sequence[str],
+        size: SceneSize,
+        batch_s: float,
     ) -> None:
         self._recording, self._path, self._size = recording, path, size
         self._at = {name: columns.index(name) for name in columns}
+        self._held: list[FloatArray] = []
+        self._most_held = batch_s / PERIOD_S
         self._due_s = self._words_due_s = -np.inf
         self._said: tuple[float, float] = (np.nan, np.nan)
+        self._stand()
+
+    def _stand(self) -> None:
+        """Log what stays as it is: the ship's parts, upright, and how what moves looks."""
+        size, place = self._size, scene_path(self._path)
         thin = 0.004 * size.width_m
-        line, duct = 0.7 * _RESERVOIR * size.width_m / _LINES, 0.06 * size.width_m
-        style = rr.LineStrips2D.from_fields
-        sea = [[-3 * size.reach_m, 0.0], [3 * size.reach_m, 0.0]]
+        column = 0.7 * _RESERVOIR * size.width_m / _LINES
+        strips, sea = rr.LineStrips2D, [[-3 * size.reach_m, 0.0], [3 * size.reach_m, 0.0]]
+        duct, arrow = 0.06 * size.width_m, rr.Arrows2D.from_fields
         for name, looks in (
-            ("sea", rr.LineStrips2D([sea], colors=_SEA, radii=2 * thin, draw_order=0.0)),
-            ("twin", style(colors=_TWIN, radii=thin, draw_order=1.0)),
-            ("duct", style(colors=_WATER, radii=duct, draw_order=2.0)),
-            ("water", style(colors=_WATER, radii=line, draw_order=2.0)),
-            ("hull", style(colors=_HULL, radii=2 * thin, draw_order=3.0)),
-            ("limits", style(colors=_LIMIT, radii=2 * thin, draw_order=4.0)),
-            ("pump", rr.Arrows2D.from_fields(colors=_PUMP, radii=4 * thin, draw_order=5.0)),
+            ("sea", strips([sea], colors=_SEA, radii=2 * thin, draw_order=0.0)),
+            ("twin", strips([size.hull()], colors=_TWIN, radii=thin, draw_order=1.0)),
+            ("ship/duct", strips([size.duct()], colors=_WATER, radii=duct, draw_order=2.0)),
+            ("ship/water", strips.from_fields(colors=_WATER, radii=column, draw_order=2.0)),
+            ("ship/hull", strips([size.hull()], colors=_HULL, radii=2 * thin, draw_order=3.0)),
+            (
+                "ship/limits",
+                strips(list(size.limits()), colors=_LIMIT, radii=2 * thin, draw_order=4.0),
+            ),
+            ("ship/pump", arrow(colors=_PUMP, radii=4 * thin, draw_order=5.0)),
         ):
-            recording.log(f"{scene_path(path)}/{name}", looks, static=True, strict=True)
+            self._recording.log(f"{place}/{name}", looks, static=True, strict=True)
 
     def write(self, rows: FloatArray) -> None:
         """Append the pictures and words that are due within these rows."""
-        time_s = rows[:, self._at["time_s"]]
-        due = []
-        for row, now_s in enumerate(time_s):
+        for row, now_s in zip(rows, rows[:, self._at["time_s"]], strict=True):
             if now_s >= self._due_s - 1e-9:
-                due.append(row)
+                self._held.append(row.copy())
                 self._due_s = now_s + PERIOD_S
-        if due:
-            self._draw(rows[due])
-        for row in rows[due]:
-            self._say(row)
+        if len(self._held) >= self._most_held:
+            self.close()
 
-    def _draw(self, rows: FloatArray) -> None:
-        size = self._size
-        roll, twin, port, starboard, pressure = (rows[:, self._at[name]] for name in NEEDED)
-        known = np.isfinite(roll)
-        roll = np.where(known, roll, 0.0)
-        frames = len(rows)
-        hull = np.broadcast_to(size.hull(), (frames, *size.hull().shape))
-        limits = np.broadcast_to(size.limits(), (frames, *size.limits().shape))
-        self._strips("hull", rows, turned(hull, roll)[:, None])
-        self._strips("twin", rows, turned(hull, np.where(np.isfinite(twin), twin, roll))[:, None])
-        self._strips("limits", rows, turned(limits, roll))
-        duct = np.broadcast_to(size.duct(), (frames, 2, 2))
-        self._strips("duct", rows, turned(duct, roll)[:, None])
-        water = size.water(np.nan_to_num(port), np.nan_to_num(starboard))
-        self._strips("water", rows, turned(water, roll))
-        if size.pressure_pa:
-            length = _ARROW * size.width_m * np.nan_to_num(pressure) / size.pressure_pa
-            along = np.column_stack([length, np.zeros(frames)])[:, None]
-            below = np.broadcast_to([[0.0, size.lz_m]], (frames, 1, 2))
-            vectors, origins = turned(along, roll)[:, 0], turned(below, roll)[:, 0]
+    def close(self) -> None:
+        """Send what is held; idempotent."""
+        if not self._held:
+            return
+        rows = np.stack(self._held)
+        self._held.clear()
+        self._draw(rows)
+        told = rows[[self._is_news(row) for row in rows]]
+        if len(told):
+            words = [self._words(row) for row in told]
             self._recording.send_columns(
-                f"{scene_path(self._path)}/pump",
-                [self._times(rows)],
-                rr.Arrows2D.columns(vectors=vectors, origins=origins - vectors / 2),
+                words_path(self._path),
+                [self._times(told)],
+                rr.TextDocument.columns(text=words, media_type=["text/markdown"] * len(told)),
             )
 
-    def _strips(self, name: str, rows: FloatArray, strips: FloatArray) -> None:
-        """Send strips of shape (n, strips of a picture, points, 2)."""
-        flat = list(strips.reshape(-1, *strips.shape[2:]))
-        columns = rr.LineStrips2D.columns(strips=flat).partition([strips.shape[1]] * len(rows))
+    def _draw(self, rows: FloatArray) -> None:
+        """Send what moves: the turn of ship and twin, and in the ship's own axes water and pump."""
+        size = self._size
+        roll, twin, port, starboard, pressure = (rows[:, self._at[name]] for name in NEEDED)
+        roll = np.nan_to_num(roll)
+        self._turn("ship", rows, roll)
+        self._turn("twin", rows, np.where(np.isfinite(twin), twin, roll))
+        water = size.water(np.nan_to_num(port), np.nan_to_num(starboard))
+        strips = rr.LineStrips2D.columns(strips=list(water.reshape(-1, 2, 2)))
+        self._send("ship/water", rows, strips.partition([water.shape[1]] * len(rows)))
+        if size.pressure_pa:
+            vectors, origins = size.arrow(np.nan_to_num(pressure))
+            self._send("ship/pump", rows, rr.Arrows2D.columns(vectors=vectors, origins=origins))
+
+    def _turn(self, name: str, rows: FloatArray, roll_rad: FloatArray) -> None:
+        """Turn a part of the scene, and what lies below it, to starboard."""
+        turns = [rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=angle) for angle in roll_rad]
+        self._send(name, rows, rr.Transform3D.columns(rotation_axis_angle=turns))
+
+    def _send(self, name: str, rows: FloatArray, columns: rr.ComponentColumnList) -> None:
         self._recording.send_columns(
             f"{scene_path(self._path)}/{name}", [self._times(rows)], columns
         )
@@ -220,20 +239,17 @@ class Scene:
         time_ns = np.rint(rows[:, self._at["time_s"]] * 1e9).astype("timedelta64[ns]")
         return rr.TimeColumn(TIMELINE, duration=time_ns)
 
-    def _say(self, row: FloatArray) -> None:
-        """Write mode, roll beside the twin's and alarms in words, when due or changed."""
+    def _is_news(self, row: FloatArray) -> bool:
+        """Whether words are due, or say another mode or fault than before."""
         now_s = row[self._at["time_s"]]
         state = (row[self._at["mode"]], row[self._at["fault"]])
         if state == self._said and now_s < self._words_due_s - 1e-9:
-            return
+            return False
         self._said, self._words_due_s = state, now_s + WORDS_PERIOD_S
-        self._recording.send_columns(
-            words_path(self._path),
-            [self._times(row[None])],
-            rr.TextDocument.columns(text=[self._words(row)], media_type=["text/markdown"]),
-        )
+        return True
 
     def _words(self, row: FloatArray) -> str:
+        """Mode, roll beside the twin's, and alarms."""
         mode, fault = int(row[self._at["mode"]]), int(row[self._at["fault"]])
         lines = [f"# {Mode(mode).name if mode in set(Mode) else mode}"]
         if fault != Fault.NONE:

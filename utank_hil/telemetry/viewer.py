@@ -4,11 +4,10 @@ import importlib.util
 import os
 import socket
 import subprocess
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 from utank_hil.closing import Closing
 
@@ -26,15 +25,30 @@ class Viewer(Closing):
     ----------
     url : str or None
         Address for a browser; None if the viewer has its own window.
+    ports : tuple of int
+        That such a browser needs, all on loopback.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes], url: str | None) -> None:
+    def __init__(
+        self, process: subprocess.Popen[bytes], url: str | None = None, ports: tuple[int, ...] = ()
+    ) -> None:
         self._process = process
         self.url = url
+        self.ports = ports
 
-    def wait(self) -> None:
-        """Wait until the user closes the window; forever if the viewer is in a browser."""
-        self._process.wait()
+    def wait(self, longest_s: float) -> bool:
+        """Wait for its end; returns whether it has ended: the user closed the window, or it failed.
+
+        One in a browser goes on until `close`.
+        """
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(longest_s)
+        return self._process.poll() is not None
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended because it can't be, for example for want of a graphics driver."""
+        return (self._process.poll() or 0) > 0
 
     def close(self) -> None:
         """End the viewer; idempotent."""
@@ -42,7 +56,7 @@ class Viewer(Closing):
         self._process.wait()
 
 
-def open_viewer(source: Path | str, at_s: float | None = None) -> Viewer:
+def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool = True) -> Viewer:
     """Show a recording or a live stream in a window, or in a browser if there is no display.
 
     Without a display the viewer is served on loopback at `Viewer.url`, for a browser on this
@@ -51,9 +65,11 @@ def open_viewer(source: Path | str, at_s: float | None = None) -> Viewer:
     Parameters
     ----------
     source : Path or str
-        A file, or the `url` of a `RecorderProcess`.
+        A file, or the `url` of a `LiveStream`.
     at_s : float, optional
         Where the cursor of a recording shall stand; at its beginning if not given.
+    window : bool
+        Whether it may be a window.
 
     Raises
     ------
@@ -63,31 +79,35 @@ def open_viewer(source: Path | str, at_s: float | None = None) -> Viewer:
     if isinstance(source, Path) and not source.is_file():
         raise FileNotFoundError(f"no recording {source}")
     command = [rerun_binary(), "--bind", LOOPBACK]
-    port = None
-    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
-        port = free_tcp_port()
-        command += ["--port", str(port)]
-        url = None
-    else:
-        data_port, page_port = free_tcp_port(), free_tcp_port()
-        command += ["--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)]
-        data = live_url(data_port) if isinstance(source, Path) else source
-        when = "" if at_s is None else f"#when=time@{at_s:g}s"
-        url = f"http://{LOOPBACK}:{page_port}?url={quote(data + when, safe='')}"
-    process = subprocess.Popen(
-        [*command, str(source)], env=rerun_environment(), stdin=subprocess.DEVNULL
-    )
-    if port is not None and at_s is not None:
-        _move_cursor(port, at_s)
-    return Viewer(process, url)
+    port = free_tcp_port()
+    command += ["--port", str(port)]
+    displays = (os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    if window and any(displays):
+        viewer = Viewer(_started([*command, str(source)]))
+        if at_s is not None:
+            _move_cursor(viewer, port, at_s)
+        return viewer
+    page_port = free_tcp_port()
+    command += ["--serve-web", "--web-viewer-port", str(page_port), str(source)]
+    data = live_url(port) if isinstance(source, Path) else source
+    when = "" if at_s is None else f"#when=time@{at_s:g}s"
+    url = f"http://{LOOPBACK}:{page_port}?url={quote(data + when, safe='')}"
+    data_port = urlsplit(data).port
+    assert data_port is not None
+    return Viewer(_started(command), url, (page_port, data_port))
 
 
-def _move_cursor(port: int, at_s: float) -> None:
+def _started(command: list[str]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(command, env=rerun_environment(), stdin=subprocess.DEVNULL)
+
+
+def _move_cursor(viewer: Viewer, port: int, at_s: float) -> None:
     """Move the time cursor of a viewer that is starting; if it does not answer, it stays."""
     from rerun.experimental import ViewerClient
 
     for _ in range(_TRIES):
-        time.sleep(_PAUSE_S)
+        if viewer.wait(_PAUSE_S):
+            return
         with suppress(Exception):  # whatever the client raises: the viewer shows its recording
             ViewerClient.connect(live_url(port)).set_time(TIMELINE, duration=at_s)
             return

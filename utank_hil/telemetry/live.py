@@ -1,0 +1,122 @@
+"""Runs on this machine: found by their rings in shared memory, and streamed to viewers.
+
+A run is not asked and does not notice: a ring has any number of readers.
+"""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any, Final
+
+import rerun as rr
+
+from utank_hil.closing import Closing
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.event_ring import EventReader, is_event_ring
+from utank_hil.telemetry.rerun_log import APPLICATION, LIVE_RUN, RunLog, run_paths, write_about
+from utank_hil.telemetry.ring import RingReader, ring_names
+from utank_hil.telemetry.scene import scene_size
+from utank_hil.telemetry.viewer import LOOPBACK, free_tcp_port, live_url
+
+MEMORY: Final = "64MiB"
+"""History for a viewer that connects late; bounds the memory of the stream."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveRun:
+    """A run whose writer lives.
+
+    Attributes
+    ----------
+    ring : str
+        Name of its telemetry ring.
+    events : str or None
+        Name of its ring of events.
+    pid : int
+        Its process.
+    about : mapping
+        Where its rows come from (`utank_hil.provenance`); empty if it does not say.
+    """
+
+    ring: str
+    events: str | None
+    pid: int
+    about: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        name = self.about.get("configuration", {}).get("name", self.ring)
+        return f"{self.pid}: {self.about.get('command', 'process')}, {name}"
+
+
+def live_runs() -> list[LiveRun]:
+    """The runs of this machine that this user may read; left-overs of killed ones are not among."""
+    found: list[tuple[str, int, Mapping[str, Any]]] = []
+    events: dict[int, str] = {}
+    for name in ring_names():
+        try:
+            with RingReader(name) as ring:
+                if ring.ended:
+                    continue
+                if ring.columns == SIGNALS:
+                    found.append((name, ring.writer_pid, ring.about or {}))
+                elif is_event_ring(ring):
+                    events[ring.writer_pid] = name
+        except OSError:  # gone since, no ring of this version, or somebody else's
+            continue
+    return [LiveRun(ring, events.get(pid), pid, about) for ring, pid, about in found]
+
+
+class LiveStream(Closing):
+    """Streams a run to viewers, those that connect late included.
+
+    Parameters
+    ----------
+    run : LiveRun
+
+    Attributes
+    ----------
+    url : str
+        Where viewers find it, on loopback.
+
+    Raises
+    ------
+    OSError
+        If the run has ended meanwhile.
+    """
+
+    def __init__(self, run: LiveRun) -> None:
+        with ExitStack() as stack:
+            self._ring = stack.enter_context(RingReader(run.ring))
+            self._events = None if run.events is None else EventReader(run.events)
+            if self._events is not None:
+                stack.enter_context(self._events)
+            self._recording = rr.RecordingStream(APPLICATION, recording_id=run.ring)
+            port = free_tcp_port()
+            self.url = live_url(port)
+            columns = self._ring.columns
+            self._recording.set_sinks(
+                rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=MEMORY),
+                default_blueprint=make_blueprint(
+                    columns, [LIVE_RUN], size=scene_size(columns, run.about)
+                ),
+            )
+            stack.callback(self._recording.disconnect)
+            if run.about:
+                write_about(self._recording, run.about)
+            self._log = RunLog(self._recording, run_paths([LIVE_RUN])[0], columns, run.about)
+            self._stack = stack.pop_all()
+
+    def send(self) -> bool:
+        """Send what has come since the last call; returns whether more may come."""
+        ended = self._ring.ended
+        rows = self._ring.read()
+        if len(rows):
+            self._log.write(rows)
+        if self._events is not None:
+            self._log.write_events(self._events.read())
+        return not ended
+
+    def close(self) -> None:
+        """End the stream; idempotent."""
+        self._stack.close()
