@@ -16,10 +16,10 @@ from retuning_toys import (
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
-from utank_hil.retuning import Candidate, MotionEstimate, Refusal, adaptive
-from utank_hil.retuning.adaptive import TRIAL_PATIENCE
+from utank_hil.retuning import Candidate, MotionEstimate, Refusal, law_exchange
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES
 from utank_hil.retuning.law_bank import FADE_SAMPLES
+from utank_hil.retuning.law_exchange import TRIAL_PATIENCE
 
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
 
@@ -226,7 +226,7 @@ def test_roll_above_its_limit_ends_an_identification_though_the_tanks_levels_are
 
 
 def test_the_last_events_are_kept_and_each_is_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adaptive, "MOST_EVENTS", 5)
+    monkeypatch.setattr(law_exchange, "MOST_EVENTS", 5)
     rig = Rig(ToyRetuner())
     taken = []
     for number in range(1, 13):  # too early to begin, which is said each time

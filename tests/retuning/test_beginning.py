@@ -18,7 +18,8 @@ from retuning_toys import (
 
 from utank_hil.canbus import RetuningState
 from utank_hil.retuning import Refusal
-from utank_hil.retuning.adaptive import MOST_TRIES, RETRY_NS
+from utank_hil.retuning.adaptive import MOST_TRIES
+from utank_hil.retuning.law_exchange import RETRY_NS
 
 CHANGE = replace(SETTINGS, change_factor=1.05)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState

@@ -277,7 +277,15 @@ class NotedUpdates:
     def take_events(self) -> list[RetuningEvent]:
         return []
 
-    def update(self, now_ns: int, order: RetuningOrder, *, engaged: bool, fresh: bool) -> None:
+    def update(
+        self,
+        now_ns: int,
+        order: RetuningOrder,
+        *,
+        engaged: bool,
+        fresh: bool,
+        passive_roll_rad: float,
+    ) -> None:
         self.fresh.append(fresh)
 
 

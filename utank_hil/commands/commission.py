@@ -19,7 +19,7 @@ from utank_hil.commands.common import Json, fail, lead_on, load, notes, shown, w
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.retuning.adaptive import RetuningEvent
+from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runtime import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.commissioning.node import CommissioningNode, Stage

@@ -4,11 +4,12 @@ Exports what the controller's process needs. Identification and design (`redesig
 of their own and are not imported here.
 """
 
-from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent, RetuningOrder
+from utank_hil.retuning.adaptive import AdaptiveController
 from utank_hil.retuning.answer import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.desk import Desk
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import EstimateFigures, EstimateSettings, Estimator
+from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent, RetuningOrder
 from utank_hil.retuning.pulses import make_pulses
 from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner, Work
 from utank_hil.retuning.retuner_process import RetunerProcess
@@ -22,6 +23,7 @@ __all__ = [
     "EstimateFigures",
     "EstimateSettings",
     "Estimator",
+    "LawExchange",
     "ModelSummary",
     "MotionEstimate",
     "Refusal",

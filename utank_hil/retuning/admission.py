@@ -7,7 +7,7 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.washout import WashoutLaw
-from utank_hil.retuning.answer import Candidate
+from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import MonitoredLaw
@@ -18,6 +18,7 @@ WARM_UP_CHUNK: Final = 50
 """Samples of the warm-up done in one sample time."""
 GAIN_FACTOR: Final = 30.0
 """Largest gains of a candidate, relative to the configured law's."""
+ANOTHER_QUESTION: Final = "the retuner answered another question"
 MOST_COEFFICIENTS: Final = 1e9
 """Sum of the gains on a reference: far beyond sense, and no overflow."""
 
@@ -43,8 +44,10 @@ class Admission:
         self._most_on_commands = GAIN_FACTOR * max(1.0, on_commands)
         self._most_on_outputs = GAIN_FACTOR * outputs
 
-    def admit(self, candidate: Candidate) -> "WarmUp | str":
+    def admit(self, candidate: Answer) -> "WarmUp | str":
         """Warm-up of the candidate's law, or the reason why it is not admitted."""
+        if not isinstance(candidate, Candidate):
+            return ANOTHER_QUESTION
         if candidate.law.output_gains.shape[1:] != (1, self._history.outputs):
             return "the law is for other signals"
         try:

@@ -52,6 +52,21 @@ class Excitation:
 
 
 @dataclass(frozen=True, slots=True)
+class TrialSettings:
+    """How a new law is awaited and tried: the keys of `RetuningSettings` of the same names.
+
+    Attributes
+    ----------
+    trial_s, roll_factor, effort_factor, answer_within_s : float
+    """
+
+    trial_s: float
+    roll_factor: float
+    effort_factor: float
+    answer_within_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class RetuningSettings:
     """When and how the controller may retune itself: section ``retuning`` of a controller.
 
@@ -131,3 +146,10 @@ class RetuningSettings:
                     )
                 )
         refuse("retuning", problems)
+
+    @property
+    def trial(self) -> TrialSettings:
+        """How a new law is awaited and tried."""
+        return TrialSettings(
+            self.trial_s, self.roll_factor, self.effort_factor, self.answer_within_s
+        )

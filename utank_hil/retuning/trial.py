@@ -17,11 +17,14 @@ class WindowStatistics(NamedTuple):
         Standard deviation.
     pressure_rms_pa : float
         Root mean square, with the steady part, which costs power and may heel the ship.
+    passive_roll_rad : float
+        Standard deviation of what she would have rolled with the tank passive; 0 if not known.
     """
 
     roll_rad: float
     pressure_pa: float
     pressure_rms_pa: float
+    passive_roll_rad: float = 0.0
 
 
 NOISE_FLOOR: Final = WindowStatistics(1e-4, 100.0, 100.0)
@@ -43,7 +46,7 @@ class MovingWindow:
     """
 
     def __init__(self, samples: int) -> None:
-        self._rows = np.zeros((samples, 2))
+        self._rows = np.zeros((samples, 3))
         self.clear()
 
     def clear(self) -> None:
@@ -51,14 +54,17 @@ class MovingWindow:
         self.samples = 0
         self._roll = self._roll_square = 0.0
         self._pressure = self._pressure_square = 0.0
+        self._passive = self._passive_square = 0.0
 
-    def add(self, roll_rad: float, pressure_pa: float) -> None:
+    def add(self, roll_rad: float, pressure_pa: float, passive_roll_rad: float = 0.0) -> None:
         """Append a sample; the oldest leaves a full window."""
+        if not math.isfinite(passive_roll_rad):
+            passive_roll_rad = 0.0
         row = self._rows[self.samples % len(self._rows)]
         if self.full:
-            self._add_to_sums(float(row[0]), float(row[1]), -1.0)
-        row[0], row[1] = roll_rad, pressure_pa
-        self._add_to_sums(roll_rad, pressure_pa, 1.0)
+            self._add_to_sums(float(row[0]), float(row[1]), float(row[2]), -1.0)
+        row[0], row[1], row[2] = roll_rad, pressure_pa, passive_roll_rad
+        self._add_to_sums(roll_rad, pressure_pa, passive_roll_rad, 1.0)
         self.samples += 1
 
     @property
@@ -74,13 +80,18 @@ class MovingWindow:
             _deviation(self._roll, self._roll_square, count),
             _deviation(self._pressure, self._pressure_square, count),
             math.sqrt(max(0.0, self._pressure_square / count)),
+            _deviation(self._passive, self._passive_square, count),
         )
 
-    def _add_to_sums(self, roll_rad: float, pressure_pa: float, sign: float) -> None:
+    def _add_to_sums(
+        self, roll_rad: float, pressure_pa: float, passive_rad: float, sign: float
+    ) -> None:
         self._roll += sign * roll_rad
         self._roll_square += sign * roll_rad * roll_rad
         self._pressure += sign * pressure_pa
         self._pressure_square += sign * pressure_pa * pressure_pa
+        self._passive += sign * passive_rad
+        self._passive_square += sign * passive_rad * passive_rad
 
 
 def worsening(

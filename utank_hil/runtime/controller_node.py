@@ -26,8 +26,8 @@ from utank_hil.canbus import (
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limits import CommandLimiter
-from utank_hil.retuning.adaptive import AdaptiveController, RetuningEvent
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
+from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
 from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
@@ -118,7 +118,7 @@ class ControllerNode:
         If the tank has a valve.
     monitors : Monitors, optional
         Of sensors, pump and bus; without them the fault table has ages, states and limits only.
-    retuning : AdaptiveController, optional
+    retuning : LawExchange, optional
         The controller again, when it is one that retunes itself.
     sink : callable, optional
         Takes one telemetry row (columns `SIGNALS`); must copy it and not wait.
@@ -173,7 +173,7 @@ class ControllerNode:
         pump: bool = True,
         valve: ValveCommander | None = None,
         monitors: Monitors | None = None,
-        retuning: AdaptiveController | None = None,
+        retuning: LawExchange | None = None,
         estimator: Estimator | None = None,
         statistics: LoopStatistics | None = None,
         sink: Callable[[FloatArray], None] | None = None,
@@ -445,6 +445,7 @@ class ControllerNode:
                 self.inbox.stations.take_retuning(),
                 engaged=self.supervisor.demand is Demand.CONTROL,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
+                passive_roll_rad=self.twin_roll_rad,
             )
         self._answered = True
         answer = self._controller.step(self._measure(self.inbox, self._level))

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver
 from utank_hil.canbus.endpoints import MAX_LOST
-from utank_hil.retuning.adaptive import RetuningOrder
+from utank_hil.retuning.law_exchange import RetuningOrder
 
 NEVER_HEARD_NS: Final = -(1 << 62)
 

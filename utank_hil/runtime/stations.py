@@ -9,7 +9,7 @@ the arm bit set, or else it disarms. Alarms can be accepted at both.
 from typing import Final
 
 from utank_hil.canbus import Address, Catalogue, Mode, OperatorCommand, Station
-from utank_hil.retuning.adaptive import RetuningOrder
+from utank_hil.retuning.law_exchange import RetuningOrder
 from utank_hil.runtime.orders import Orders, Wishes
 
 ADDRESSES: Final = {

@@ -14,8 +14,8 @@ import numpy as np
 
 from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
 from utank_hil.closing import Closing
-from utank_hil.retuning.adaptive import RetuningEvent
 from utank_hil.retuning.answer import ModelSummary
+from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry.ring import RingReader, RingWriter

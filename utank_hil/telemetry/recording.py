@@ -14,7 +14,7 @@ from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
 from utank_hil.arrays import FloatArray
-from utank_hil.retuning.adaptive import RetuningEvent
+from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.telemetry.blueprint import make_blueprint
 from utank_hil.telemetry.rerun_log import (
     ABOUT,
