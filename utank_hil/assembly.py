@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
+from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.parameters import ParameterError
@@ -20,12 +22,15 @@ from utank_hil.retuning import (
     AdaptiveController,
     Desk,
     Estimator,
+    LawExchange,
+    RenewingController,
     Retuner,
     RetunerProcess,
     ShipFigures,
     Work,
     make_pulses,
 )
+from utank_hil.retuning.estimate import MOST_NUMBERS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runtime.commissioning.node import CommissioningNode
 from utank_hil.runtime.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
@@ -167,9 +172,11 @@ def build_controller_node(
     law = law or build_law(config)
     tank, catalogue = config.vessel.tank, load_catalogue()
     level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
-    retuning = None
+    retuning: LawExchange | None = None
     if retuner is not None and config.retuning is not None:
         retuning = _adaptive(config, law, retuner)
+    elif retuner is not None and config.renews:
+        retuning = _renewing(config, law, retuner)
     estimator = None
     if estimating is not None and config.sea_estimate is not None:
         estimator = Estimator(
@@ -296,6 +303,8 @@ def retuner_work(config: ControllerConfig) -> Work | None:
     The work may be handed to another process.
     """
     settings = config.retuning
+    if config.renews:
+        return _renewal_work(config)
     if settings is None:
         return None
     from utank_hil.retuning.redesign import LEAST_GAIN, retune  # here: scipy.optimize
@@ -305,6 +314,15 @@ def retuner_work(config: ControllerConfig) -> Work | None:
     predictor = task.design.predictor
     rows = round(settings.identification_s / predictor.sample_time_s)
     return partial(retune, task=task), (rows, 1 + len(predictor.measured))
+
+
+def _renewal_work(config: ControllerConfig) -> Work:
+    from utank_hil.retuning.renewal import RenewalTask, renew
+
+    design = config.law
+    assert isinstance(design, SelfTunedDesign)
+    task = RenewalTask(config.plant, sample_time_of(config.plant), design.mean_power_w)
+    return partial(renew, task=task), (1, MOST_NUMBERS)
 
 
 def estimator_work(config: ControllerConfig) -> Work | None:
@@ -345,9 +363,17 @@ def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Adap
     assert law.linear is not None
     return AdaptiveController(
         law.linear,
-        ShipFigures(ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad),
+        ShipFigures.of(ship),
         design.predictor.measured.index("roll_rad"),
         settings,
         make_pulses(settings, config.plant, law.linear.sample_time_s),
         retuner,
     )
+
+
+def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> RenewingController:
+    """A controller that begins with `law` and has it renewed."""
+    assert isinstance(law.linear, ConstrainedLaw)
+    ship = ShipFigures.of(config.vessel.ship)
+    roll = law.measured.index("roll_rad")
+    return RenewingController(law.linear, ship, roll, config.limits, retuner)

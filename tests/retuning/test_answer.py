@@ -78,7 +78,7 @@ def law_of_size(order: int, horizon: int, outputs: int, gain: float = 0.0) -> Ca
 
 def test_the_largest_answer_that_a_configuration_can_ask_for_fits_its_mailbox() -> None:
     whole = answer_bytes(law_of_size(MOST_ORDER, MOST_SAMPLES, len(STATES)))
-    assert len(whole) == LONGEST_BYTES
+    assert len(whole) <= LONGEST_BYTES
     assert isinstance(read_answer(whole), Candidate)
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
@@ -72,12 +73,20 @@ class ControllerConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> "ControllerConfig":
         problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
+        if self.renews and not isinstance(self.law, SelfTunedDesign):
+            reason = f"is for a law of kind self_tuned, not {self.law.kind}: leave it out"
+            problems.append(("sea_estimate.renew", reason))
         refuse("", problems)
         return self
 
     def warnings(self) -> list[Problem]:
         """What is unusual in the vessel."""
         return [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
+
+    @property
+    def renews(self) -> bool:
+        """Whether the law is renewed under way."""
+        return self.sea_estimate is not None and self.sea_estimate.renew
 
     def _limit_problems(self) -> list[Problem]:
         pump = self.vessel.pump

@@ -11,6 +11,8 @@ from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import EstimateFigures, EstimateSettings, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent, RetuningOrder
 from utank_hil.retuning.pulses import make_pulses
+from utank_hil.retuning.renewed_law import RenewedLaw
+from utank_hil.retuning.renewing import RenewingController
 from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner, Work
 from utank_hil.retuning.retuner_process import RetunerProcess
 from utank_hil.retuning.settings import RetuningSettings
@@ -27,6 +29,8 @@ __all__ = [
     "ModelSummary",
     "MotionEstimate",
     "Refusal",
+    "RenewedLaw",
+    "RenewingController",
     "RetuneFunction",
     "Retuner",
     "RetunerProcess",

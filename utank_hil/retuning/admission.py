@@ -1,5 +1,6 @@
 """Admission of a candidate law before its trial: bounds on its gains, and warm-up of its memory."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -72,15 +73,23 @@ class WarmUp:
     ----------
     law : MonitoredLaw
     history : SampleHistory
+    observe : callable, optional
+        Takes a measurement in the place of the law's `step`, whose answers go nowhere.
 
     Attributes
     ----------
     law : MonitoredLaw
     """
 
-    def __init__(self, law: MonitoredLaw, history: SampleHistory) -> None:
+    def __init__(
+        self,
+        law: MonitoredLaw,
+        history: SampleHistory,
+        observe: Callable[[FloatArray], object] | None = None,
+    ) -> None:
         self.law = law
         self._history = history
+        self._observe = observe or law.controller.step
         self._stepped = max(0, history.count - WARM_UP_SAMPLES)
 
     @property
@@ -94,7 +103,7 @@ class WarmUp:
         rows = self._history.latest(missing)[:WARM_UP_CHUNK]
         for row in rows:
             controller.applied(row[:1])
-            controller.step(row[1:])
+            self._observe(row[1:])
         self._stepped += len(rows)
 
 

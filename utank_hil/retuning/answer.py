@@ -1,12 +1,12 @@
-"""The retuner's answer: a candidate law, an estimate of waves and ship, or a refusal with reasons.
+"""The retuner's answer: a law, an estimate of waves and ship, or a refusal with reasons.
 
 All pass between processes as plain bytes. Decoding executes no code and rejects anything else, and
 anything too large for the loop to read, to build and to step between two ticks.
 """
 
-import math
 from dataclasses import dataclass, fields, replace
 from typing import Final
+from zlib import crc32
 
 import numpy as np
 
@@ -18,19 +18,24 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.number_reader import NumberReader
+from utank_hil.retuning.renewed_law import MOST_NUMBERS, RenewedLaw
 
 _CANDIDATE: Final = b"CANDIDAT"
 _REFUSAL: Final = b"REFUSAL "
 _ESTIMATE: Final = b"ESTIMATE"
+_RENEWED: Final = b"RENEWED "
+_CRC_BYTES: Final = 8
 _REASONS_BYTES: Final = 4000
 _MOST_REASONS: Final = 20
 _MOST_OUTPUTS: Final = len(STATES)
 _HEAD: Final = 6
 
-LONGEST_BYTES: Final = 8 * (
-    1 + _HEAD + 9 + MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS
+LONGEST_BYTES: Final = 8 * max(
+    1 + _HEAD + 9 + MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS,
+    1 + 1 + MOST_NUMBERS,
 )
-"""Of an answer that can be read: kind, head, summary and the law's gains."""
+"""Of an answer that can be read: kind, head, summary and gains; or kind, check and numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +70,8 @@ class ModelSummary:
     roll_below_passive: float
 
     def ship(self, configured: RollShip) -> RollShip:
-        """The configured ship as she was identified; righting levers scale with the stiffness."""
-        share = self.stiffness_nm_rad / configured.stiffness_nm_rad
-        return replace(
-            configured,
-            inertia_kg_m2=self.inertia_kg_m2,
-            stiffness_nm_rad=self.stiffness_nm_rad,
-            damping_nms_rad=self.damping_nms_rad,
-            displacement_n=share * configured.displacement_n,
-        )
+        """The configured ship as she was identified."""
+        return self.figures.ship(configured)
 
     def tank(self, configured: Tank) -> Tank:
         """The configured tank as it was identified."""
@@ -125,7 +123,7 @@ class Refusal:
     reasons: tuple[str, ...]
 
 
-Answer = Candidate | MotionEstimate | Refusal
+Answer = Candidate | RenewedLaw | MotionEstimate | Refusal
 
 
 def answer_bytes(answer: Answer) -> bytes:
@@ -134,6 +132,9 @@ def answer_bytes(answer: Answer) -> bytes:
         return _REFUSAL + "\n".join(answer.reasons).encode(errors="replace")[:_REASONS_BYTES]
     if isinstance(answer, MotionEstimate):
         return _ESTIMATE + answer.numbers().tobytes()
+    if isinstance(answer, RenewedLaw):
+        content = answer.numbers().tobytes()
+        return _RENEWED + crc32(content).to_bytes(_CRC_BYTES, "little") + content
     law = answer.law
     order, inputs, outputs = law.output_gains.shape
     numbers: list[FloatArray | list[float]] = [
@@ -170,11 +171,16 @@ def read_answer(data: bytes) -> Answer:
     if kind == _REFUSAL:
         reasons = content[:_REASONS_BYTES].decode(errors="replace").split("\n")
         return Refusal(tuple(reasons[:_MOST_REASONS]))
-    if kind not in (_CANDIDATE, _ESTIMATE) or len(content) % 8:
-        raise ValueError("the answer is no candidate, estimate or refusal")
+    if kind not in (_CANDIDATE, _ESTIMATE, _RENEWED) or len(content) % 8:
+        raise ValueError("the answer is no law, estimate or refusal")
+    if kind == _RENEWED:
+        check, content = content[:_CRC_BYTES], content[_CRC_BYTES:]
+        if int.from_bytes(check, "little") != crc32(content):
+            raise ValueError("the answer's check sum is wrong")
+        return RenewedLaw.of_numbers(np.frombuffer(content))
     if kind == _ESTIMATE:
         return MotionEstimate.of_numbers(np.frombuffer(content))
-    values = _Values(np.frombuffer(content))
+    values = NumberReader(np.frombuffer(content))
     order, inputs, outputs = values.size(MOST_ORDER), values.size(1), values.size(_MOST_OUTPUTS)
     horizon = values.size(MOST_SAMPLES)
     washout_rad_s, sample_time_s = values.take(2).tolist()
@@ -189,37 +195,3 @@ def read_answer(data: bytes) -> Answer:
     if not washout_rad_s >= 0:
         raise ValueError(f"the answer's washout is {washout_rad_s} rad/s")
     return Candidate(law, washout_rad_s, summary)
-
-
-class _Values:
-    """A cursor over an array of finite numbers."""
-
-    def __init__(self, values: FloatArray) -> None:
-        if not np.isfinite(values).all():
-            raise ValueError("the answer holds numbers that are not finite")
-        self._values = values
-        self._next = 0
-
-    def take(self, count: int) -> FloatArray:
-        """The next `count` numbers."""
-        taken = self._values[self._next : self._next + count]
-        if len(taken) < count:
-            raise ValueError("the answer is too short")
-        self._next += count
-        return taken
-
-    def size(self, most: int) -> int:
-        """The next number as a dimension."""
-        value = float(self.take(1)[0])
-        if not (1 <= value <= most and math.floor(value) == value):
-            raise ValueError(f"the answer has a dimension of {value}")
-        return int(value)
-
-    def array(self, *shape: int) -> FloatArray:
-        """The next numbers as a new array of this shape."""
-        return self.take(math.prod(shape)).reshape(shape).copy()
-
-    def end(self) -> None:
-        """Refuse numbers left over."""
-        if self._next != len(self._values):
-            raise ValueError("the answer is too long")

@@ -4,13 +4,14 @@ Passes between processes as plain numbers.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Final
 
 import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Verdict
+from utank_hil.dynamics.ship import RollShip
 from utank_hil.parameters import Range, range_problems, refuse
 from utank_hil.sea import SlopeSpectrum
 
@@ -42,10 +43,31 @@ class ShipFigures:
     def __post_init__(self) -> None:
         refuse("ship", range_problems(self))
 
+    @classmethod
+    def of(cls, ship: RollShip) -> "ShipFigures":
+        """The figures of a ship that is known."""
+        return cls(ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad)
+
     @property
     def roll_period_s(self) -> float:
         """Natural roll period."""
         return 2 * math.pi * math.sqrt(self.inertia_kg_m2 / self.stiffness_nm_rad)
+
+    def ship(self, configured: RollShip) -> RollShip:
+        """The configured ship with these figures; righting levers scale with the stiffness."""
+        share = self.stiffness_nm_rad / configured.stiffness_nm_rad
+        return replace(
+            configured,
+            inertia_kg_m2=self.inertia_kg_m2,
+            stiffness_nm_rad=self.stiffness_nm_rad,
+            damping_nms_rad=self.damping_nms_rad,
+            displacement_n=share * configured.displacement_n,
+        )
+
+
+_HEAD: Final = 6
+MOST_NUMBERS: Final = _HEAD + len(fields(ShipFigures)) + 3 * MOST_BANDS
+"""Of an estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,11 +124,11 @@ class MotionEstimate:
         ValueError
             If they are of no estimate.
         """
-        ship_end = 6 + len(fields(ShipFigures))
+        ship_end = _HEAD + len(fields(ShipFigures))
         bands, left = divmod(len(numbers) - ship_end, 3)
         if left or not 0 <= bands <= MOST_BANDS:
             raise ValueError(f"{len(numbers)} numbers are no estimate")
-        head, ship = numbers[:6].tolist(), numbers[6:ship_end]
+        head, ship = numbers[:_HEAD].tolist(), numbers[_HEAD:ship_end]
         spectrum = numbers[ship_end:].reshape(3, bands).copy()
         return cls(
             Verdict(head[0]),

@@ -44,6 +44,9 @@ class EstimateSettings:
         Length of the record: so much of the past is told.
     effective_slope : float
         Ratio of effective to true wave slope, for the height of the waves.
+    renew : bool
+        Have a self-tuned law designed anew for the waves and the ship that are estimated, whenever
+        they differ from what the law in charge was designed for.
 
     Raises
     ------
@@ -54,6 +57,7 @@ class EstimateSettings:
     every_s: Annotated[float, Range(least=30, most=3600)] = 180.0
     record_s: Annotated[float, Range(least=300, most=LONGEST_RECORD_S)] = 1200.0
     effective_slope: Positive = 0.5
+    renew: bool = False
 
     def __post_init__(self) -> None:
         refuse("sea estimate", range_problems(self))

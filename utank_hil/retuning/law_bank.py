@@ -19,6 +19,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control import Controller
 from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
 FADE_SAMPLES: Final = 15
 _NOTHING: Final = np.zeros(1)
@@ -32,13 +33,16 @@ class MonitoredLaw:
     ----------
     controller : Controller
     monitor : ChangeMonitor
-    found : ModelSummary or None
+    found : ModelSummary, ShipFigures or None
         The identified ship that the law was designed for; None for that of the configuration.
+    estimate : MotionEstimate or None
+        Of the waves that it was designed for; None if they were not estimated.
     """
 
     controller: Controller
     monitor: ChangeMonitor
-    found: ModelSummary | None = None
+    found: ModelSummary | ShipFigures | None = None
+    estimate: MotionEstimate | None = None
 
 
 class LawBank:

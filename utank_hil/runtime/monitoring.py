@@ -13,6 +13,7 @@ from utank_hil.canbus import Quality
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.answer import ModelSummary
+from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
 from utank_hil.runtime.monitors.finding import Finding
@@ -98,7 +99,7 @@ class Monitors:
         self.volume = Volume(thresholds)
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
         self._ship, self._tank = ship, tank
-        self._followed: ModelSummary | None = None
+        self._followed: ModelSummary | ShipFigures | None = None
         # a valve's loss stands neither in the tank's equation here nor in the twin
         self._water_free = plant.valve is None
         self._compares = compares and self._water_free
@@ -120,12 +121,12 @@ class Monitors:
         self._of_senders = self._of_twin = self._of_saturation = 0
         self.found = 0
 
-    def follow(self, found: ModelSummary | None) -> None:
+    def follow(self, found: ModelSummary | ShipFigures | None) -> None:
         """Compare the law in charge with the twin of the ship that it was designed for.
 
         Parameters
         ----------
-        found : ModelSummary or None
+        found : ModelSummary, ShipFigures or None
             As identified; None for the ship of the configuration, which is taken too in the place
             of one that can't be hers.
         """
@@ -134,7 +135,9 @@ class Monitors:
         self._followed = found
         ship, tank = self._ship, self._tank
         if found is not None and _may_be(found, ship):
-            ship, tank = found.ship(ship), found.tank(tank)
+            ship = found.ship(ship)
+            if isinstance(found, ModelSummary):
+                tank = found.tank(tank)
         self.twin.take(ship, tank)
 
     @property
@@ -307,7 +310,7 @@ class Monitors:
         self._leave_accused(inbox, seen, spare)
 
 
-def _may_be(found: ModelSummary, configured: RollShip) -> bool:
+def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:
     """Whether an identified ship is the configured one in any loading."""
     inertia, stiffness = found.inertia_kg_m2, found.stiffness_nm_rad
     # written so that NaN fails too
@@ -317,7 +320,5 @@ def _may_be(found: ModelSummary, configured: RollShip) -> bool:
     ):
         return False
     damping_ratio = found.damping_nms_rad / (2 * math.sqrt(inertia * stiffness))
-    return (
-        0.0 <= damping_ratio <= MOST_DAMPING_RATIO
-        and 0.0 <= found.tank_damping_ratio <= MOST_DAMPING_RATIO
-    )
+    of_tank = found.tank_damping_ratio if isinstance(found, ModelSummary) else 0.0
+    return 0.0 <= damping_ratio <= MOST_DAMPING_RATIO and 0.0 <= of_tank <= MOST_DAMPING_RATIO

@@ -135,6 +135,7 @@ def self_tuned(
     *,
     noise: SensorNoise = SensorNoise(),  # noqa: B008 - frozen
     mean_power_w: float = math.inf,
+    sample_time_s: float | None = None,
 ) -> SelfTuned:
     """The constrained law of least predicted cost that has all margins and keeps a mean power.
 
@@ -148,13 +149,15 @@ def self_tuned(
         Of the sensors, as measured.
     mean_power_w : float
         Budget of the predicted power; infinite for the greatest comfort.
+    sample_time_s : float, optional
+        Instead of the one that follows from the roll frequency.
 
     Raises
     ------
     NoLawError
         If no law has the margins, or the sea does not roll the ship.
     """
-    search = _Search(plant, sea, noise)
+    search = _Search(plant, sea, noise, sample_time_s)
     found, doubt = search.best()
     for power in range(1, _MOST_STEPS + 1):
         if found.prediction.power_w <= mean_power_w:
@@ -229,13 +232,19 @@ def unknown_sea(ship: RollShip) -> SeaModel:
 class _Search:
     """One ship in one sea: what is designed, predicted and judged again and again."""
 
-    def __init__(self, plant: DesignPlant, sea: SlopeDensity, noise: SensorNoise) -> None:
+    def __init__(
+        self,
+        plant: DesignPlant,
+        sea: SlopeDensity,
+        noise: SensorNoise,
+        sample_time_s: float | None = None,
+    ) -> None:
         self._plant, self._std = plant, (noise.roll_rad, noise.roll_rate_rad_s, noise.level_m)
         self._roll_rad = passive_roll_rad(plant, sea)
         if not (math.isfinite(self._roll_rad) and self._roll_rad > 0):
             raise NoLawError("the sea does not roll the ship: there is nothing to design a law for")
         w = plant.ship.natural_frequency_rad_s
-        self._step_s = round(TICK_S * max(2, round(0.1 / w / TICK_S)), 2)
+        self._step_s = sample_time_s or sample_time_of(plant)
         omega = w * _OMEGA
         self._sea = SeaModel.of_slope(
             omega,
@@ -394,6 +403,12 @@ def _mean_positive_product(first: float, second: float, covariance: float) -> fl
         return 0.0
     r = min(max(covariance / size, -1.0), 1.0)
     return size / (2 * math.pi) * (2 * math.sqrt(1 - r**2) + 2 * r * (math.pi / 2 + math.asin(r)))
+
+
+def sample_time_of(plant: DesignPlant) -> float:
+    """Time between two steps of a law for a plant, in s: a tenth over its roll frequency."""
+    w = plant.ship.natural_frequency_rad_s
+    return round(TICK_S * max(2, round(0.1 / w / TICK_S)), 2)
 
 
 def _short(value: float) -> float:

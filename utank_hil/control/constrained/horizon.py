@@ -41,6 +41,8 @@ class Horizon:
         The best plan is unlimited_state x + sum_q unlimited_target[q] y_T(k+q) as long as no limit
         is in its way.
     unlimited_target : ndarray, shape (N, j, m)
+    output_weight, input_weight, first_output, terminal
+        As `condense` was given them; no terminal cost has shape (0, n).
     """
 
     knots: npt.NDArray[np.int64]
@@ -51,6 +53,10 @@ class Horizon:
     hessian: FloatArray
     unlimited_state: FloatArray
     unlimited_target: FloatArray
+    output_weight: FloatArray
+    input_weight: float
+    first_output: int
+    terminal: FloatArray
 
 
 def condense(
@@ -143,6 +149,10 @@ def condense(
         hessian=plan_rows.T @ plan_rows,
         unlimited_state=-np.linalg.solve(triangle, orthogonal.T @ state_rows),
         unlimited_target=by_target.reshape(len(knots), samples, outputs).swapaxes(0, 1),
+        output_weight=output_weight,
+        input_weight=input_weight,
+        first_output=first_output,
+        terminal=rest,
     )
 
 

@@ -183,10 +183,8 @@ class ConstrainedController:
         `reference`, shape (m,) or (N, m), is the target of the outputs: one for the whole horizon,
         or one for each sample of it.
         """
-        state, mean = self._state, self._mean_pa
-        surprise = y - self._c.dot(state) - self._d * mean
-        state = self._a.dot(state) + self._b * mean + self._observer_gain.dot(surprise)
-        self._state = state
+        self.observe(y)
+        state = self._state
         best = self._plan_gain.dot(state)
         if reference is not None:
             if reference.ndim == 1:
@@ -198,9 +196,16 @@ class ConstrainedController:
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
         command = min(max(float(self._plan_pa[0]), low), high)
         command = min(max(command, -self._pressure_pa), self._pressure_pa)
-        self._before_pa, self._mean_before_pa = self._last_pa, mean
+        self._before_pa = self._last_pa
         self._command_pa = self._mean_pa = self._last_pa = command
         return np.array([command])
+
+    def observe(self, y: FloatArray) -> None:
+        """Take a measurement as `step` does, and plan nothing: how a law learns the past."""
+        state, mean = self._state, self._mean_pa
+        surprise = y - self._c.dot(state) - self._d * mean
+        self._state = self._a.dot(state) + self._b * mean + self._observer_gain.dot(surprise)
+        self._mean_before_pa = mean
 
     def applied(self, u: FloatArray) -> None:
         """Tell the mean of the commands that left since the last step, shape (1,).

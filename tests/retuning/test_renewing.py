@@ -1,0 +1,346 @@
+"""A law that is renewed: when it is asked for, what is admitted, kept and taken back, and how."""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from retuning_toys import SAMPLE_NS, ToyRetuner
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
+from utank_hil.control.sea_model import SeaModel
+from utank_hil.retuning import (
+    Answer,
+    MotionEstimate,
+    Refusal,
+    RenewedLaw,
+    RenewingController,
+    RetuningOrder,
+    ShipFigures,
+)
+from utank_hil.retuning.law_bank import FADE_SAMPLES
+from utank_hil.retuning.law_exchange import RETRY_NS
+from utank_hil.retuning.renewing import SEA_DIFFERENCE, TRIAL, sea_difference
+from utank_hil.sea import SlopeSpectrum, jonswap
+
+CONFIG = load_config("configs/controllers/constrained_gpc.yaml", ControllerConfig)
+PLANT = CONFIG.plant
+SHIP = ShipFigures.of(PLANT.ship)
+SLOWER = replace(SHIP, stiffness_nm_rad=SHIP.stiffness_nm_rad / 1.15**2, stiffness_deviation=0.01)
+OMEGA = np.linspace(0.15, 2.0, 80)
+IDLE, IDENTIFY, DESIGN, TRYING, RETUNED, REFUSED, UNDONE = RetuningState
+
+
+@cache
+def law_for(hs_m: float, tp_s: float, **settings: float) -> ConstrainedLaw:
+    sea = jonswap(hs_m, tp_s)
+    model = SeaModel(tuple(sea.frequency_hz), tuple(sea.density))
+    return ConstrainedDesign("constrained_gpc", model, **settings).law(PLANT)  # type: ignore[arg-type]
+
+
+def renewed(hs_m: float = 3.0, tp_s: float = 10.0, **settings: float) -> RenewedLaw:
+    return RenewedLaw(law_for(hs_m, tp_s, **settings), 0.015, 2e4, 0.03)
+
+
+def estimate(height: float = 1.0, ship: ShipFigures | None = None) -> MotionEstimate:
+    waves = SlopeSpectrum(OMEGA, height**2 * 1e-3 * np.exp(-OMEGA), 1e-4 * np.ones_like(OMEGA))
+    of_ship = Verdict.UNCERTAIN if ship is None else Verdict.GOOD
+    return MotionEstimate(
+        Verdict.UNCERTAIN, of_ship, ship or SHIP, waves, 0.05, 3.0 * height, 10.0, 1200.0
+    )
+
+
+class Rig:
+    """A renewing controller on a linear ship that a wave of one period rolls."""
+
+    def __init__(self, answer: Answer | None, first: ConstrainedLaw | None = None) -> None:
+        self.retuner = ToyRetuner(answer)
+        self.controller = RenewingController(
+            first or law_for(2.0, 8.0), SHIP, 0, CONFIG.limits, self.retuner
+        )
+        self._model = PLANT.sampled(("roll_rad", "roll_rate_rad_s", "level_m"), 0.2)
+        self._state = np.zeros(len(self._model.A))
+        self.command_pa, self.samples = 0.0, 0
+        self.commands: list[float] = []
+        self.rows: list[FloatArray] = []
+        self.engaged = True
+        self.wave: Callable[[int], float] = lambda k: 1.0
+        self.passive: Callable[[int], float] = lambda k: 1.0
+
+    def run(self, samples: int, order: RetuningOrder = RetuningOrder()) -> None:  # noqa: B008
+        w = 0.6 * 0.2
+        for _ in range(samples):
+            k, controller = self.samples, self.controller
+            if k:
+                controller.applied(np.array([self.command_pa]))
+            passive = 0.04 * self.passive(k) * np.sin(w * k)
+            controller.update(
+                k * SAMPLE_NS, order, engaged=self.engaged, fresh=True, passive_roll_rad=passive
+            )
+            order = RetuningOrder()
+            motion = np.array(
+                [0.03 * np.sin(w * k), 0.018 * np.cos(w * k), 0.8 * np.sin(w * k - 1)]
+            )
+            y = self._model.C @ self._state + self.wave(k) * motion
+            self.command_pa = float(controller.step(y)[0])
+            self.rows.append(y)
+            self.commands.append(self.command_pa)
+            self._state = self._model.A @ self._state + self._model.B[:, 0] * self.command_pa
+            self.samples += 1
+
+    def run_until(self, state: RetuningState, most: int = 3000) -> None:
+        while self.controller.state is not state:
+            assert most > 0, f"still {self.controller.state.name}"
+            self.run(1)
+            most -= 1
+
+    @property
+    def states(self) -> list[RetuningState]:
+        return [event.state for event in self.controller.events]
+
+    @property
+    def reasons(self) -> str:
+        return "; ".join(self.controller.events[-1].reasons)
+
+
+def test_known_waves_bring_a_law_that_is_tried_and_kept() -> None:
+    rig = Rig(renewed())
+    rig.run(300)
+    assert rig.states == []
+    rig.controller.note(estimate())
+    rig.run_until(RETUNED)
+    assert rig.states == [DESIGN, TRYING, RETUNED]
+    assert rig.controller.laws.accepted.estimate is not None
+    assert "renewed for Hs 3.00 m, Tp 10.0 s" in rig.reasons
+    assert "predicted roll 0.86 degrees" in rig.reasons
+    (request,) = rig.retuner.records
+    asked = MotionEstimate.of_numbers(request[0])
+    assert asked.waves is not None
+    assert np.array_equal(asked.waves.density, estimate().waves.density)  # type: ignore[union-attr]
+
+
+def test_the_same_waves_bring_nothing_and_others_a_law() -> None:
+    rig = Rig(renewed())
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(RETUNED)
+    rig.controller.note(estimate(1 + 0.8 * SEA_DIFFERENCE))
+    rig.run(300)
+    assert rig.controller.state is RETUNED
+    rig.controller.note(estimate(1 + 1.2 * SEA_DIFFERENCE))
+    rig.run_until(DESIGN, 2)
+    assert "waves differ by 24%" in rig.reasons
+
+
+def test_a_longer_record_of_the_same_waves_brings_a_law() -> None:
+    rig = Rig(renewed())
+    rig.run(300)
+    rig.controller.note(replace(estimate(), duration_s=600.0))
+    rig.run_until(RETUNED)
+    rig.controller.note(estimate())
+    rig.run_until(DESIGN, 2)
+    assert "longer record, 20 minutes" in rig.reasons
+
+
+def test_a_changed_ship_brings_a_law_for_her() -> None:
+    rig = Rig(renewed())
+    rig.run(300)
+    rig.controller.note(estimate(ship=SHIP))
+    rig.run_until(RETUNED)
+    rig.controller.note(estimate(ship=SLOWER))
+    rig.run(10)
+    assert rig.controller.state is RETUNED  # once is not enough
+    rig.controller.note(estimate(ship=SLOWER))
+    rig.run_until(TRYING)
+    rig.run_until(RETUNED)
+    assert MotionEstimate.of_numbers(rig.retuner.records[-1][0]).ship == SLOWER
+    assert rig.controller.laws.active.found == SLOWER  # the passive twin is hers, too
+    rig.controller.note(estimate())  # she can't be told: still the last one that could
+    assert rig.controller._latest is not None
+    assert rig.controller._latest.ship == SLOWER
+
+
+def test_difference_of_seas_is_that_of_their_amplitudes() -> None:
+    one = estimate().waves
+    assert one is not None
+    assert sea_difference(one, one) == 0
+    taller = replace(one, density=1.21 * one.density)
+    assert sea_difference(taller, one) == pytest.approx(0.1)
+    moved = replace(one, omega_rad_s=one.omega_rad_s + 10.0)
+    assert sea_difference(one, moved) == np.inf
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"limits": replace(CONFIG.limits, pressure_pa=60e3)}, "stronger pump"),
+        ({"limits": replace(CONFIG.limits, level_m=4.5)}, "larger tank"),
+        ({"level_output": 1}, "other signals"),
+        ({"level_output": None}, "other signals"),
+    ],
+)
+def test_a_law_for_another_pump_or_other_signals_is_refused(
+    change: dict[str, object], words: str
+) -> None:
+    answer = renewed()
+    rig = Rig(replace(answer, law=dataclasses.replace(answer.law, **change)))  # type: ignore[arg-type]
+    first = rig.controller.laws.accepted
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(REFUSED)
+    assert words in rig.reasons
+    assert rig.controller.laws.active is first
+
+
+def test_another_sample_time_or_another_answer_is_refused() -> None:
+    slow = law_for(3.0, 10.0, sample_time_s=0.25)
+    for answer in (RenewedLaw(slow, 0.01, 1e4, 0.03), Refusal(("no law has the margins",))):
+        rig = Rig(answer)
+        rig.run(300)
+        rig.controller.note(estimate())
+        rig.run_until(REFUSED)
+        assert rig.states == [DESIGN, REFUSED]
+
+
+def test_after_a_refusal_it_waits_ten_minutes() -> None:
+    rig = Rig(Refusal(("no",)))
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(REFUSED)
+    rig.controller.note(estimate(2.0))
+    wait = RETRY_NS // SAMPLE_NS
+    rig.run(wait - 20)
+    assert rig.controller.state is REFUSED
+    rig.run(40)
+    assert rig.states == [DESIGN, REFUSED, DESIGN, REFUSED]
+
+
+def bad(gain: float) -> RenewedLaw:
+    """A law that answers the opposite, the stronger the gain."""
+    good = renewed()
+    horizon = good.law.horizon
+    wrong = replace(horizon, unlimited_state=-gain * horizon.unlimited_state)
+    return replace(good, law=dataclasses.replace(good.law, horizon=wrong))
+
+
+def test_a_bad_law_is_taken_back_and_the_one_before_is_in_charge() -> None:
+    rig = Rig(bad(3.0))
+    first = rig.controller.laws.accepted
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(REFUSED)
+    assert rig.states == [DESIGN, TRYING, REFUSED]
+    assert "roll rose" in rig.reasons
+    assert rig.controller.laws.active is first
+
+
+def test_a_law_whose_answer_is_not_finite_is_dropped_at_once() -> None:
+    rig = Rig(bad(np.nan))
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(REFUSED)
+    assert "not finite" in rig.reasons
+    assert np.isfinite(rig.commands).all()
+
+
+def test_a_growing_sea_takes_no_good_law_back_and_a_growing_roll_does() -> None:
+    for passive_grows, state in ((True, RETUNED), (False, REFUSED)):
+        rig = Rig(renewed())
+        begin = 300 + round(TRIAL.trial_s / 0.2) // 4
+
+        def growing(k: int, begin: int = begin) -> float:
+            return 1.0 if k < begin else 4.0
+
+        rig.wave = growing
+        if passive_grows:
+            rig.passive = growing
+        rig.run(300)
+        rig.controller.note(estimate())
+        rig.run_until(state)
+
+
+def test_undo_goes_back_and_stays_for_ten_minutes() -> None:
+    rig = Rig(renewed())
+    first = rig.controller.laws.accepted
+    rig.run(300)
+    rig.controller.note(estimate())
+    rig.run_until(RETUNED)
+    rig.run(1, RetuningOrder(undo=True))
+    assert rig.controller.state is UNDONE
+    assert rig.controller.laws.active is first
+    rig.controller.note(estimate())
+    rig.run(RETRY_NS // SAMPLE_NS - 20)
+    assert rig.controller.state is UNDONE
+    rig.run(40)
+    assert rig.controller.state in (DESIGN, TRYING)
+
+
+def test_an_order_renews_at_once_and_needs_known_waves() -> None:
+    rig = Rig(renewed())
+    rig.run(300)
+    rig.run(2, RetuningOrder(retune=True))
+    assert "waves are not known yet" in rig.reasons
+    rig.controller.note(estimate())
+    rig.run(2)
+    assert rig.controller.state is REFUSED  # by itself only later
+    rig.run(200, RetuningOrder(retune=True))
+    assert rig.controller.state is TRYING
+
+
+def test_forbidden_or_not_in_charge_nothing_begins() -> None:
+    rig = Rig(renewed())
+    rig.engaged = False
+    rig.controller.note(estimate())
+    rig.run(300)
+    rig.engaged = True
+    for _ in range(300):
+        rig.run(1, RetuningOrder(forbidden=True))
+    assert rig.states == []
+    rig.run_until(TRYING)
+
+
+def test_the_new_law_knows_the_past_as_if_it_had_been_stepped_all_along() -> None:
+    answer = renewed()
+    rig = Rig(answer)
+    alone = answer.law.controller()
+    rig.run(900)
+    rig.controller.note(estimate())
+    rig.run_until(TRYING)
+    applied = 0.0
+    for y, command in zip(rig.rows, rig.commands, strict=True):
+        alone.applied(np.array([applied]))
+        alone.observe(y)
+        applied = command
+    active = rig.controller.laws.active.controller
+    assert isinstance(active, ConstrainedController)
+    assert active._state == pytest.approx(alone._state, rel=1e-3, abs=1e-6)
+
+
+def test_the_exchange_makes_no_step_in_the_pressure() -> None:
+    rig, same = Rig(renewed(4.0, 12.5)), Rig(None)
+    rig.run(900)
+    rig.controller.note(estimate())
+    rig.run_until(TRYING)
+    begin = rig.samples
+    rig.run(300)
+    same.run(rig.samples)
+    # the first sample of the trial is a fifteenth of the way from the old law's to the new one's
+    apart = np.abs(np.array(rig.commands) - same.commands)[begin - 1 :]
+    assert apart.max() > 5e3  # the laws do differ
+    assert apart[0] < 1.5 * apart[1:].max() / FADE_SAMPLES
+    steps = np.abs(np.diff(rig.commands))[begin - 2 :]
+    assert steps[:5].max() < 0.5 * steps[FADE_SAMPLES:].max()
+
+
+def test_a_request_of_the_widest_estimate_fits() -> None:
+    from utank_hil.retuning.estimate import MOST_BANDS, MOST_NUMBERS
+
+    omega = np.linspace(0.1, 3.0, MOST_BANDS)
+    waves = SlopeSpectrum(omega, np.ones(MOST_BANDS), np.ones(MOST_BANDS))
+    assert len(replace(estimate(), waves=waves).numbers()) == MOST_NUMBERS

@@ -1,0 +1,96 @@
+"""From an estimate of waves and ship to a constrained law: the retuner's work for a renewal."""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from utank_hil.analysis.loop.self_tuning import self_tuned
+from utank_hil.arrays import FloatArray
+from utank_hil.control import DesignPlant
+from utank_hil.retuning.answer import Refusal
+from utank_hil.retuning.estimate import MotionEstimate
+from utank_hil.retuning.renewed_law import RenewedLaw
+from utank_hil.sea import SlopeSpectrum
+
+TAIL_SHARE: Final = 0.15
+"""Share of the bands, at the upper end, that the tail is taken from."""
+ROLL_PART: Final = 1.0
+"""Largest predicted roll, relative to the passive tank's."""
+
+
+@dataclass(frozen=True, slots=True)
+class RenewalTask:
+    """What the retuner needs besides the estimate.
+
+    Attributes
+    ----------
+    plant : DesignPlant
+        The configured ship and tank.
+    sample_time_s : float
+        Of the law in charge, and of the one that takes its place.
+    mean_power_w : float
+        Budget of the predicted power.
+    """
+
+    plant: DesignPlant
+    sample_time_s: float
+    mean_power_w: float = math.inf
+
+
+class TailedSpectrum:
+    """A slope spectrum that goes on beyond its last band as wind waves do.
+
+    There the elevation's density falls with the fifth power of the frequency (Phillips), so that
+    of the slope with the first.
+
+    Parameters
+    ----------
+    waves : SlopeSpectrum
+    """
+
+    def __init__(self, waves: SlopeSpectrum) -> None:
+        self._waves = waves
+        count = max(1, round(TAIL_SHARE * len(waves.omega_rad_s)))
+        self._top_rad_s = float(waves.omega_rad_s[-1])
+        self._level = float(np.mean((waves.omega_rad_s * waves.density)[-count:]))
+
+    def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
+        """One-sided density of the effective wave slope, rad^2 per rad/s."""
+        inside = self._waves.slope_density(omega_rad_s)
+        return np.where(omega_rad_s > self._top_rad_s, self._level / omega_rad_s, inside)
+
+
+def renew(request: FloatArray, task: RenewalTask) -> RenewedLaw | Refusal:
+    """Design a law for the estimated waves and ship.
+
+    Parameters
+    ----------
+    request : ndarray, shape (1, N)
+        `MotionEstimate.numbers` of an estimate that holds both.
+    task : RenewalTask
+    """
+    estimate = MotionEstimate.of_numbers(request[0])
+    if estimate.waves is None or estimate.ship is None:
+        return Refusal(("there is no estimate of the waves to design a law for",))
+    plant = dataclasses.replace(task.plant, ship=estimate.ship.ship(task.plant.ship))
+    try:
+        tuned = self_tuned(
+            plant,
+            TailedSpectrum(estimate.waves),
+            mean_power_w=task.mean_power_w,
+            sample_time_s=task.sample_time_s,
+        )
+    except ValueError as error:  # NoLawError and LinAlgError are such
+        return Refusal((str(error),))
+    predicted = tuned.prediction
+    if not predicted.roll_rad <= ROLL_PART * tuned.passive_roll_rad:
+        return Refusal(
+            (
+                f"the law is predicted to roll {math.degrees(predicted.roll_rad):.2f} degrees RMS, "
+                f"the passive tank {math.degrees(tuned.passive_roll_rad):.2f}",
+            )
+        )
+    return RenewedLaw(tuned.law, predicted.roll_rad, predicted.pressure_pa, tuned.passive_roll_rad)

@@ -1,0 +1,208 @@
+"""A self-tuned law that is renewed under way: for the waves and the ship that the motion shows.
+
+`LawExchange` has the states. Nothing is stimulated: what the retuner is asked with is the latest
+estimate (`Estimator`). It is asked when the waves, or the ship, differ from those that the law in
+charge was designed for.
+"""
+
+import dataclasses
+import math
+from typing import Final
+
+import numpy as np
+
+from utank_hil.arrays import FloatArray
+from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
+from utank_hil.control.limits import PumpLimits
+from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
+from utank_hil.retuning.answer import Answer
+from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.law_bank import MonitoredLaw
+from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
+from utank_hil.retuning.renewed_law import RenewedLaw
+from utank_hil.retuning.retuner import Retuner
+from utank_hil.retuning.settings import TrialSettings
+from utank_hil.retuning.trial import NOISE_FLOOR, WindowStatistics
+from utank_hil.sea import SlopeSpectrum
+
+SEA_DIFFERENCE: Final = 0.2
+"""`sea_difference` from which a law is renewed: as of waves a fifth higher."""
+SHIP_DIFFERENCE: Final = 1.05
+"""Factor in roll period, or in the root of the stiffness, from which a law is renewed."""
+LONGER: Final = 1.3
+"""Factor in length of the record from which a law is renewed for the same waves, better known."""
+TRIAL: Final = TrialSettings(
+    trial_s=180.0, roll_factor=1.25, effort_factor=1.5, answer_within_s=300.0
+)
+_AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
+
+
+class RenewingController(LawExchange):
+    """A constrained law that is renewed as waves and ship change.
+
+    Parameters
+    ----------
+    law : ConstrainedLaw
+        First law, of a sea that nobody knew.
+    ship : ShipFigures
+        The configured ship.
+    roll : int
+        Index of the roll among the outputs.
+    limits : PumpLimits
+        That no law may exceed.
+    retuner : Retuner
+        Designs.
+
+    Attributes
+    ----------
+    fallbacks : int
+        As of `Plans`, of whichever law was in charge.
+    """
+
+    def __init__(
+        self,
+        law: ConstrainedLaw,
+        ship: ShipFigures,
+        roll: int,
+        limits: PumpLimits,
+        retuner: Retuner,
+    ) -> None:
+        first = MonitoredLaw(law.controller(), ChangeMonitor(ship))
+        super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
+        self._law = law
+        self._limits = limits
+        self._configured = self._ship = ship
+        self._latest: MotionEstimate | None = None
+        self._due = ""
+        self._asked: MotionEstimate | None = None
+        self._renewed: RenewedLaw | None = None
+        self.fallbacks = 0
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        """Take the newest measurement and return the command; see `Controller`."""
+        controller = self.laws.active.controller
+        assert isinstance(controller, ConstrainedController)
+        before = controller.fallbacks
+        command = super().step(y, reference)
+        self.fallbacks += controller.fallbacks - before
+        return command
+
+    def reset(self) -> None:
+        """Reset all laws; a law on trial is dropped."""
+        super().reset()
+        self.fallbacks = 0
+
+    def note(self, estimate: MotionEstimate) -> None:
+        """Take what the motion tells of waves and ship."""
+        for law in self.laws.stepped:
+            law.monitor.watch(estimate)
+        if estimate.waves is None or estimate.ship is None:
+            return
+        if estimate.of_ship is Verdict.GOOD:
+            self._ship = estimate.ship
+        self._latest = dataclasses.replace(estimate, ship=self._ship)
+        self._due = _reason(self._latest, self.laws.active)
+
+    def _automatic_reason(self) -> str:
+        return self._due if self._now_ns >= self._not_before_ns else ""
+
+    def _begin(self, reason: str) -> None:
+        self._due = ""
+        self._asked = self._latest
+        if self._asked is None:
+            self._abort(f"{reason}, but the waves are not known yet: try again later")
+            return
+        self._submit(self._asked.numbers()[None], reason)
+
+    def _admit(self, answer: Answer) -> WarmUp | str:
+        if not isinstance(answer, RenewedLaw):
+            return ANOTHER_QUESTION
+        law, first = answer.law, self._law
+        same = (law.sample_time_s, len(law.model.C), law.level_output)
+        if same != (first.sample_time_s, len(first.model.C), first.level_output):
+            return "the law is for other signals or another sample time"
+        most, asked = self._limits, law.limits
+        if not (
+            asked.pressure_pa <= most.pressure_pa
+            and asked.rate_pa_s <= most.rate_pa_s
+            and asked.level_m <= most.level_m
+            and asked.power_w <= most.power_w
+        ):
+            return "the law is for a stronger pump or a larger tank"
+        try:
+            controller = law.controller()
+        except (ValueError, ArithmeticError) as error:
+            return str(error)
+        assert self._asked is not None
+        self._renewed, ship = answer, self._asked.ship
+        assert ship is not None
+        found = None if ship is self._configured else ship
+        service = MonitoredLaw(controller, ChangeMonitor(ship), found, self._asked)
+        return WarmUp(service, self._history, controller.observe)
+
+    def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
+        """What the law before would have had in the waves of the trial.
+
+        Its roll follows that of the passive ship, and is never taken as more than hers. The
+        pressure may be what is predicted of the new law.
+        """
+        before, renewed = self._baseline, self._renewed
+        assert renewed is not None
+        roll_rad = before.roll_rad
+        if min(before.passive_roll_rad, tried.passive_roll_rad) > NOISE_FLOOR.roll_rad:
+            share = min(1.0, roll_rad / before.passive_roll_rad)
+            roll_rad = share * tried.passive_roll_rad
+        predicted_pa = min(renewed.pressure_pa, self._limits.pressure_pa)
+        return WindowStatistics(
+            roll_rad,
+            max(before.pressure_pa, predicted_pa),
+            max(before.pressure_rms_pa, predicted_pa),
+        )
+
+    def _on_trial(self) -> str:
+        renewed, asked = self._renewed, self._asked
+        assert renewed is not None
+        assert asked is not None
+        assert asked.ship is not None
+        return (
+            f"renewed for Hs {asked.hs_m:.2f} m, Tp {asked.tp_s:.1f} s, roll period "
+            f"{asked.ship.roll_period_s:.2f} s: predicted roll "
+            f"{math.degrees(renewed.roll_rad):.2f} degrees, with the passive tank "
+            f"{math.degrees(renewed.passive_roll_rad):.2f}"
+        )
+
+    def _accept(self) -> None:
+        self._finish(RetuningState.RETUNED, self._on_trial())
+
+    def _finish(self, state: RetuningState, *reasons: str) -> None:
+        if state in _AT_REST_AFTER:
+            self._not_before_ns = self._now_ns + RETRY_NS
+        super()._finish(state, *reasons)
+
+
+def _reason(now: MotionEstimate, law: MonitoredLaw) -> str:
+    """Why a law should be renewed, in words; empty if it should not."""
+    if law.monitor.change > SHIP_DIFFERENCE:
+        return f"the ship has changed by a factor of {law.monitor.change:.2f}"
+    then = law.estimate
+    if then is None or then.waves is None or now.waves is None:
+        return "the waves are known now"
+    if now.duration_s > LONGER * then.duration_s:
+        return f"the waves are known from a longer record, {now.duration_s / 60:.0f} minutes"
+    difference = sea_difference(now.waves, then.waves)
+    if difference > SEA_DIFFERENCE:
+        return f"the waves differ by {difference:.0%} from those of the law"
+    return ""
+
+
+def sea_difference(now: SlopeSpectrum, then: SlopeSpectrum) -> float:
+    """How far two seas are apart: 0 for the same, 0.2 for waves a fifth higher.
+
+    The root mean square of the difference of amplitudes over that of the amplitudes then.
+    """
+    before = then.slope_density(now.omega_rad_s)
+    apart = float(np.sum((np.sqrt(now.density) - np.sqrt(before)) ** 2))
+    energy = float(np.sum(before))
+    return math.sqrt(apart / energy) if energy > 0 else math.inf
