@@ -198,7 +198,9 @@ def jobs_of(
         content = {"name": PASSIVE, "vessel": scenario.vessel, "law": {"kind": "passive"}}
         passive = ControllerConfig.model_validate(content)
     else:
-        passive = first.model_copy(update={"law": PassiveDesign(), "retuning": None})
+        passive = first.model_copy(
+            update={"law": PassiveDesign(), "retuning": None, "sea_estimate": None}
+        )
     return [
         Job(PASSIVE, scenario, passive, build_law(passive), PASSIVE_SCRIPT, seed, duration_s),
         *(

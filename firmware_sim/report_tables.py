@@ -168,7 +168,7 @@ def retuning_table(told: Told) -> RichTable:
     table.add_column("\nended in", no_wrap=True)
     table.add_column("\nbecause")
     table.caption = (
-        f"± one standard deviation; before the first identification, and from {SETTLING_S:g} s "
+        f"± one standard deviation; before the first retuning, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
     for run in told["runs"]:

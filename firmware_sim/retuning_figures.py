@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -41,12 +42,11 @@ class RetuningFigures:
     Attributes
     ----------
     attempts : int
-        Identifications begun.
+        Retunings begun, with an identification or without.
     retuned_at_s : float or None
         When the last new law took charge, on trial at first; None if none did.
     roll_before_rad : float or None
-        Root mean square about the heel, before the first identification; None if there is no such
-        time.
+        Root mean square about the heel, before the first retuning; None if there is no such time.
     roll_after_rad : float or None
         From `SETTLING_S` after the last new law took charge for as long as it stayed there and
         nothing was identified; None if there is no such time.
@@ -55,11 +55,11 @@ class RetuningFigures:
     found : ModelSummary or None
         What the last new law was made for.
     truth : ShipInFigures
-        When the identification began that found it, or the last one.
+        When the retuning began that found it, or the last one.
     state : str
         At the end.
     reasons : tuple of str
-        Why the last identification began, and why it ended as it did; what was found apart.
+        Why the last retuning began, and why it ended as it did; what was found apart.
     events : tuple of RetuningEvent
         `time_ns` on the ship's time.
     """
@@ -97,7 +97,11 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
         return None
     events = events_on_ships_time(run)
     time_s, state = run.column("time_s"), run.column("retuning")
-    begun = [event for event in events if event.state is RetuningState.IDENTIFY]
+    begun = [
+        event
+        for before, event in pairwise((None, *events))
+        if event is not None and _begins(event, before)
+    ]
     begun_s = begun[0].time_ns * 1e-9 if begun else math.inf
     changed_s = [point.time_s for point in scenario.voyage if point.ship]
     if scenario.actual_ship:
@@ -129,6 +133,13 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
         ),
         events=events,
     )
+
+
+def _begins(event: RetuningEvent, before: RetuningEvent | None) -> bool:
+    """Whether a retuning begins with an event: a design that no identification leads to."""
+    if event.state is RetuningState.DESIGN:
+        return before is None or before.state is not RetuningState.IDENTIFY
+    return event.state is RetuningState.IDENTIFY
 
 
 def events_on_ships_time(run: Run) -> tuple[RetuningEvent, ...]:

@@ -105,6 +105,20 @@ def test_pulses_of_a_later_attempt_do_not_count_and_its_reasons_do() -> None:
     assert told.found == LATER
 
 
+def test_renewal_without_pulses_is_an_attempt_of_its_own() -> None:
+    renewal = (
+        (100.0, DESIGN, 0.02, ("the waves are known now",), None),
+        (110.0, TRIAL, 0.01, ("renewed for 3 m",), None),
+        (200.0, RETUNED, 0.01, ("renewed for 3 m",), None),
+        (300.0, DESIGN, 0.01, ("the waves differ",), None),
+        (310.0, REFUSED, 0.01, ("no law has the margins",), None),
+    )
+    told = figures(voyage(*renewal))
+    assert (told.attempts, told.retuned_at_s, told.found) == (2, pytest.approx(110.0), None)
+    assert (told.roll_before_rad, told.roll_after_rad) == pytest.approx((0.02, 0.01), rel=1e-12)
+    assert told.reasons == ("the waves differ", "no law has the margins")
+
+
 def test_order_that_waits_is_told_and_is_no_attempt() -> None:
     told = figures(voyage((50.0, IDLE, 0.02, ("ordered: begins later",), None)))
     assert (told.attempts, told.state, told.roll_before_rad) == (0, "IDLE", None)
