@@ -274,16 +274,7 @@ def run_in_turn(
     """
     started = time.monotonic()
     jobs = jobs_of(scenario, seed, scenario.duration_s, laws)
-    return _result(
-        jobs, [run_lockstep(job, _Unwatched()) for job in jobs], LOCKSTEP, False, started
-    )
-
-
-class _Unwatched:
-    """The watch of a run that nobody looks on at."""
-
-    def stopped(self, done_s: float) -> bool:  # noqa: ARG002, goes on to the end
-        return False
+    return _result(jobs, [run_lockstep(job) for job in jobs], LOCKSTEP, False, started)
 
 
 def _result(

@@ -201,7 +201,7 @@ class ControllerRun:
     law_error: str = ""
 
 
-def run_lockstep(job: Job, watch: Watch) -> Run:
+def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
     """Run in simulated time; the same job gives the same rows, bit for bit.
 
     The scenario's faults are in it, but for the passive run.
@@ -223,7 +223,7 @@ def run_lockstep(job: Job, watch: Watch) -> Run:
 
 
 def _run_with_faults(
-    job: Job, watch: Watch, retuner: Retuner | None, estimating: Retuner | None
+    job: Job, watch: Watch | None, retuner: Retuner | None, estimating: Retuner | None
 ) -> Run:
     """A run in which the scenario's faults happen; it keeps no log of frames."""
     log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
@@ -239,9 +239,11 @@ def _run_with_faults(
     return _lockstep_run(job, bench.lockstep, bench.node, log, bench.ship, truth, truth_log)
 
 
-def _run_to_the_end(job: Job, lockstep: Lockstep, watch: Watch) -> None:
+def _run_to_the_end(job: Job, lockstep: Lockstep, watch: Watch | None) -> None:
     end_ns = job.ticks * TICK_NS
-    while lockstep.now_ns < end_ns and not watch.stopped(lockstep.now_ns / SECOND_NS):
+    while lockstep.now_ns < end_ns:
+        if watch is not None and watch.stopped(lockstep.now_ns / SECOND_NS):
+            return
         lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
 
 

@@ -53,9 +53,10 @@ class SensorNode:
         Sent in the heartbeat, for the controller to compare with its own.
     seed : int
         Of the noise.
+    second : bool
+        Whether it is the second motion sensor, which measures nothing else and has no bias.
     """
 
-    name = "sensors"
     period_ns = TICK_NS
 
     def __init__(
@@ -66,7 +67,10 @@ class SensorNode:
         *,
         configuration_version: int,
         seed: int,
+        second: bool = False,
     ) -> None:
+        self.name = "sensors_2" if second else "sensors"
+        address = Address.SENSORS_2 if second else Address.SENSORS
         self.hears: frozenset[int] = frozenset()
         self._plant = plant
         self._errors = errors
@@ -75,10 +79,12 @@ class SensorNode:
         self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
         self._messages: list[tuple[int, Callable[[Any], Frame], Callable[[], Any]]] = []
         # the noise is drawn in this order: a new message goes last
-        self._publish(catalogue.transmitter(SensorMotion), self._measure_motion)
-        self._publish(catalogue.transmitter(SensorTank), self._measure_tank)
-        self._publish(catalogue.transmitter(SensorPump), self._measure_pump)
-        self._housekeeping = Housekeeping(Address.SENSORS, catalogue, configuration_version)
+        self._publish(catalogue.transmitter(SensorMotion, address), self._measure_motion)
+        if not second:
+            self._publish(catalogue.transmitter(SensorTank), self._measure_tank)
+            self._publish(catalogue.transmitter(SensorPump), self._measure_pump)
+        self._bias_rad = 0.0 if second else errors.roll_bias_rad
+        self._housekeeping = Housekeeping(address, catalogue, configuration_version)
         self._ticks = 0
 
     def _publish(self, transmitter: Transmitter[_M], measure: Callable[[], _M]) -> None:
@@ -106,7 +112,7 @@ class SensorNode:
         errors, draw = self._errors, self._draw
         roll_rad, rate_rad_s = self._motion[0]
         return SensorMotion(
-            roll_rad + errors.roll_bias_rad + errors.roll_noise_rad * draw(),
+            roll_rad + self._bias_rad + errors.roll_noise_rad * draw(),
             rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
             _GOOD,
         )

@@ -7,8 +7,8 @@ from typing import Final
 from firmware_sim.drive import PumpDrive
 from firmware_sim.external_drive import ExternalDrive
 from firmware_sim.external_valve import ExternalValve
+from firmware_sim.hardwired import HardwiredNode
 from firmware_sim.plant import Plant
-from firmware_sim.redundant_sensors import HardwiredNode, SecondMotionNode
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensors import SensorNode
 from firmware_sim.valve import ValveNode
@@ -44,7 +44,7 @@ class ShipSide:
     panel : OperatorPanel
     valve : ValveNode or None
         If the tank has one.
-    second_motion : SecondMotionNode or None
+    second_motion : SensorNode or None
     hardwired : HardwiredNode or None
         If the vessel's redundancy has them.
     """
@@ -55,7 +55,7 @@ class ShipSide:
     drive: PumpDrive | None
     panel: OperatorPanel
     valve: ValveNode | None = None
-    second_motion: SecondMotionNode | None = None
+    second_motion: SensorNode | None = None
     hardwired: HardwiredNode | None = None
 
     @property
@@ -148,8 +148,13 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
         )
     second_motion = hardwired = None
     if vessel.redundancy.second_motion_sensor:
-        second_motion = SecondMotionNode(
-            plant, scenario.sensors, catalogue, configuration_version=version, seed=seed + 2
+        second_motion = SensorNode(
+            plant,
+            scenario.sensors,
+            catalogue,
+            configuration_version=version,
+            seed=seed + 2,
+            second=True,
         )
     if vessel.redundancy.hardwired_inputs:
         hardwired = HardwiredNode(

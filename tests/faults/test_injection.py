@@ -196,11 +196,6 @@ def test_broken_transceiver_is_passive_then_off_and_comes_back() -> None:
     assert min(sent) >= (END_S + 0.5) * SECOND
 
 
-class Watch:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
     lost = TypeAdapter(AnyFault).validate_python(
         {"kind": "lost", "message": "SENSOR_MOTION", "at_s": 7.0}
@@ -210,7 +205,7 @@ def test_faults_of_a_scenario_are_in_its_runs_but_for_the_passive_one() -> None:
     )
     ended = {}
     for job in jobs_of(scenario, 1, 8.0, {"gpc": law()}):
-        run = run_lockstep(job, Watch())
+        run = run_lockstep(job)
         ended[run.name] = (Mode(int(run.column("mode")[-1])), Fault(int(run.column("fault")[-1])))
         assert run.end_s == pytest.approx(8.0)
     assert ended == {

@@ -20,11 +20,6 @@ SCENARIOS = Path("configs/scenarios")
 IDENTIFY, DESIGN, TRIAL, RETUNED = list(RetuningState)[1:5]
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 @cache
 def scenario(name: str) -> Scenario:
     return load_config(SCENARIOS / name, Scenario)
@@ -33,7 +28,7 @@ def scenario(name: str) -> Scenario:
 def run_of(name: str, controller: str, seed: int = 1) -> Run:
     loaded = scenario(name)
     jobs = {job.name: job for job in jobs_of(loaded, seed, loaded.duration_s)}
-    return run_lockstep(jobs[controller], Unwatched())
+    return run_lockstep(jobs[controller])
 
 
 @cache
@@ -69,7 +64,7 @@ def test_heeled_by_the_wind_and_measured_askew_she_is_retuned_all_the_same() -> 
         }
     )
     jobs = {job.name: job for job in jobs_of(heeled, 1, heeled.duration_s)}
-    run = run_lockstep(jobs["dpc-roll"], Unwatched())
+    run = run_lockstep(jobs["dpc-roll"])
     assert [event.state for event in run.retuning] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
     time_s, roll, level = (run.column(name) for name in ("time_s", "true_roll_rad", "true_level_m"))
     pressure, seen = run.column("true_pressure_pa"), run.column("roll_rad")

@@ -207,17 +207,12 @@ def test_what_can_not_be_written_is_named_and_the_rest_is_there(storm, tmp_path:
     assert set(json.loads(files["figures"].read_text())["files"]) == {"picture", "figures"}
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def test_same_seed_same_rows_in_any_process_and_another_seed_another_sea(storm) -> None:
     result, _ = storm
     for job, run in zip(jobs_of(STORM, STORM.seed, 20.0), result.runs, strict=True):
-        again = run_lockstep(job, Unwatched())
+        again = run_lockstep(job)
         assert again.rows.tobytes() == run.rows[: len(again.rows)].tobytes()
-    other = run_lockstep(jobs_of(STORM, 99, 5.0)[0], Unwatched())
+    other = run_lockstep(jobs_of(STORM, 99, 5.0)[0])
     assert not np.array_equal(
         other.column("wave_moment_nm"), result.runs[0].column("wave_moment_nm")[:100]
     )

@@ -20,19 +20,14 @@ from utank_hil.telemetry.replay_head import causes, recorded_config
 STORM = Path("configs/scenarios/storm.yaml")
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 @pytest.mark.parametrize("name", ["passive", "dpc"])
 def test_a_run_is_the_same_with_a_frame_log_which_is_replayed_exactly(
     tmp_path: Path, name: str
 ) -> None:
     (job,) = (job for job in jobs_of(load_config(STORM, Scenario), 3, 25.0) if job.name == name)
     file = tmp_path / f"{name}.frames"
-    logged = run_lockstep(replace(job, frames=file), Unwatched())
-    np.testing.assert_array_equal(logged.rows, run_lockstep(job, Unwatched()).rows)
+    logged = run_lockstep(replace(job, frames=file))
+    np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
     log = FrameLog(file)
     assert log.head["about"]["seed"] == 3
     with recorded_config(log.head) as config:

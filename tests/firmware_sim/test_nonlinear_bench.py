@@ -18,11 +18,6 @@ PATTI_B = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)
 SETTLED = round(PATTI_B.settle_s / RECORD_S)
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def rms_deg(roll_rad: np.ndarray) -> float:
     return math.degrees(float(np.sqrt(np.mean(roll_rad[SETTLED:] ** 2))))
 
@@ -34,7 +29,7 @@ def test_patti_b_rolls_as_the_simulation_of_the_nonlinear_equations_says() -> No
     bare, capsized_s = roll_without_tank(PATTI_B, 1, rows)
     assert capsized_s == math.inf
     job = next(iter(jobs_of(PATTI_B, 1, PATTI_B.duration_s)))
-    passive = run_lockstep(job, Unwatched()).column("true_roll_rad")
+    passive = run_lockstep(job).column("true_roll_rad")
     # on the bench the pump is there, held at zero pressure
     for found, tank, off in ((bare, negligible(vessel.tank), 1e-3), (passive, vessel.tank, 1e-2)):
         model = RollModel(vessel.ship, tank)

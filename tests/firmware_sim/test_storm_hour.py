@@ -16,11 +16,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 @pytest.fixture(
     scope="module",
     params=[
@@ -32,7 +27,7 @@ def runs(request: pytest.FixtureRequest) -> dict[str, Run]:
     """The whole hour, and seven minutes of another."""
     assert SCENARIO.duration_s == 3600
     jobs = jobs_of(SCENARIO, *request.param)
-    return {job.name: run_lockstep(job, Unwatched()) for job in jobs}
+    return {job.name: run_lockstep(job) for job in jobs}
 
 
 def judged(run: Run, column: str) -> np.ndarray:

@@ -36,16 +36,11 @@ def scenario_file(folder: Path, **changes: object) -> Path:
     return path
 
 
-class _NeverStopped:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def test_bench_runs_its_tank_passive(tmp_path: Path) -> None:
     scenario = load_config(scenario_file(tmp_path), Scenario)
     (job,) = jobs_of(scenario, seed=1, duration_s=DURATION_S)
     assert job.name == PASSIVE
-    run = run_lockstep(job, _NeverStopped())
+    run = run_lockstep(job)
     assert not run.column("true_pressure_pa").any()
     # the same motion by the transfer function: its last waves, where the start has died out
     vessel = scenario.vessel

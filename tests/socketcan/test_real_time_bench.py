@@ -90,15 +90,10 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return first_that_can_be_judged(attempt, tmp_path_factory.mktemp("bench"))
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def lockstep(scenario: Scenario, index: int, arm_s: float = 0.5) -> Run:
     script = (TimedAction(arm_s, Action.ARM),)
     changed = scenario.model_copy(update={"operator": script})
-    return run_lockstep(jobs_of(changed, scenario.seed, 2 * DURATION_S)[index], Unwatched())
+    return run_lockstep(jobs_of(changed, scenario.seed, 2 * DURATION_S)[index])
 
 
 def roll_at(when_s: np.ndarray, run: Run) -> np.ndarray:

@@ -27,14 +27,6 @@ from utank_hil.control import BuiltLaw
 WORKERS = 2
 
 
-class Unwatched:
-    """Nobody looks on."""
-
-    def stopped(self, done_s: float) -> bool:  # noqa: ARG002
-        """Go on."""
-        return False
-
-
 @dataclass(frozen=True)
 class Voyage:
     """One controller with one seed.
@@ -67,11 +59,6 @@ class Voyage:
     passive_rad: float
     as_it_was_rad: float
     retuned_rad: float
-
-
-def sail(job: Job) -> Run:
-    """One run; in a process of its own."""
-    return run_lockstep(job, Unwatched())
 
 
 def jobs_for(scenario: Scenario, seed: int, laws: Mapping[str, BuiltLaw]) -> list[Job]:
@@ -123,7 +110,7 @@ def main() -> None:
     seeds = arguments.seeds or [scenario.seed]
     jobs = {seed: jobs_for(scenario, seed, laws) for seed in seeds}
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        runs = pool.map(sail, [job for seed in seeds for job in jobs[seed]])
+        runs = pool.map(run_lockstep, [job for seed in seeds for job in jobs[seed]])
         found: list[Voyage] = []
         for seed in seeds:
             found += voyages(seed, [next(runs) for _ in jobs[seed]], scenario.settle_s)

@@ -42,14 +42,6 @@ MODELS = {"swell": (3.0, 14.0), "short": (3.0, 8.0)}
 DECIBEL = 10 / math.log(10)
 
 
-class Unwatched:
-    """Nobody looks on."""
-
-    def stopped(self, done_s: float) -> bool:  # noqa: ARG002
-        """Go on."""
-        return False
-
-
 @dataclass(frozen=True)
 class Part:
     """One part of a record, told and true.
@@ -116,7 +108,7 @@ def parts_of(sea: str, period_s: float, hours: int, minutes: list[float]) -> Ite
     every = round(SAMPLE_TIME_S / RECORD_S)
     for seed in range(1, hours + 1):
         for job in jobs_of(scenario, seed, 3600.0):
-            rows = run_lockstep(job, Unwatched()).rows[round(SETTLED_S / RECORD_S) :: every]
+            rows = run_lockstep(job).rows[round(SETTLED_S / RECORD_S) :: every]
             signals = {name: rows[:, COLUMNS.index(name)] for name in COLUMNS}
             level = (signals["starboard_level_m"] - signals["port_level_m"]) / 2
             record = np.column_stack(

@@ -1,18 +1,14 @@
-"""What a ship may have beside its sensors: a second motion sensor, and hard-wired inputs."""
+"""High-level switches and a stop loop that a ship may have by wires of their own."""
 
-from collections import deque
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from firmware_sim.sensor_errors import SensorErrors
-from firmware_sim.sensors import standard_normal
 from utank_hil.canbus import (
     Address,
     Catalogue,
     Frame,
     HardwiredInputs,
     Quality,
-    SensorMotion,
     Switch,
 )
 from utank_hil.runtime.housekeeping import Housekeeping
@@ -22,62 +18,8 @@ if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it
 
 
-class SecondMotionNode:
-    """A motion sensor like the first one, with noise of its own and without its bias.
-
-    Parameters
-    ----------
-    plant : Plant
-        The ship to measure.
-    errors : SensorErrors
-        Of the first one.
-    catalogue : Catalogue
-    configuration_version : int
-        Sent in the heartbeat.
-    seed : int
-        Of the noise.
-    """
-
-    name = "sensors_2"
-    period_ns = TICK_NS
-    hears: frozenset[int] = frozenset()
-
-    def __init__(
-        self,
-        plant: "Plant",
-        errors: SensorErrors,
-        catalogue: Catalogue,
-        *,
-        configuration_version: int,
-        seed: int,
-    ) -> None:
-        self._plant = plant
-        self._errors = errors
-        self._draw = standard_normal(seed).__next__
-        delay_ticks = round(errors.motion_delay_ms * 1e6 / TICK_NS)
-        self._motion: deque[tuple[float, float]] = deque(maxlen=delay_ticks + 1)
-        self._transmitter = catalogue.transmitter(SensorMotion, Address.SENSORS_2)
-        self._housekeeping = Housekeeping(Address.SENSORS_2, catalogue, configuration_version)
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Sensors listen to no message."""
-
-    def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Measure and send."""
-        plant, errors, draw = self._plant, self._errors, self._draw
-        plant.advance(now_ns)
-        self._motion.append((plant.roll_rad, plant.roll_rate_rad_s))
-        roll_rad, rate_rad_s = self._motion[0]
-        motion = SensorMotion(
-            roll_rad + errors.roll_noise_rad * draw(),
-            rate_rad_s + errors.roll_rate_noise_rad_s * draw(),
-            Quality.GOOD,
-        )
-        return [self._transmitter.frame(motion), *self._housekeeping.frames(now_ns)]
-
-
 class HardwiredNode:
-    """High-level switches and a stop loop by wires of their own.
+    """Sends what the wires say.
 
     Parameters
     ----------
