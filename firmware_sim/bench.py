@@ -230,10 +230,6 @@ def run_bench(
     laws : mapping of str to BuiltLaw, optional
         Of the scenario's controllers, if they were built before; they are designed without.
 
-    Returns
-    -------
-    BenchResult
-
     Raises
     ------
     OSError

@@ -19,11 +19,6 @@ class ExternalDrive:
     every state of the drive. Without a valid report for `STALE_NS` the rotor turns freely. A frame
     that fails CRC or counter is no report, nor is one whose pressure is not available.
 
-    Parameters
-    ----------
-    plant : Plant
-    catalogue : Catalogue
-
     Attributes
     ----------
     hears : frozenset of int

@@ -37,12 +37,7 @@ class StoreError(Exception):
 
 
 class Store:
-    """The folder of a campaign.
-
-    Parameters
-    ----------
-    folder : Path
-    """
+    """The folder of a campaign."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

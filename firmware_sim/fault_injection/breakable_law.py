@@ -13,10 +13,6 @@ LEANING_PA: Final = 1e4
 class BreakableLaw:
     """A controller that can be made to raise, or to answer what is no number.
 
-    Parameters
-    ----------
-    law : Controller
-
     Attributes
     ----------
     raises, answers_nan, opposite, leans : bool

@@ -44,10 +44,6 @@ class Spoiled:
 class FaultyNode:
     """A node with faults; without any it is as the node itself.
 
-    Parameters
-    ----------
-    node : Node
-
     Attributes
     ----------
     node : Node

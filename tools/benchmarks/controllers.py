@@ -81,12 +81,7 @@ class Candidate:
 
 
 class Timed:
-    """A controller whose steps are timed, and what it saw.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    """
+    """A controller whose steps are timed, and what it saw."""
 
     def __init__(self, candidate: Candidate) -> None:
         self.sample_time_s = candidate.controller.sample_time_s

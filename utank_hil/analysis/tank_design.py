@@ -67,10 +67,6 @@ def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
     tank : Tank
         Its reservoirs, width, height and place are kept.
 
-    Returns
-    -------
-    Tank
-
     Raises
     ------
     ValueError

@@ -18,10 +18,6 @@ _WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
 class EventLog:
     """Appends events to a file, each one at once.
 
-    Parameters
-    ----------
-    file : Path
-
     Raises
     ------
     OSError

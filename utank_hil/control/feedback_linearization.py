@@ -227,12 +227,7 @@ def level_brake(model: RollModel, damping_ratio: float) -> float:
 
 
 class FeedbackLinearizationController:
-    """Steps a `FeedbackLinearization`; it has no memory.
-
-    Parameters
-    ----------
-    law : FeedbackLinearization
-    """
+    """Steps a `FeedbackLinearization`; it has no memory."""
 
     def __init__(self, law: FeedbackLinearization) -> None:
         self.sample_time_s = law.sample_time_s

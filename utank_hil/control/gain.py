@@ -59,12 +59,7 @@ class GainLaw:
 
 
 class GainController:
-    """Steps a `GainLaw`; it has no memory.
-
-    Parameters
-    ----------
-    law : GainLaw
-    """
+    """Steps a `GainLaw`; it has no memory."""
 
     def __init__(self, law: GainLaw) -> None:
         self.sample_time_s = law.sample_time_s

@@ -26,16 +26,6 @@ def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLa
 
     The gains suppose no delay, so the sample time must be short against the roll period.
 
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-    sample_time_s : float
-
-    Returns
-    -------
-    GainLaw
-
     Raises
     ------
     ValueError

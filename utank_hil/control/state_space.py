@@ -86,10 +86,6 @@ class StateSpaceController:
     """Steps a `StateSpaceLaw`.
 
     Its state follows from the measurements alone, so what `applied` says changes nothing.
-
-    Parameters
-    ----------
-    law : StateSpaceLaw
     """
 
     def __init__(self, law: StateSpaceLaw) -> None:

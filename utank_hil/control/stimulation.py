@@ -164,10 +164,6 @@ class Stimulation(StimulationDesign):
 class StimulationController:
     """Steps a `Stimulation`.
 
-    Parameters
-    ----------
-    plan : Stimulation
-
     Attributes
     ----------
     passed_limit : str

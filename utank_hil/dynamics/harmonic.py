@@ -60,10 +60,6 @@ def harmonic_response(
     pressure_pa, wave_moment_nm : float
         Amplitudes of the inputs.
     pressure_phase_rad, wave_phase_rad : float
-
-    Returns
-    -------
-    HarmonicResponse
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     half = tank.width_m / 2  # level per tank angle; turns the level's force into a moment

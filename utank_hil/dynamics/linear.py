@@ -80,11 +80,6 @@ def state_matrices(ship: RollShip, tank: Tank) -> tuple[FloatArray, FloatArray]:
 def coupled_model(ship: RollShip, tank: Tank) -> "StateSpace":
     """Continuous linear model of ship and tank.
 
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-
     Returns
     -------
     control.StateSpace

@@ -83,13 +83,7 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RollModel:
-    """Ship and tank, coupled in roll; states (roll_rad, roll_rate_rad_s, level_m, level_rate_m_s).
-
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-    """
+    """Ship and tank in roll; states (roll_rad, roll_rate_rad_s, level_m, level_rate_m_s)."""
 
     ship: RollShip
     tank: Tank

@@ -273,10 +273,6 @@ def pump_step(
     step_s : float
         About 20 ms at most.
     c : PumpCoefficients
-
-    Returns
-    -------
-    PumpState
     """
     target = min(max(setpoint, -c.max_pressure), c.max_pressure)
     change = (target - state.reference_pa) * (1.0 - math.exp(-step_s / c.reference_lag))

@@ -77,10 +77,6 @@ def simulate_reference(
     capsize_rad : float
         The run ends when the roll's magnitude passes this angle.
 
-    Returns
-    -------
-    RollRun
-
     Raises
     ------
     RuntimeError

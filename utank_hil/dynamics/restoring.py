@@ -67,16 +67,7 @@ class Restoring(NamedTuple):
 
 
 def restoring(ship: RollShip) -> Restoring:
-    """Restoring moment of the ship without its tank water.
-
-    Parameters
-    ----------
-    ship : RollShip
-
-    Returns
-    -------
-    Restoring
-    """
+    """Restoring moment of the ship without its tank water."""
     if not ship.gz_m:
         odd = (ship.stiffness_nm_rad, *ship.restoring_odd_nm)
         coefficients = np.zeros((1, 2 * len(odd)))

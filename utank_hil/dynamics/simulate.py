@@ -116,10 +116,6 @@ def simulate(
     capsize_rad : float
         Roll angle at which the ship counts as capsized and the run ends.
 
-    Returns
-    -------
-    RollRun
-
     Raises
     ------
     ValueError
@@ -208,10 +204,6 @@ def simulate_batch(
     capsize_rad : float
     progress : callable, optional
         Called about fifty times with the completed fraction.
-
-    Returns
-    -------
-    BatchResult
 
     Raises
     ------

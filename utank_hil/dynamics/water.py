@@ -52,10 +52,6 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
     ----------
     tank : Tank
     level_m : array_like, shape (...)
-
-    Returns
-    -------
-    WaterMoments
     """
     h = np.asarray(level_m, dtype=np.float64)
     rho, at, ap = tank.density_kg_m3, tank.reservoir_area_m2, tank.duct_area_m2

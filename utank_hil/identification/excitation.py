@@ -140,10 +140,6 @@ def response_scale(pressure_pa: FloatArray, model: ARX, response_limits: FloatAr
     response_limits : array_like, shape (m,)
         Largest magnitude of each output, such as added roll in rad and level in m.
 
-    Returns
-    -------
-    float
-
     Raises
     ------
     ValueError

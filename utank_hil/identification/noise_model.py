@@ -77,10 +77,6 @@ def low_order_noise_model(errors: FloatArray, highest_order: int) -> NoiseModel 
     highest_order : int
         Order P of the reference model, 1 or more.
 
-    Returns
-    -------
-    NoiseModel or None
-
     Raises
     ------
     IdentificationError

@@ -133,10 +133,6 @@ def okid(
     disturbance_decay_rates_1_s : sequence of float
         Decay rates of exponential disturbances.
 
-    Returns
-    -------
-    OkidResult
-
     Raises
     ------
     ValueError

@@ -78,10 +78,6 @@ def refine(system: "StateSpace", result: OkidResult, u: FloatArray, y: FloatArra
     u : array_like, shape (N, r) or (N,)
     y : array_like, shape (N, m) or (N,)
 
-    Returns
-    -------
-    Refinement
-
     Raises
     ------
     ValueError

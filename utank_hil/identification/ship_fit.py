@@ -101,10 +101,6 @@ def fit_ship(
     measured : tuple of str
         Outputs of the model, names in `utank_hil.dynamics.linear.STATES`.
 
-    Returns
-    -------
-    ShipFit
-
     Raises
     ------
     ValueError

@@ -78,10 +78,6 @@ def validate(
         0 for an offset, 1 also for a drift, both fitted to this record: a heel or the bias of a
         sensor, which `okid` fits as well, is not an error of the model.
 
-    Returns
-    -------
-    Validation
-
     Raises
     ------
     ValueError

@@ -11,11 +11,6 @@ class SampleHistory:
     The buffer has twice the capacity, so that the latest rows are always contiguous. Every
     `capacity` samples they are moved to its front.
 
-    Parameters
-    ----------
-    capacity : int
-    outputs : int
-
     Attributes
     ----------
     capacity, outputs : int

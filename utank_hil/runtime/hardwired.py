@@ -17,10 +17,6 @@ _USABLE: Final = (Quality.GOOD, Quality.DEGRADED)
 class HardwiredHeard:
     """What HARDWIRED_INPUTS says.
 
-    Parameters
-    ----------
-    receiver : Receiver of HardwiredInputs
-
     Attributes
     ----------
     receiver : Receiver of HardwiredInputs

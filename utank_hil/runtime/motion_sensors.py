@@ -13,10 +13,6 @@ silent."""
 class MotionSensor:
     """One of the two.
 
-    Parameters
-    ----------
-    receiver : Receiver of SensorMotion
-
     Attributes
     ----------
     receiver : Receiver of SensorMotion

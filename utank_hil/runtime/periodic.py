@@ -7,10 +7,6 @@ class Schedule:
     Told by the time and not by counting ticks: where the machine left ticks out, what was due is
     done late once and the next is due at its own point again, so that the period of a sampled law
     does not stretch with every tick that is lost.
-
-    Parameters
-    ----------
-    period_ns : int
     """
 
     __slots__ = ("_due_ns", "_period_ns")

@@ -41,10 +41,6 @@ class RealTimeLoop:
     clock : Clock, optional
         By default the monotonic clock.
 
-    Attributes
-    ----------
-    statistics : LoopStatistics
-
     Raises
     ------
     ValueError

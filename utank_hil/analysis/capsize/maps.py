@@ -108,10 +108,6 @@ def capsize_map(
     progress : callable, optional
         Called with the completed fraction of the erosion, which takes most of the time.
 
-    Returns
-    -------
-    CapsizeMap
-
     Raises
     ------
     ValueError

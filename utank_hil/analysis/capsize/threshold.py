@@ -49,13 +49,7 @@ class Threshold(NamedTuple):
 
 
 class Probability(NamedTuple):
-    """Estimated probability of capsizing, with an exact (Clopper-Pearson) confidence interval.
-
-    Attributes
-    ----------
-    estimate, low, high : float
-    capsized, ships : int
-    """
+    """Estimated probability of capsizing, with an exact (Clopper-Pearson) confidence interval."""
 
     estimate: float
     low: float
@@ -65,16 +59,7 @@ class Probability(NamedTuple):
 
 
 def without_tank(model: RollModel) -> RollModel:
-    """The same ship with a negligible tank: 1e-9 of the water, strongly damped.
-
-    Parameters
-    ----------
-    model : RollModel
-
-    Returns
-    -------
-    RollModel
-    """
+    """The same ship with a negligible tank: 1e-9 of the water, strongly damped."""
     return RollModel(model.ship, negligible(model.tank))
 
 
@@ -148,10 +133,6 @@ def capsize_threshold(
     tolerance : float
         Relative width of the bracket.
     capsize_rad : float
-
-    Returns
-    -------
-    Threshold
     """
 
     def first_capsize(amplitude: FloatArray) -> Threshold | None:
@@ -281,10 +262,6 @@ def capsize_probability(
     capsize_rad : float
     progress : callable, optional
         Called with the completed fraction.
-
-    Returns
-    -------
-    Probability
 
     Raises
     ------

@@ -30,14 +30,7 @@ EXPOSURE_S: Final = 7200.0
 
 
 class WorkLimit(NamedTuple):
-    """Largest RMS values for a kind of work on board.
-
-    Attributes
-    ----------
-    work : str
-    roll_rad : float
-    lateral_m_s2, vertical_m_s2 : float
-    """
+    """Largest RMS values for a kind of work on board."""
 
     work: str
     roll_rad: float

@@ -15,12 +15,7 @@ from utank_hil.arrays import FloatArray
 
 
 class Interval(NamedTuple):
-    """Confidence interval of a mean: mean - half_width ... mean + half_width.
-
-    Attributes
-    ----------
-    mean, half_width : float
-    """
+    """Confidence interval of a mean: mean - half_width ... mean + half_width."""
 
     mean: float
     half_width: float

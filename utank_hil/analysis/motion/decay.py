@@ -48,10 +48,6 @@ def roll_decay(time_s: FloatArray, roll_rad: FloatArray, *, least_rad: float = 0
     least_rad : float
         Peaks of smaller amplitude are left out.
 
-    Returns
-    -------
-    RollDecay
-
     Raises
     ------
     ValueError

@@ -33,12 +33,6 @@ def motion_sickness_incidence(
     roll, and the refinement of a mathematical model", Human Factors Research, AD-A024 709;
     unadapted young men, single frequencies. For irregular motion f is its mean frequency.
 
-    Parameters
-    ----------
-    acceleration_rms_m_s2 : float
-    frequency_hz : float
-    exposure_s : float
-
     Returns
     -------
     float
@@ -75,10 +69,6 @@ def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
     acceleration_m_s2 : ndarray, shape (n,)
         Uniformly sampled at several Hz; its mean is subtracted.
     step_s : float
-
-    Returns
-    -------
-    float
     """
     spectrum = np.fft.rfft(acceleration_m_s2 - np.mean(acceleration_m_s2))
     frequency_hz = np.arange(len(spectrum)) / (step_s * len(acceleration_m_s2))

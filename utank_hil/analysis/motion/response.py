@@ -41,10 +41,6 @@ def simulated_response(
         Wave periods before the analysed one.
     samples_per_period : int
         Integration steps per wave period.
-
-    Returns
-    -------
-    ResponseAmplitude
     """
     first = np.empty((2, len(frequency_rad_s)), dtype=np.complex128)
     angle = math.tau * np.arange(samples_per_period) / samples_per_period

@@ -35,15 +35,6 @@ class StimulatedRoll(NamedTuple):
 def tuned_tank(ship: RollShip, tank: Tank) -> Tank:
     """The tank with its duct sized for the ship's natural roll frequency, thesis 2.6.
 
-    Parameters
-    ----------
-    ship : RollShip
-    tank : Tank
-
-    Returns
-    -------
-    Tank
-
     Raises
     ------
     ValueError
@@ -77,10 +68,6 @@ def stimulate_on_still_water(
     off_s : float
         Time at which the pump stops.
     duration_s : float
-
-    Returns
-    -------
-    StimulatedRoll
 
     Raises
     ------

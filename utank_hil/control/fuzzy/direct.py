@@ -152,10 +152,6 @@ def _q_problems(law: FuzzyLaw, above: float) -> list[Problem]:
 class DirectFuzzyController(FuzzyController):
     """Steps a direct adaptive fuzzy law.
 
-    Parameters
-    ----------
-    law : SmallGainFuzzy or RobustFuzzy
-
     Attributes
     ----------
     law : SmallGainFuzzy or RobustFuzzy

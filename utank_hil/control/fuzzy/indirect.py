@@ -72,10 +72,6 @@ class IndirectFuzzy(FuzzyLaw):
 class IndirectFuzzyController(FuzzyController):
     """Steps an `IndirectFuzzy`.
 
-    Parameters
-    ----------
-    law : IndirectFuzzy
-
     Attributes
     ----------
     drift : ndarray, shape (rules, inputs + 1)

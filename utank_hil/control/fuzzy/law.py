@@ -117,10 +117,6 @@ class FuzzyController(ABC):
     What was learnt before a fault, or before an operator disarmed, may be what led to it: an armed
     law starts anew (`StartsAnew`).
 
-    Parameters
-    ----------
-    law : FuzzyLaw
-
     Attributes
     ----------
     passed_limit : str

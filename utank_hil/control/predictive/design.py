@@ -256,11 +256,6 @@ class PredictiveDesign:
 def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, FloatArray]:
     """Sampled model of ship, tank, drive and wave moment, and its process noise.
 
-    Parameters
-    ----------
-    predictor : Predictor
-    plant : DesignPlant
-
     Returns
     -------
     model : LinearModel
@@ -287,13 +282,7 @@ def wave_plant(predictor: Predictor, plant: DesignPlant) -> tuple[LinearModel, F
 
 
 def wave_arx(predictor: Predictor, plant: DesignPlant) -> ARX:
-    """ARX model of least prediction error for a ship and tank in waves.
-
-    Parameters
-    ----------
-    predictor : Predictor
-    plant : DesignPlant
-    """
+    """ARX model of least prediction error for a ship and tank in waves."""
     model, process = wave_plant(predictor, plant)
     rows = [STATES.index(name) for name in predictor.measured]
     measurement = np.diag(np.square(predictor.measurement_std))

@@ -45,10 +45,6 @@ def finite_memory_arx(
     order : int
         p.
 
-    Returns
-    -------
-    ARX
-
     Raises
     ------
     ValueError

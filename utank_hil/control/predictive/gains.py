@@ -40,10 +40,6 @@ def design_gpc(
     first_output : int
         Outputs before y(k + first_output) are not weighed.
 
-    Returns
-    -------
-    PredictiveLaw
-
     Raises
     ------
     ValueError
@@ -101,10 +97,6 @@ def design_dpc(
         Relaxes the deadbeat: the squares of the outputs in the window, so weighed, are traded
         against the squares of the inputs instead of being brought to zero whatever it takes. What
         the inputs cannot reach, such as a wave that goes on, then costs no undue effort.
-
-    Returns
-    -------
-    PredictiveLaw
 
     Raises
     ------

@@ -111,12 +111,7 @@ class DriveFollowing:
 
 
 class Saturation:
-    """How long the command is held at its limit on one side, or the drive at one of its own.
-
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-    """
+    """How long the command is held at its limit on one side, or the drive at one of its own."""
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_pa = thresholds.pressure_limit_pa

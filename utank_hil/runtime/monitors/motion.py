@@ -75,10 +75,6 @@ class Stuck:
 class RollAgainstRate:
     """Compares the roll with its integrated rate.
 
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-
     Attributes
     ----------
     unexplained_rad : float

@@ -47,12 +47,7 @@ class SpikeGate:
 
 
 class MotionGate:
-    """The gates of one motion sensor.
-
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-    """
+    """The gates of one motion sensor."""
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
@@ -71,10 +66,6 @@ class MotionGate:
 
 class SpikeGates:
     """The gates of the motion sensor and of the level gauges.
-
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
 
     Attributes
     ----------
@@ -101,12 +92,7 @@ class SpikeGates:
 
 
 class SpikeCount:
-    """Leaky count of what the gates discarded: one a second is forgotten, five in one are too many.
-
-    Attributes
-    ----------
-    found : bool
-    """
+    """Leaky count of discarded samples: one a second is forgotten, five in one are too many."""
 
     MOST: Final = 4.0
 

@@ -20,10 +20,6 @@ _NOISE: Final = int(Finding.NOISE)
 class Volume:
     """Sum of both levels, smoothed over two seconds, and the gauges' noise in it.
 
-    Parameters
-    ----------
-    thresholds : MonitorThresholds
-
     Attributes
     ----------
     sum_m : float
