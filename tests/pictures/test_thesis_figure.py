@@ -33,9 +33,8 @@ def test_legends_stand_off_the_data_and_no_text_is_cut(
     columns: int, panels: int, canvas: list[Canvas], tmp_path: Path
 ) -> None:
     panel = Panel("A title", "Time (s)", "Roll (°)", LONG, span=(0.0, 9.0), span_label="before")
-    path = draw_figure(
-        Figure("9.9", "A figure", "", "", (panel,) * panels, columns=columns), tmp_path / "x.png"
-    )
+    path = tmp_path / "x.png"
+    draw_figure(Figure("", "", (panel,) * panels, columns=columns), path, "9.9  A figure")
     assert path.stat().st_size > 10_000
     (drawn,) = canvas
     shown = [axis for axis in drawn.axes if axis.get_visible()]

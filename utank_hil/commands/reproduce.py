@@ -13,7 +13,7 @@ from rich.table import Table
 
 from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, shown
 from utank_hil.commands.tables import print_table
-from utank_hil.thesis.figure import Figure, Verdict, as_json
+from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
 
 PAGE: Final = "gallery.html"
@@ -48,12 +48,11 @@ def reproduce(
     made, seconds = _make(made_here, out)
     from utank_hil.pictures.gallery import write_gallery
 
-    files = {"page": write_gallery(entries, made, out, out / PAGE), "numbers": out / NUMBERS}
+    files = {"page": out / PAGE, "numbers": out / NUMBERS}
+    write_gallery(entries, made, out, files["page"])
     result = {
         "figures": [
-            as_json(made[entry.key])
-            if entry.make is not None
-            else {"key": entry.key, "title": entry.title, "word": entry.word}
+            entry.as_json() | (as_json(made[entry.key]) if entry.key in made else {})
             for entry in entries
         ]
     }
@@ -88,7 +87,7 @@ def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str,
             begin = time.monotonic()
             figure = entry.make()
             if figure.panels:
-                draw_figure(figure, out / f"{figure.key}.png")
+                draw_figure(figure, out / f"{entry.key}.png", entry.heading)
             made[entry.key] = figure
             seconds[entry.key] = time.monotonic() - begin
             bar.advance(task)
@@ -98,10 +97,7 @@ def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str,
 def _list(entries: tuple[Entry, ...], as_object: bool) -> None:
     """Print keys and titles."""
     if as_object:
-        listed = [
-            {"key": entry.key, "title": entry.title, "word": entry.word or None}
-            for entry in entries
-        ]
+        listed = [entry.as_json() for entry in entries]
         sys.stdout.write(json.dumps({"figures": listed}) + "\n")
         return
     console = Console(highlight=False)
@@ -122,12 +118,11 @@ def _summary(
         if figure is None:
             table.add_row(entry.key, f"{entry.title} ({entry.word})", "", "", "", "", "")
             continue
-        known = [row.deviation for row in figure.rows if row.deviation is not None]
         verdicts = [check.verdict for check in figure.checks]
         table.add_row(
             entry.key,
             entry.title,
-            f"{max(known, key=abs):+.1%}" if known else "",
+            greatest(figure.rows),
             *(
                 str(verdicts.count(verdict) or "")
                 for verdict in (Verdict.HOLDS, Verdict.PARTLY, Verdict.FAILS)

@@ -1,26 +1,22 @@
 """The figures of the source on one self-contained HTML page."""
 
-import base64
 from collections.abc import Iterator, Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Final
 
-from utank_hil.thesis.figure import Check, Figure, Row, Verdict, printed_text
+from utank_hil.pictures.report_page import (
+    ReportPicture,
+    ReportSection,
+    ReportTable,
+    write_report_page,
+)
+from utank_hil.thesis.figure import Figure, Verdict, greatest, printed_text
 from utank_hil.thesis.registry import Entry
 
-_STYLE: Final = """
-body{font:16px/1.5 system-ui,sans-serif;color:#222;max-width:1100px;margin:0 auto;padding:1rem}
-h2{margin-top:3rem;border-top:1px solid #ccc;padding-top:1rem}
-img{max-width:100%;height:auto}
-.wide{overflow-x:auto}
-table{border-collapse:collapse;margin:.7rem 0;font-size:.9rem}
-td,th{border-bottom:1px solid #ddd;padding:.25rem .6rem;text-align:left;vertical-align:top}
-td.n{text-align:right;white-space:nowrap}
-.word{font-weight:600;white-space:nowrap}
-.open{color:#555}
-@media print{h2{break-before:page}body{max-width:none}}
-"""
+_ABOUT: Final = (
+    "Every figure and printed number of chapters 2 to 4 of Passive and active nonlinear control of "
+    "ship roll motions using U-tube tanks (2006), made anew."
+)
 _SIGNS: Final = {
     Verdict.HOLDS: "✓",
     Verdict.PARTLY: "◐",
@@ -31,7 +27,7 @@ _SIGNS: Final = {
 
 def write_gallery(
     entries: Sequence[Entry], figures: Mapping[str, Figure], folder: Path, path: Path
-) -> Path:
+) -> None:
     """Write the page.
 
     Parameters
@@ -44,95 +40,56 @@ def write_gallery(
         Where their pictures are, as `KEY.png`.
     path : Path
         The `.html` file; overwritten.
-
-    Returns
-    -------
-    Path
-        `path`.
     """
-    path.write_text("".join(_page(entries, figures, folder)), encoding="utf-8")
-    return path
+    contents = [_contents_row(entry, figures.get(entry.key)) for entry in entries]
+    headings = ("figure", "", "greatest deviation", "statements")
+    sections = [ReportSection("Figures", tables=[ReportTable(headings, contents, text=True)])]
+    sections += [
+        _section(entry, figures[entry.key], folder) for entry in entries if entry.key in figures
+    ]
+    write_report_page(path, "The thesis shown again", _ABOUT, (), sections)
 
 
-def _page(entries: Sequence[Entry], figures: Mapping[str, Figure], folder: Path) -> Iterator[str]:
-    yield '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-    yield '<meta name="viewport" content="width=device-width,initial-scale=1">'
-    yield f"<title>The thesis shown again</title><style>{_STYLE}</style></head><body>"
-    yield "<h1>The thesis shown again</h1>"
-    yield (
-        "<p>Every figure and printed number of chapters 2 to 4 of <i>Passive and active nonlinear "
-        "control of ship roll motions using U-tube tanks</i> (2006), made anew.</p>"
-    )
-    yield '<div class="wide"><table><tr><th>figure</th><th></th><th>greatest deviation</th>'
-    yield "<th>statements</th></tr>"
-    for entry in entries:
-        yield _contents_row(entry, figures.get(entry.key))
-    yield "</table></div>"
-    for entry in entries:
-        if entry.key in figures:
-            yield from _section(figures[entry.key], folder)
-    yield "</body></html>\n"
-
-
-def _contents_row(entry: Entry, figure: Figure | None) -> str:
+def _contents_row(entry: Entry, figure: Figure | None) -> tuple[str, ...]:
     if figure is None:
-        cells = f"<td>{escape(entry.word)}: nothing to compute</td><td></td>"
-        return f"<tr><td>{entry.key}</td><td>{escape(entry.title)}</td>{cells}</tr>"
+        return (entry.key, entry.title, f"{entry.word}: nothing to compute", "")
     verdicts = [check.verdict for check in figure.checks]
-    counted = ", ".join(
-        f"{verdicts.count(verdict)} {verdict.value}" for verdict in Verdict if verdict in verdicts
-    )
-    return (
-        f'<tr><td><a href="#f{entry.key}">{entry.key}</a></td><td>{escape(entry.title)}</td>'
-        f'<td class="n">{_greatest(figure.rows)}</td><td>{escape(counted)}</td></tr>'
-    )
+    counted = (f"{verdicts.count(each)} {each}" for each in Verdict if each in verdicts)
+    return (entry.key, entry.title, greatest(figure.rows), ", ".join(counted))
 
 
-def _greatest(rows: Sequence[Row]) -> str:
-    known = [row.deviation for row in rows if row.deviation is not None]
-    return f"{max(known, key=abs):+.2%}" if known else ""
-
-
-def _section(figure: Figure, folder: Path) -> Iterator[str]:
-    yield f'<h2 id="f{figure.key}">{figure.key} {escape(figure.title)}</h2>'
+def _section(entry: Entry, figure: Figure, folder: Path) -> ReportSection:
+    pictures = []
     if figure.panels:
-        data = base64.b64encode((folder / f"{figure.key}.png").read_bytes()).decode()
-        told = "; ".join(panel.title or figure.title for panel in figure.panels)
-        yield f'<img alt="{escape(told)}" src="data:image/png;base64,{data}">'
-    yield f"<p><b>How ours was made:</b> {escape(figure.method)}.</p>"
-    yield f'<p class="open"><b>Left open by the source:</b> {escape(figure.open_points)}</p>'
+        shown = "; ".join(panel.title or entry.title for panel in figure.panels)
+        pictures.append(ReportPicture((folder / f"{entry.key}.png").read_bytes(), shown))
+    texts = [
+        f"How ours was made: {figure.method}.",
+        f"Left open by the source: {figure.open_points}",
+    ]
+    return ReportSection(entry.heading, texts, pictures, list(_tables(figure)))
+
+
+def _tables(figure: Figure) -> Iterator[ReportTable]:
     if figure.table is not None:
-        yield '<div class="wide"><table>'
-        yield _cells("th", figure.table.headings)
-        yield from (_cells("td", row) for row in figure.table.rows)
-        yield "</table></div>"
+        yield ReportTable(figure.table.headings, figure.table.rows, text=True)
     if figure.rows:
-        yield '<div class="wide"><table><tr><th>number</th><th>printed</th><th>ours</th><th></th>'
-        yield "<th>deviation</th><th>reason</th></tr>"
-        yield from map(_number_row, figure.rows)
-        yield "</table></div>"
+        rows = [
+            (
+                row.quantity,
+                printed_text(row),
+                "" if row.ours is None else f"{row.ours:.5g}",
+                row.unit,
+                "" if row.deviation is None else f"{row.deviation:+.2%}",
+                row.reason,
+            )
+            for row in figure.rows
+        ]
+        headings = ("number", "printed", "ours", "", "deviation", "reason")
+        yield ReportTable(headings, rows, text=True)
     if figure.checks:
-        yield '<div class="wide"><table><tr><th>the text says</th><th></th><th>measured</th></tr>'
-        yield from map(_check_row, figure.checks)
-        yield "</table></div>"
-
-
-def _cells(tag: str, cells: Sequence[str]) -> str:
-    return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-
-def _number_row(row: Row) -> str:
-    ours = "" if row.ours is None else f"{row.ours:.5g}"
-    deviation = "" if row.deviation is None else f"{row.deviation:+.2%}"
-    return (
-        f'<tr><td>{escape(row.quantity)}</td><td class="n">{printed_text(row)}</td>'
-        f'<td class="n">{ours}</td><td>{escape(row.unit)}</td><td class="n">{deviation}</td>'
-        f"<td>{escape(row.reason)}</td></tr>"
-    )
-
-
-def _check_row(check: Check) -> str:
-    return (
-        f'<tr><td>{escape(check.statement)}</td><td class="word">{_SIGNS[check.verdict]} '
-        f"{escape(check.verdict.value)}</td><td>{escape(check.measured)}</td></tr>"
-    )
+        judged = [
+            (check.statement, f"{_SIGNS[check.verdict]} {check.verdict}", check.measured)
+            for check in figure.checks
+        ]
+        yield ReportTable(("the text says", "", "measured"), judged, text=True)

@@ -24,7 +24,7 @@ _DENSE: Final = 6
 """Swings of a curve from which on its panel has whole strokes."""
 
 
-def draw_figure(figure: Figure, path: Path) -> Path:
+def draw_figure(figure: Figure, path: Path, title: str) -> None:
     """Draw the panels of a figure; legends stand above their panels, never on the data.
 
     Parameters
@@ -33,24 +33,18 @@ def draw_figure(figure: Figure, path: Path) -> Path:
         With one panel or more.
     path : Path
         The `.png` file; overwritten.
-
-    Returns
-    -------
-    Path
-        `path`.
+    title : str
     """
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)
     size_in = (5.8 * columns, 0.5 + 3.9 * rows) if columns > 1 else (8.0, 0.5 + 3.3 * rows)
-    number = f"{figure.key}  " if figure.key[0].isdigit() else ""
-    with picture(path, number + figure.title, size_in) as canvas:
+    with picture(path, title, size_in) as canvas:
         axes = canvas.subplots(rows, columns, squeeze=False).ravel()
         for axis, panel in zip(axes, figure.panels, strict=False):
             _draw_panel(axis, panel)
         for axis in axes[len(figure.panels) :]:
             axis.set_visible(False)
     _shrink(path)
-    return path
 
 
 def _shrink(path: Path) -> None:

@@ -170,8 +170,6 @@ def figure_3_11() -> Figure:
             "the text says hc = 25 and, at its end, 50"),
     )  # fmt: skip
     return Figure(
-        "3.11",
-        "Adaptive DPC on roll and level",
         _METHOD,
         _OPEN + " The text gives the control horizon as 25 and as 50: 50 is drawn.",
         (*_history_panels(found, GREATER[1]), _over_waves(curves)),
@@ -199,8 +197,6 @@ def figure_3_12() -> Figure:
     """The record for identification with two outputs."""
     found = voyage(*GREATER, dpc_both(50), OWN_WAVE)
     return Figure(
-        "3.12",
-        "Record for identification: pulses, roll and water",
         _METHOD,
         _OPEN,
         _record(found, GREATER[1], water=True),
@@ -228,8 +224,6 @@ def figure_3_13() -> Figure:
         Row("the same, printed reservoirs", "%", PRINTED_GAIN, _reduced(printed_ship), reason),
     )
     return Figure(
-        "3.13",
-        "Adaptive DPC on roll",
         _METHOD,
         _OPEN + " Pulses as in 3.14.",
         (*_history_panels(found, GREATER[1]), _over_waves(curves)),
@@ -245,8 +239,6 @@ def figure_3_14() -> Figure:
     slow, quick = dpc_both(50).excitation(), dpc_roll(70).excitation()
     centre = [_mean_frequency(u) for u in (slow, quick)]
     return Figure(
-        "3.14",
-        "Record for identification: pulses and roll",
         _METHOD,
         _OPEN + " Here pulses of 0.4 to 2 s up to 10 kPa.",
         _record(found, GREATER[1], water=False),
@@ -289,8 +281,6 @@ def figure_3_15() -> Figure:
     over = _less_roll(ship, tank, gpc_roll(), gpc_roll())
     alike = _WAVES_RAD_S[np.abs(over) < 20]
     return Figure(
-        "3.15",
-        "Adaptive GPC on roll",
         _METHOD,
         _OPEN,
         (*_history_panels(found, tank), _over_waves({"hc 50": over})),

@@ -64,8 +64,6 @@ def figure_capsize() -> Figure:
     closest = float(bare[int(np.argmin(np.abs(bare - WEAK_NM)))])
     nearest = by_place[0.0][int(np.argmin(np.abs(by_place[0.0] - PASSIVE_NM)))]
     return Figure(
-        "capsize",
-        "Wave moments that capsize Patti-B (4.5)",
         "nonlinear model; the least capsizing amplitude, searched upwards in steps of "
         f"{FINE_NM:g} N m without a tank and {COARSE_NM:g} with it, {DURATION_S:.0f} s each",
         "The phase at which the wave starts, Lz, the friction and how long she must survive are "

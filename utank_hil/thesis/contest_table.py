@@ -25,8 +25,6 @@ def figure_contest() -> Figure:
     controlled = [largest[law, math.inf] for law in CONTROLLED]
     small = {law: largest[law, PUMPS_PA[-1]] for law in LAWS if law != NO_TANK}
     return Figure(
-        "contest",
-        "Who capsizes, and in what wave (4.5)",
         "nonlinear model, M cos(0.6 t) from rest for 300 s, laws sampled at 20 ms without delay; "
         "the greatest wave survived by bisection",
         "Lz, friction, pump and the laws' parameters are not given: Lz = 0, damping ratio 0.10, "

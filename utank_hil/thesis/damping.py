@@ -70,8 +70,6 @@ def figure_damping() -> Figure:
         pd[name] = float(answers[PASSIVE_TANK].roll.max() / answers[PD].roll.max()) - 1
     told = ", ".join(f"{name} {value:.3f}" for name, value in ratio.items())
     return Figure(
-        "damping",
-        "Gains of roll damping (4.5, 5.1)",
         "free decay of Patti-B on still water, nonlinear model; PD: greatest roll in waves of the "
         "linear first ship",
         "How damping is measured is not said, nor are amplitude, friction and the laws' numbers. "

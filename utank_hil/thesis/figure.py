@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Final
 
@@ -165,9 +165,6 @@ class Figure:
 
     Attributes
     ----------
-    key : str
-        Number of the figure, or name of the group.
-    title : str
     method : str
         How ours was made.
     open_points : str
@@ -180,8 +177,6 @@ class Figure:
     table : Table, optional
     """
 
-    key: str
-    title: str
     method: str
     open_points: str
     panels: tuple[Panel, ...] = ()
@@ -194,33 +189,14 @@ class Figure:
 def as_json(figure: Figure) -> dict[str, Any]:
     """Numbers, judgements and table of a figure, without its curves."""
     return {
-        "key": figure.key,
-        "title": figure.title,
-        "word": None,
         "method": figure.method,
         "open_points": figure.open_points,
         "rows": [
-            {
-                "quantity": row.quantity,
-                "unit": row.unit,
-                "printed": _finite(row.printed),
-                "ours": row.ours,
-                "deviation": row.deviation,
-                "reason": row.reason,
-            }
+            {**asdict(row), "printed": _finite(row.printed), "deviation": row.deviation}
             for row in figure.rows
         ],
-        "checks": [
-            {
-                "statement": check.statement,
-                "verdict": check.verdict.value,
-                "measured": check.measured,
-            }
-            for check in figure.checks
-        ],
-        "table": None
-        if figure.table is None
-        else {"headings": list(figure.table.headings), "rows": list(map(list, figure.table.rows))},
+        "checks": [asdict(check) for check in figure.checks],
+        "table": None if figure.table is None else asdict(figure.table),
     }
 
 
@@ -240,6 +216,12 @@ def printed_text(row: Mapping[str, Any] | Row) -> str:
             return f"{low:.5g} or more"
         return f"{low:.5g} to {high:.5g}" if low else f"less than {high:.5g}"
     return f"{printed:.5g}"
+
+
+def greatest(rows: Iterable[Row]) -> str:
+    """The greatest deviation of some rows as text; nothing where none is known."""
+    known = [row.deviation for row in rows if row.deviation is not None]
+    return f"{max(known, key=abs):+.2%}" if known else ""
 
 
 def peaks(y: npt.ArrayLike) -> int:

@@ -97,8 +97,6 @@ def figure_2_3() -> Figure:
     exact = _by_pump(SIMULATED, _MARKS)
     roll, _ = _simulated(SIMULATED)
     return Figure(
-        "2.3",
-        "Roll by pump pressure: magnitude",
         _METHOD,
         _OPEN,
         (
@@ -196,8 +194,6 @@ def figure_2_4() -> Figure:
     roll, _ = _simulated(SIMULATED)
     across = [float(np.ptp(y[(_RATIO > 0.8) & (_RATIO < 1.25)])) for y in family]
     return Figure(
-        "2.4",
-        "Roll by pump pressure: phase",
         _METHOD,
         _OPEN,
         (_phase_panel("Roll by the pump", family),),
@@ -224,8 +220,6 @@ def figure_2_5() -> Figure:
     tops = [float(y.max()) for y in family]
     everywhere = np.mean(np.diff(np.array(family), axis=0).max(axis=0) < 0)
     return Figure(
-        "2.5",
-        "Water by pump pressure: magnitude",
         _METHOD,
         _OPEN,
         (
@@ -260,8 +254,6 @@ def figure_2_6() -> Figure:
     # the phase falls but where ship and water swing as one
     rise = [float((y - np.minimum.accumulate(y)).max()) for y in family]
     return Figure(
-        "2.6",
-        "Water by pump pressure: phase",
         _METHOD,
         _OPEN,
         (_phase_panel("Tank angle by the pump", family),),

@@ -56,28 +56,26 @@ def _run(build: Callable[[], DirectFuzzyController]) -> Run:
 def figure_4_12() -> Figure:
     """Parameter lambda of (4.23)."""
     runs = {name: _run(law.controller) for name, law in _robust().items()}
-    return _figure("4.12", "Parameter λ of (4.23)", runs, 0, "λ")
+    return _figure(runs, 0, "λ")
 
 
 def figure_4_13() -> Figure:
     """Parameter theta of (4.23)."""
     runs = {name: _run(law.controller) for name, law in _robust().items()}
-    return _figure("4.13", "Parameter θ of (4.23)", runs, 1, "θ")
+    return _figure(runs, 1, "θ")
 
 
 def figure_4_16() -> Figure:
     """Parameter lambda of (4.20)."""
     runs = {name: _run(law.controller) for name, law in _small_gain().items()}
-    return _figure("4.16", "Parameter λ of (4.20)", runs, 0, "λ")
+    return _figure(runs, 0, "λ")
 
 
-def _figure(key: str, title: str, runs: dict[str, Run], column: int, symbol: str) -> Figure:
+def _figure(runs: dict[str, Run], column: int, symbol: str) -> Figure:
     records = {name: each.parameters[:, column] for name, each in runs.items()}
     bounded = all(bool((y >= 0).all() and np.isfinite(y).all()) for y in records.values())
     first = {name: _settled_s(runs[name].time_s, y) for name, y in records.items()}
     return Figure(
-        key,
-        f"{title}, wave moment {MIDDLE_NM / 1e3:.1f} kN m",
         METHOD,
         _OPEN,
         (

@@ -40,8 +40,6 @@ def figure_gains() -> Figure:
     both = [abs(row.deviation or 0.0) for row in rows if "(roll, level):" in row.quantity]
     as_printed, fitted = deviations(*AS_PRINTED), deviations(*FITTED)
     return Figure(
-        "gains",
-        "Printed gains of DPC and GPC (3.8)",
         "designed at 0.2 s: the laws on roll from the ARX(4) model recovered from them (docs/"
         "control.md), those on roll and tank angle from the ship with reservoirs of 25.2 m²",
         "Sample time, prediction horizon, friction of the tank and model are not given. They "
@@ -98,8 +96,6 @@ def figure_first_ship() -> Figure:
     ratios, _ = ship_ratios(ship, tank)
     critical = 2 * INERTIA_KG_M2 * ROLL_RAD_S
     return Figure(
-        "first-ship",
-        "Numbers of the first ship (3.7, 3.8)",
         "algebra",
         "The friction of the tank and the ship's stiffness k1 are not given; k1 = I w².",
         rows=(

@@ -80,8 +80,6 @@ def figure_3_6() -> Figure:
         ("Printed ship: both fed back", WHOLE, found["printed ship"]),
     )
     return Figure(
-        "3.6",
-        "Roll over frequency with PD, LQR, GPC and DPC",
         "sampled loop on the continuous ship, exact linear theory",
         _OPEN,
         (
@@ -171,8 +169,6 @@ def figure_3_7() -> Figure:
     worst = {w: max((name for name in each if name != PASSIVE), key=each.__getitem__)
              for w, each in late.items()}  # fmt: skip
     return Figure(
-        "3.7",
-        "Roll over time with PD, LQR, GPC and DPC",
         "sampled loop on the linear ship, simulated without bus",
         _OPEN + " Wave: 0.02 rad of effective slope at 0.5 rad/s from t = 0; 0.4 and 0.6 rad/s are "
         "judged beside it.",
@@ -213,8 +209,6 @@ def figure_3_8() -> Figure:
     roll_laws = [early[name] / late[name] for name in (GPC_ROLL, DPC_ROLL)]
     others = [early[name] / late[name] for name in (LQR, GPC_BOTH, DPC_BOTH)]
     return Figure(
-        "3.8",
-        "Pump pressure over time with LQR, GPC and DPC",
         "as 3.7",
         _OPEN + " Wave as in 3.7.",
         tuple(
@@ -278,8 +272,6 @@ def figure_3_9() -> Figure:
             )
         )
     return Figure(
-        "3.9",
-        "Control horizon of DPC (roll, level)",
         "sampled loop on the continuous ship, exact linear theory; p = 2, hp = hc + 2",
         "The horizons of the family are not known: 8 to 50 samples of 0.2 s. Ships as in 3.6.",
         tuple(panels),
@@ -325,8 +317,6 @@ def figure_3_10() -> Figure:
     without = [law for law in printed_order if law != LQR]
     same = [[law for law in each if law != LQR] == without for each in order.values()]
     return Figure(
-        "3.10",
-        "Roll reduced per pressure",
         "sampled loop on the continuous ship, exact linear theory",
         _OPEN + " Range and unit of the integral are not given: q from 0.01 to 2, and indices "
         "relative to DPC (roll).",

@@ -16,8 +16,6 @@ def figure_magnification() -> Figure:
     first, greater = (_peak(ship) for ship, _ in (AS_PRINTED, GREATER))
     boat = _peak(without_tank(PATTI_B).ship)
     return Figure(
-        "magnification",
-        "Magnification factors (introduction of chapter 2)",
         "linear roll without tank: 1 / (2 zeta sqrt(1 - zeta²))",
         "The ships of the cited figures are not named.",
         rows=(

@@ -41,8 +41,6 @@ def figure_4_5() -> Figure:
     same = np.allclose(degrees / degrees.sum(), of_law, rtol=1e-12)
     greatest = max(float(each.max()) for each in printed)
     return Figure(
-        "4.5",
-        "Membership functions",
         "formula",
         "The width sigma is not given: here neighbouring sets cross at one half. As printed, the "
         "exponent has no square and the centres are -c, -c/2 and 0; built are -c, 0 and c.",

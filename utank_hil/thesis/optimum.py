@@ -51,8 +51,6 @@ def figure_3_2() -> Figure:
     ratios = [best.frequency_ratio for column in family.values() for best in column]
     at_large = [column[-1].damping_ratio for column in family.values()]
     return Figure(
-        "3.2",
-        "Optimal frequency and damping ratio of the water",
         "min-max of the printed roll response over all wave frequencies",
         "Range of mass ratio, ship damping and coupling G1 are not given: varied from 0.01 to "
         f"0.12, 0 to 0.1 and {COUPLINGS[0]:g} to {COUPLINGS[-1]:g} (drawn: "
@@ -114,8 +112,6 @@ def figure_3_3() -> Figure:
     }
     tops = {share: float(y.max()) for share, y in family.items()}
     return Figure(
-        "3.3",
-        "Roll at the optimal frequency ratio",
         "closed form of 3.2",
         "Ship and dampings are not given: the first ship with a duct of her roll frequency "
         f"(mass ratio {ratios.mass_ratio:.3f}), 0.3, 1 and 3 times the optimum.",
@@ -159,8 +155,6 @@ def figure_3_4() -> Figure:
     ]
     least = float(fine[int(np.argmin(along))])
     return Figure(
-        "3.4",
-        "Roll at the optimal damping ratio",
         "closed form of 3.2",
         "Ship and frequency ratios are not given: as in 3.3, 0.85, the optimum and 1.15.",
         (

@@ -39,8 +39,6 @@ def figure_4_1() -> Figure:
     within = (_energy(model, rolls[None, :], rates[:, None]) < _energy(
         model, np.array(saddle), 0.0)) & (np.abs(rolls)[None, :] < saddle)  # fmt: skip
     return Figure(
-        "4.1",
-        "Phase plane without damping",
         "energy of the ship without tank; orbits by compiled simulation",
         "Nothing: the figure is taken from Jiang et al. (1996), here with the numbers of Patti-B.",
         (
@@ -102,8 +100,6 @@ def table_4_1() -> Figure:
     ship = PATTI_B.ship
     w = ship.natural_frequency_rad_s
     return Figure(
-        "table-4.1",
-        "Parameters of Patti-B (Table 4.1)",
         "algebra",
         "The added inertia's frequency is not given. Two rows are named b44; the units of both "
         "dampings are misprinted (errata).",

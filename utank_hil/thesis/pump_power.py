@@ -57,8 +57,6 @@ def figure_2_7() -> Figure:
     spread = float(np.ptp(found["the same, friction as (2.12)"][1]))
     names = list(ways)
     return Figure(
-        "2.7",
-        "Stimulator moment per pump power",
         "linear model, ship held still, pump at her roll frequency; apparent power, for a moment "
         "of 0.02 rad times the ship's stiffness",
         "The source gives neither ship, power (mean or of the amplitudes), moment nor how the mass "

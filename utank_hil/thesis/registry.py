@@ -65,6 +65,15 @@ class Entry:
     make: Callable[[], Figure] | None = None
     word: str = ""
 
+    @property
+    def heading(self) -> str:
+        """Number, if it has one, and title."""
+        return f"{self.key}  {self.title}" if self.key[0].isdigit() else self.title
+
+    def as_json(self) -> dict[str, str | None]:
+        """Key, title and word."""
+        return {"key": self.key, "title": self.title, "word": self.word or None}
+
 
 ENTRIES: Final = (
     Entry(
@@ -77,7 +86,7 @@ ENTRIES: Final = (
     Entry("2.5", "Water by pump pressure: magnitude", figure_2_5),
     Entry("2.6", "Water by pump pressure: phase", figure_2_6),
     Entry("2.7", "Stimulator moment per pump power", figure_2_7),
-    Entry("2.8", "Roll on still water", figure_2_8),
+    Entry("2.8", "Roll on still water: pump on at 0, off at 141 s", figure_2_8),
     Entry("3.1", "Phases of roll and water by waves", figure_3_1),
     Entry("tank-height", "Effect of the tank's height Lz (3.2)", figure_tank_place),
     Entry("3.2", "Optimal frequency and damping ratio of the water", figure_3_2),
@@ -110,11 +119,11 @@ ENTRIES: Final = (
     Entry("4.11", "Roll rate over roll, the greatest waves", figure_4_11),
     Entry("capsize", "Wave moments that capsize Patti-B (4.5)", figure_capsize),
     Entry("contest", "Who capsizes, and in what wave (4.5)", figure_contest),
-    Entry("4.12", "Parameter λ of (4.23)", figure_4_12),
-    Entry("4.13", "Parameter θ of (4.23)", figure_4_13),
-    Entry("4.14", "Roll over time with (4.20)", figure_4_14),
-    Entry("4.15", "Roll rate over roll with (4.20)", figure_4_15),
-    Entry("4.16", "Parameter λ of (4.20)", figure_4_16),
+    Entry("4.12", "Parameter λ of (4.23), wave moment 78.6 kN m", figure_4_12),
+    Entry("4.13", "Parameter θ of (4.23), wave moment 78.6 kN m", figure_4_13),
+    Entry("4.14", "Roll over time with (4.20), wave moment 78.6 kN m", figure_4_14),
+    Entry("4.15", "Roll rate over roll with (4.20), wave moment 78.6 kN m", figure_4_15),
+    Entry("4.16", "Parameter λ of (4.20), wave moment 78.6 kN m", figure_4_16),
     Entry("damping", "Gains of roll damping (4.5, 5.1)", figure_damping),
 )
 

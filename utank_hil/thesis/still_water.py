@@ -62,8 +62,6 @@ def figure_2_8() -> Figure:
         for begin in (OFF_S - 3 * _CYCLE_S, OFF_S + 0.5 * _CYCLE_S)
     )
     return Figure(
-        "2.8",
-        "Roll on still water: pump on at 0, off at 141 s",
         "nonlinear model, compiled simulation",
         "The source gives no ship, pressure or friction. Here the first ship with a duct sized for "
         "her roll frequency; the pressure is chosen for three degrees, the friction varied from "

@@ -91,8 +91,6 @@ def figure_4_6() -> Figure:
     """Histories in the wave that capsizes the ship without tank."""
     runs = _runs(WEAK_NM)
     return Figure(
-        "4.6",
-        f"Roll over time, wave moment {_kn(WEAK_NM)}",
         METHOD,
         OPEN,
         (_history("", runs),),
@@ -116,8 +114,6 @@ def figure_4_7() -> Figure:
     """The same in the phase plane."""
     runs = _runs(WEAK_NM)
     return Figure(
-        "4.7",
-        f"Roll rate over roll, wave moment {_kn(WEAK_NM)}",
         METHOD,
         OPEN,
         (_plane("", runs),),
@@ -147,8 +143,6 @@ def figure_4_8() -> Figure:
     """Histories in the middle wave."""
     runs = _runs(MIDDLE_NM)
     return Figure(
-        "4.8",
-        f"Roll over time, wave moment {_kn(MIDDLE_NM)}",
         METHOD,
         OPEN,
         (_history("", runs),),
@@ -167,8 +161,6 @@ def figure_4_9() -> Figure:
     """The same in the phase plane."""
     runs = _runs(MIDDLE_NM)
     return Figure(
-        "4.9",
-        f"Roll rate over roll, wave moment {_kn(MIDDLE_NM)}",
         METHOD,
         OPEN,
         (_plane("", runs),),
@@ -183,8 +175,6 @@ def figure_4_10() -> Figure:
     first_minute = _early_share()
     heel, where = _heel()
     return Figure(
-        "4.10",
-        "Roll over time, the greatest waves",
         METHOD,
         OPEN + _CAPTION,
         (_history(_kn(PASSIVE_NM), passive), _history(_kn(STRONG_NM), strong)),
@@ -261,8 +251,6 @@ def figure_4_11() -> Figure:
     passive, strong = _runs(PASSIVE_NM), _runs(STRONG_NM)
     fuzzy = strong.pop("fuzzy (4.23)")
     return Figure(
-        "4.11",
-        "Roll rate over roll, the greatest waves",
         METHOD,
         OPEN
         + _CAPTION
@@ -292,8 +280,6 @@ def figure_4_14() -> Figure:
         for law, survived in zip((SMALL_GAIN, ROBUST), fuzzy_nm, strict=True)
     }
     return Figure(
-        "4.14",
-        f"Roll over time with (4.20), wave moment {_kn(MIDDLE_NM)}",
         METHOD,
         OPEN,
         (_history("", runs),),
@@ -320,8 +306,6 @@ def figure_4_15() -> Figure:
     """The same in the phase plane."""
     runs = _small_gain_runs()
     return Figure(
-        "4.15",
-        f"Roll rate over roll with (4.20), wave moment {_kn(MIDDLE_NM)}",
         METHOD,
         OPEN,
         (_plane("", runs),),

@@ -36,8 +36,6 @@ def figure_tank_place() -> Figure:
         higher = Verdict.HOLDS if (np.diff(top) > 0).all() else Verdict.PARTLY
     acting = [_couplings(ship, replace(tank, lz_m=z)) for z in (PLACES_M[0], PLACES_M[-1])]
     return Figure(
-        "tank-height",
-        "Effect of the tank's height Lz",
         "linear model; moments by difference of the model at Lz and at 0",
         "Only the trend is described. The first ship with a duct of her roll frequency and a "
         f"damping ratio of {_DAMPING:g}; Lz from -10 m (above the centre of gravity) to 5 m, also "

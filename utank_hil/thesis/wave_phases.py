@@ -41,8 +41,6 @@ def figure_3_1() -> Figure:
     slow, own = _parts(ship, tank, 0.05), _parts(ship, tank, 1.0)
     labels = [f"friction {friction:g}" for friction in FRICTIONS]
     return Figure(
-        "3.1",
-        "Phases of roll and water by waves",
         "closed form (2.24), corrected",
         "Ship, friction and tuning are not given: the first ship with a duct of her own roll "
         "frequency, friction varied from 0.05 to 0.4 (numbers at 0.1), and with the printed duct.",
