@@ -11,7 +11,6 @@ import numpy as np
 from firmware_sim.report_tables import tables
 from firmware_sim.scenario import PASSIVE
 from utank_hil.arrays import FloatArray
-from utank_hil.commands.check_report import ship_line
 from utank_hil.commands.report_parts import (
     Report,
     ReportKind,
@@ -19,6 +18,7 @@ from utank_hil.commands.report_parts import (
     printed,
     roll_figure,
 )
+from utank_hil.commands.ship_report import ship_line
 from utank_hil.configuration import Vessel
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.telemetry import read_recording

@@ -9,6 +9,7 @@ from rich.table import Table as RichTable
 
 from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.scenario import PASSIVE
+from utank_hil.commands.tables import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 NO_TANK: Final = "no tank"
@@ -28,7 +29,7 @@ def tables(told: Told) -> list[RichTable]:
 
 def motion_table(told: Told) -> RichTable:
     """Table of how much the ship rolled; runs that do not count stand at its end."""
-    table = _table(
+    table = new_table(
         f"{told['scenario']} · {told['mode']} · seed {told['seed']}",
         "roll\nRMS °",
         "signif.\n°",
@@ -84,7 +85,7 @@ def pump_table(told: Told) -> RichTable:
             ("power\npeak", "power_peak_w", "W"),
         )
     ]
-    table = _table(
+    table = new_table(
         "Pump and bus",
         *(f"{heading} {unit}" for heading, unit, _ in columns),
         "level\npeak m",
@@ -126,7 +127,7 @@ def on_board_table(told: Told) -> RichTable:
     """Table of what the roll is like for people at the scenario's place."""
     judged = told["on_board"]
     levels, place = judged["levels_rad"], judged["place"]
-    table = _table(
+    table = new_table(
         "On board",
         *(f"above\n{math.degrees(levels[index]):g}°" for index in _SHOWN),
         "lateral\nRMS g",
@@ -155,7 +156,7 @@ def on_board_table(told: Told) -> RichTable:
 
 def retuning_table(told: Told) -> RichTable:
     """Table of what retuning found and gained; without rows where nothing retuned."""
-    table = _table(
+    table = new_table(
         "Retuning",
         "retuned\nat s",
         "roll RMS\nbefore °",
@@ -201,14 +202,6 @@ def _retuning_cells(retuning: Told) -> tuple[str, ...]:
 
 def _percent(share: float | None) -> str:
     return "" if share is None else f"{share:.1%}"
-
-
-def _table(title: str, *headings: str) -> RichTable:
-    table = RichTable(title=title)
-    table.add_column("", no_wrap=True)
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
-    return table
 
 
 def _roll_cells(roll: Told) -> tuple[str, ...]:

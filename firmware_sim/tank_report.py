@@ -10,6 +10,7 @@ from rich.table import Table
 from utank_hil.analysis.tank_design import TankFigures
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
 from utank_hil.analysis.tank_sizing import TankCost
+from utank_hil.commands.tables import new_table
 from utank_hil.dynamics.water import water_moments
 
 Rows = list[tuple[str, str]]
@@ -82,9 +83,9 @@ def roll_rows(found: RollPrediction) -> Rows:
 
 def loading_table(points: Sequence[LoadingPoint]) -> Table:
     """Roll at other loadings."""
-    table = Table(title="Other loadings: the same tank and law, roll RMS in °")
-    for heading in ("roll period", "without tank", "passive tank", "active tank"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = "Other loadings: the same tank and law, roll RMS in °"
+    figures = ("roll period", "without tank", "passive tank", "active tank")
+    table = new_table(title, *figures, names=())
     for point in points:
         rolls = (point.without_tank_rad, point.passive_rad, point.active_rad)
         cells = ("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls)
@@ -100,15 +101,13 @@ def loading_json(points: Sequence[LoadingPoint]) -> list[dict[str, Any]]:
 def sweep_tables(points: Sequence[SweepPoint]) -> list[Table]:
     """Roll of other tanks, passive and active: by share of stability and by frequency."""
     tables = []
+    ratios = sorted({point.frequency_ratio for point in points})
     for name in ("passive", "active"):
-        table = Table(
-            title=f"Other tanks, {name}: roll RMS in °",
+        table = new_table(
+            f"Other tanks, {name}: roll RMS in °",
+            *(f"{ratio:g}" for ratio in ratios),
             caption="by stability taken, and by the water's frequency per roll frequency",
         )
-        table.add_column("")
-        ratios = sorted({point.frequency_ratio for point in points})
-        for ratio in ratios:
-            table.add_column(f"{ratio:g}", justify="right", no_wrap=True)
         for share in sorted({point.stability_share for point in points}):
             row = {p.frequency_ratio: p for p in points if p.stability_share == share}
             water_t = [water_moments(point.tank, 0.0).mass_kg / 1e3 for point in row.values()]

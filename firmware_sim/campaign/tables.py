@@ -6,6 +6,7 @@ from typing import Any
 from rich.table import Table
 
 from firmware_sim.report_tables import NO_TANK
+from utank_hil.commands.tables import new_table
 
 Figure = dict[str, Any]
 
@@ -22,16 +23,13 @@ def interval(figure: Figure, scale: float, digits: int) -> str:
 def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
     """A row for each run of each group."""
     power = _power(groups)
-    table = Table(title=title, caption="mean ± 95 % of the mean; rolls in degrees, RMS")
-    table.add_column("run", no_wrap=True)
-    for key in _short_keys(groups):
-        table.add_column(key, no_wrap=True)
     marked = any(run["marked"] for group in groups for run in group["runs"].values())
-    for heading in (
+    figures = (
         "cases", "roll", "below\npassive %", "greatest\nroll °", "level\npeak m",
         f"power\n{power[1]}", *(["not\ncounted"] if marked else []),
-    ):  # fmt: skip
-        table.add_column(heading, justify="right", no_wrap=True)
+    )  # fmt: skip
+    caption = "mean ± 95 % of the mean; rolls in degrees, RMS"
+    table = new_table(title, *figures, names=("run", *_short_keys(groups)), caption=caption)
     for group in groups:
         for run, found in group["runs"].items():
             marks = [f"{count} {mark}" for mark, count in found["marked"].items()]
@@ -53,25 +51,19 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
 
 def pairs_table(groups: list[dict[str, Any]]) -> Table:
     """What each law is worth beside the others, in the same waves."""
-    table = Table(title="In the same waves, pair by pair", caption="mean ± 95 % of the mean")
-    for heading in ("run", "against", *_short_keys(groups)):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("pairs", "roll RMS below it %", "difference °"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = new_table(
+        "In the same waves, pair by pair",
+        *("pairs", "roll RMS below it %", "difference °"),
+        names=("run", "against", *_short_keys(groups)),
+        caption="mean ± 95 % of the mean",
+    )
     for group in groups:
-        for pair in group["paired"]:
+        pairs = [(pair["against"], pair) for pair in group["paired"]]
+        pairs += [("first row's", pair) for pair in group["beside_first"]]
+        for against, pair in pairs:
             table.add_row(
                 pair["run"],
-                pair["against"],
-                *(_short(value) for value in group["parameters"].values()),
-                str(pair["share_below"]["cases"]),
-                interval(pair["share_below"], 100, 1),
-                interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
-            )
-        for pair in group["beside_first"]:
-            table.add_row(
-                pair["run"],
-                "first row's",
+                against,
                 *(_short(value) for value in group["parameters"].values()),
                 str(pair["share_below"]["cases"]),
                 interval(pair["share_below"], 100, 1),

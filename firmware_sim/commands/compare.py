@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from utank_hil.commands.common import Json, fail, shown
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 
 if TYPE_CHECKING:
     from firmware_sim.comparison.difference import Comparison, Difference
@@ -82,14 +82,12 @@ def _recording(place: Path) -> Path:
 
 
 def _table(reference: Path, found: list["Comparison"]) -> Table:
-    table = Table(
-        title=f"{shown(Path(found[0].source))} against {shown(reference)}",
+    table = new_table(
+        f"{shown(Path(found[0].source))} against {shown(reference)}",
+        *("first", "this", "difference", "%", "pairs"),
+        names=("run", *found[0].parameters, "figure"),
         caption="difference ± half width of its 95 % interval",
     )
-    for heading in ("run", *found[0].parameters, "figure"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("first", "this", "difference", "%", "pairs"):
-        table.add_column(heading, justify="right", no_wrap=True)
     for each in found:
         for name, figure in each.figures.items():
             values = [str(value) for value in each.parameters.values()]

@@ -16,7 +16,7 @@ from firmware_sim.commands.shipped_scenarios import shipped_scenario
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, shown
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import ControllerConfig
 from utank_hil.provenance import describe
 
@@ -102,9 +102,8 @@ def controller(
 
 
 def _trade_table(result: "Trade", title: str) -> Table:
-    table = Table(title=title, caption="RMS by linear prediction, without limits of pump and tank")
-    for heading in (
-        result.varied.replace(" ", "\n"),
+    table = new_table(
+        title,
         "roll\n°",
         "below\npassive",
         "pressure\nkPa",
@@ -112,8 +111,9 @@ def _trade_table(result: "Trade", title: str) -> Table:
         "sensi-\ntivity",
         "eigen-\nvalue",
         "",
-    ):
-        table.add_column(heading, justify="right", no_wrap=True)
+        names=(result.varied.replace(" ", "\n"),),
+        caption="RMS by linear prediction, without limits of pump and tank",
+    )
     passive = result.passive
     table.add_row(
         "passive",

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
 from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, shown
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import Tank
 from utank_hil.provenance import describe
@@ -167,11 +167,9 @@ def _table(
     from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost
 
-    table = Table(title=f"Tank of {escape(vessel.name)}", caption=escape(caption))
-    table.add_column("")
+    table = new_table(f"Tank of {escape(vessel.name)}", *tanks, caption=escape(caption))
     columns = []
     for name, tank in tanks.items():
-        table.add_column(name, justify="right")
         rows = [
             *figure_rows(tank_figures(vessel.ship, tank)),
             *cost_rows(tank_cost(vessel.ship, tank)),

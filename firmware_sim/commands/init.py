@@ -16,7 +16,7 @@ from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_row
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, shown
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 from utank_hil.parameters import ParameterError
 
 if TYPE_CHECKING:
@@ -228,14 +228,10 @@ def _table(project: "StarterProject") -> Table:
     """Tank, pump, law and expected roll."""
     sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
     assert pump is not None
-    table = Table(
-        show_header=False,
-        title=escape(project.vessel.name),
-        caption=f"roll: linear prediction in a sea of {project.sea['hs_m']:g} m, "
-        f"{project.sea['tp_s']:g} s",
-    )
-    table.add_column()
-    table.add_column(justify="right")
+    sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
+    caption = f"roll: linear prediction in a sea of {sea}"
+    table = new_table(escape(project.vessel.name), "", caption=caption)
+    table.show_header = False
     ship, tank = project.vessel.ship, project.vessel.tank
     rows = [
         ("roll period", f"{2 * math.pi / ship.natural_frequency_rad_s:.2f} s"),

@@ -34,6 +34,7 @@ def check(
     **Example:** utank-hil check configs/controllers/gpc.yaml
     """
     from utank_hil.commands import check_report as report
+    from utank_hil.commands.ship_report import print_ship, ship_json
 
     loaded: BaseModel
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
@@ -43,9 +44,9 @@ def check(
         fail(error)
     if kind == "ship":
         loaded = load(config, Vessel)
-        content = report.ship_json(loaded)
+        content = ship_json(loaded)
         if not json_:
-            report.print_ship(loaded)
+            print_ship(loaded)
     elif kind in collections:
         collection = load(config, collections[kind])
         judged = {

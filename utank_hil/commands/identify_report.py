@@ -12,7 +12,7 @@ from rich.table import Table
 
 from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import shown
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -116,7 +116,7 @@ def _waves(found: Identification) -> str:
 
 def _ship_table(found: Identification, task: RetuningTask) -> Table:
     fit = found.fit
-    table = _table("Ship and tank", ("", "configured", "identified", "change", "± 95 %"))
+    table = new_table("Ship and tank", "configured", "identified", "change", "± 95 %")
     before = task.plant
     inertia, stiffness, damping, tank = fit.deviation.tolist()
     rows = (
@@ -151,9 +151,12 @@ def _ship_table(found: Identification, task: RetuningTask) -> Table:
 
 def _mode_table(found: Identification, task: RetuningTask) -> Table:
     """Modes of ship and tank together, with physics and without."""
-    table = _table(
+    table = new_table(
         "Modes of ship and tank together",
-        ("", "configured", "identified", "without\nphysics", "± 95 %"),
+        "configured",
+        "identified",
+        "without\nphysics",
+        "± 95 %",
     )
     configured = _modes(task.plant.ship, task.plant.tank)
     fitted = _modes(found.fit.ship, found.fit.tank)
@@ -187,10 +190,10 @@ def _modes(ship: RollShip, tank: Tank) -> list[tuple[float, float]]:
 
 def _check_table(found: Identification, task: RetuningTask) -> Table:
     validation, limits = found.validation, task.limits
-    table = _table(
+    table = new_table(
         "On held-out data",
-        ("", "one-step\nfit", "simulation\nfit", "errors\ncorrelated", "if\nwhite",
-         "with the\ninput", "if\napart"),
+        "one-step\nfit", "simulation\nfit", "errors\ncorrelated", "if\nwhite",
+         "with the\ninput", "if\napart",
     )  # fmt: skip
     for column, name in enumerate(task.design.predictor.measured):
         table.add_row(
@@ -211,10 +214,3 @@ def _check_table(found: Identification, task: RetuningTask) -> Table:
 
 def _probability(value: float) -> str:
     return "< 0.001" if value < 1e-3 else f"{value:.3f}"
-
-
-def _table(title: str, headings: tuple[str, ...]) -> Table:
-    table = Table(title=title)
-    for heading in headings:
-        table.add_column(heading, justify="right" if heading else "left")
-    return table

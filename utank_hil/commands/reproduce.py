@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, shown
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.tables import new_table, print_table
 from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
 
@@ -110,9 +110,11 @@ def _summary(
     entries: tuple[Entry, ...], made: dict[str, Figure], seconds: dict[str, float]
 ) -> Table:
     """One line a figure."""
-    table = Table(title=f"{len(made)} of {len(ENTRIES)} figures and groups of numbers")
-    for heading in ("", "figure", "greatest\ndeviation", "holds", "in part", "does\nnot", "s"):
-        table.add_column(heading, justify="left" if heading in ("", "figure") else "right")
+    table = new_table(
+        f"{len(made)} of {len(ENTRIES)} figures and groups of numbers",
+        *("greatest\ndeviation", "holds", "in part", "does\nnot", "s"),
+        names=("", "figure"),
+    )
     for entry in entries:
         figure = made.get(entry.key)
         if figure is None:

@@ -1,5 +1,6 @@
 """Tables on terminals of any width."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from rich.console import Console
@@ -7,6 +8,18 @@ from rich.measure import Measurement
 from rich.table import Table
 
 UNLIMITED: Final = 10_000
+
+
+def new_table(
+    title: str | None, *figures: str, names: Iterable[str] = ("",), caption: str | None = None
+) -> Table:
+    """A table without rows: columns of names to the left, of figures to the right."""
+    table = Table(title=title, caption=caption)
+    for heading in names:
+        table.add_column(heading, no_wrap=True)
+    for heading in figures:
+        table.add_column(heading, justify="right", no_wrap=True)
+    return table
 
 
 def print_table(console: Console, table: Table) -> None:

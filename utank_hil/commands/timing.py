@@ -2,14 +2,14 @@
 
 from rich.table import Table
 
+from utank_hil.commands.tables import new_table
 from utank_hil.runtime import LoopStatistics
 
 
 def timing_table(loops: dict[str, LoopStatistics]) -> Table:
     """Table of how real-time loops kept their time, in microseconds."""
-    table = Table(title="Deadlines, µs")
-    for heading in ("", "", "p50", "p99", "p99.9", "max", "ticks", "overruns\nskipped"):
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
+    figures = ("p50", "p99", "p99.9", "max", "ticks", "overruns\nskipped")
+    table = new_table("Deadlines, µs", *figures, names=("", ""))
     for name, loop in loops.items():
         for what, histogram in (("wake-up late", loop.lateness), ("tick lasts", loop.duration)):
             summary = histogram.summary()
