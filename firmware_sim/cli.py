@@ -3,8 +3,6 @@
 from utank_hil.commands.interruptible import quietly_interruptible
 
 with quietly_interruptible():
-    import json
-    import sys
     from dataclasses import asdict
     from pathlib import Path
     from typing import Annotated
@@ -37,6 +35,7 @@ with quietly_interruptible():
             load,
             new_app,
             notes,
+            print_json,
         )
         from utank_hil.commands.exit_codes import ExitCode
         from utank_hil.commands.tables import print_table
@@ -112,7 +111,7 @@ def firmware_sim(
             "reported_pressure_share": external and external.reported_share,
             "loop": statistics.summary(),
         }
-        sys.stdout.write(json.dumps(summary) + "\n")
+        print_json(summary)
         return
     console = Console(highlight=False)
     print_table(console, timing_table({"ship": statistics}))

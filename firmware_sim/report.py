@@ -17,6 +17,7 @@ from firmware_sim.run import COLUMNS, Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
+from utank_hil.commands.common import finite
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
@@ -79,7 +80,7 @@ def as_json(
         "exit_code": exit_code(result),
         "endings": endings(result),
         "limits_passed": passed_limits(result),
-        "no_tank": asdict(bare) | {"capsized_s": _finite(result.without_tank_capsized_s)},
+        "no_tank": asdict(bare) | {"capsized_s": finite(result.without_tank_capsized_s)},
         "on_board": on_board_json(result),
         "runs": [
             {
@@ -90,7 +91,7 @@ def as_json(
                 "rows": result.rows_compared(run),
                 "expected_rows": result.expected_rows,
                 "end_s": run.end_s,
-                "capsized_s": _finite(run.capsized_s),
+                "capsized_s": finite(run.capsized_s),
                 "strikes": run.strikes,
                 "max_strike_impulse_nms": run.max_strike_impulse_nms,
                 "pump_speed_rad_s": run.pump_speed_rad_s,
@@ -107,11 +108,6 @@ def as_json(
         ],
         "files": {name: str(path) for name, path in files.items()},
     }
-
-
-def _finite(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if math.isfinite(value) else None
 
 
 def _retuning_json(result: BenchResult, run: Run) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ from rich.table import Table
 from utank_hil.analysis.tank_design import TankFigures
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
 from utank_hil.analysis.tank_sizing import TankCost
+from utank_hil.commands.common import finite
 from utank_hil.commands.tables import new_table
 from utank_hil.dynamics.water import water_moments
 
@@ -130,10 +131,7 @@ def sweep_json(points: Sequence[SweepPoint]) -> list[dict[str, Any]]:
             "stability_share": point.stability_share,
             "frequency_ratio": point.frequency_ratio,
             "mass_ratio": point.mass_ratio,
-            "tank": {
-                name: value if math.isfinite(value) else None
-                for name, value in asdict(point.tank).items()
-            },
+            "tank": finite(asdict(point.tank)),
             "prediction": prediction_json(point.prediction),
         }
         for point in points

@@ -1,8 +1,6 @@
 """What tools print: one JSON object, or the same figures as tables."""
 
 import argparse
-import json
-import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
@@ -11,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from utank_hil.commands.common import print_json
 from utank_hil.commands.tables import print_table
 
 WIDTH: Final = 160  # of what goes to a file
@@ -31,18 +30,10 @@ def command_line(text: str | None) -> argparse.ArgumentParser:
 def show(figures: Any, arguments: argparse.Namespace) -> None:
     """Print figures, as JSON with ``arguments.json``; a number that is not finite becomes null."""
     if arguments.json:
-        sys.stdout.write(json.dumps(_finite(figures), allow_nan=False) + "\n")
+        print_json(figures)
         return
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     _show("", figures, console)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _show(title: str, figures: Any, console: Console) -> None:

@@ -1,7 +1,5 @@
 """``utank-hil bench``: a controller quiets a rolling ship."""
 
-import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,6 +20,7 @@ from utank_hil.commands.common import (
     load,
     notes,
     prepare_out,
+    print_json,
     shown,
 )
 from utank_hil.commands.exit_codes import ExitCode
@@ -127,7 +126,7 @@ def bench(
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
     told = as_json(result, files, about)
     if json_:
-        sys.stdout.write(json.dumps(told) + "\n")
+        print_json(told)
     else:
         console = Console()
         for table in tables(told):

@@ -1,7 +1,5 @@
 """``utank-hil campaign``: many cases of a scenario, on all cores or a cluster."""
 
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +8,17 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.common import OUT, Json, fail, fail_with, lead_on, notes, prepare_out, shown
+from utank_hil.commands.common import (
+    OUT,
+    Json,
+    fail,
+    fail_with,
+    lead_on,
+    notes,
+    prepare_out,
+    print_json,
+    shown,
+)
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import print_table
 from utank_hil.configuration import ConfigError
@@ -74,7 +82,7 @@ def campaign(
     store.write_json(SUMMARY, content)
     draw(results, groups, folder / PICTURE)
     if json_:
-        sys.stdout.write(json.dumps(content) + "\n")
+        print_json(content)
     else:
         _print(loaded, groups, failed)
         console = Console()

@@ -1,8 +1,6 @@
 """``utank-hil compare``: what differs between runs, recordings or campaigns."""
 
-import json
 import math
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -12,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.commands.common import Json, fail, shown
+from utank_hil.commands.common import Json, fail, print_json, shown
 from utank_hil.commands.tables import new_table, print_table
 
 if TYPE_CHECKING:
@@ -60,7 +58,7 @@ def compare(
         fail(error)
     if json_:
         content = {"reference": str(reference), "comparisons": [asdict(each) for each in found]}
-        sys.stdout.write(json.dumps(content) + "\n")
+        print_json(content)
         return
     console = Console()
     for source in dict.fromkeys(each.source for each in found):

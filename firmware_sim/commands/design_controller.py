@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +14,7 @@ from rich.table import Table
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
-from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, shown
+from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, print_json, shown
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import ControllerConfig
 from utank_hil.provenance import describe
@@ -89,7 +88,7 @@ def controller(
     }
     files["figures"].write_text(json.dumps(figures, indent=2) + "\n")
     if json_:
-        sys.stdout.write(json.dumps(figures) + "\n")
+        print_json(figures)
         return
     console = Console(highlight=False)
     print_table(console, _trade_table(result, title))

@@ -1,7 +1,6 @@
 """``utank-hil design tank``: which tank for a ship in a sea."""
 
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
-from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, shown
+from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json, shown
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import Tank
@@ -73,7 +72,7 @@ def tank(
             fail(f"no shipped scenario is for {loaded.name}: say with --scenario which sea counts")
         figures |= {name: _figures(loaded, each, None) for name, each in tanks.items()}
         if json_:
-            sys.stdout.write(json.dumps(figures) + "\n")
+            print_json(figures)
             return
         print_table(console, _table(loaded, tanks, {}))
         console.print("Name a sea with --scenario for the roll to be expected.")
@@ -103,7 +102,7 @@ def tank(
     }
     files["figures"].write_text(json.dumps(figures, indent=2) + "\n")
     if json_:
-        sys.stdout.write(json.dumps(figures) + "\n")
+        print_json(figures)
         return
     print_table(console, _table(loaded, tanks, found, f"roll: linear prediction for {name}"))
     if left_out := _left_out(loaded.ship):

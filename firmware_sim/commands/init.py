@@ -1,8 +1,6 @@
 """``utank-hil init``: a project for a ship of one's own."""
 
-import json
 import math
-import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
@@ -14,7 +12,7 @@ from rich.table import Table
 
 from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
-from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, shown
+from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, print_json, shown
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.parameters import ParameterError
@@ -134,7 +132,7 @@ def init(
         project = make_starter(ship, room, gm_loss, hs, tp)
     except (TankImpossibleError, NoLawError) as error:
         if json_:
-            sys.stdout.write(json.dumps({"possible": False, "reason": str(error)}) + "\n")
+            print_json({"possible": False, "reason": str(error)})
         notes.print("[red]no tank:[/red]", escape(str(error)), soft_wrap=True)
         raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
@@ -149,7 +147,7 @@ def init(
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
         told = {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
-        sys.stdout.write(json.dumps(told) + "\n")
+        print_json(told)
         return
     console = Console(highlight=False)
     print_table(console, _table(project))

@@ -1,7 +1,5 @@
 """``utank-hil check``: is a configuration fit to be used, and how robust are its laws."""
 
-import json
-import sys
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +8,7 @@ import typer
 from pydantic import BaseModel
 from rich.console import Console
 
-from utank_hil.commands.common import Json, fail, lead_on, load, shown, warnings_of
+from utank_hil.commands.common import Json, fail, lead_on, load, print_json, shown, warnings_of
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
 from utank_hil.configuration.controller import ControllerConfig
@@ -64,7 +62,7 @@ def check(
             report.print_controller(controller)
     if json_:
         unusual = [str(warning) for warning in warnings_of(loaded, config)]
-        sys.stdout.write(json.dumps({"kind": kind, **content, "warnings": unusual}) + "\n")
+        print_json({"kind": kind, **content, "warnings": unusual})
     if not content.get("accepted", True):
         raise typer.Exit(ExitCode.REFUSED)
     if not json_:

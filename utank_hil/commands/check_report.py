@@ -9,6 +9,7 @@ from rich.markup import escape
 
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.loop.robustness import Robustness
+from utank_hil.commands.common import finite
 from utank_hil.commands.gate import JudgedLaw
 from utank_hil.commands.remedy import remedy
 from utank_hil.commands.ship_report import ship_figures, ship_line
@@ -41,8 +42,8 @@ def controller_json(judged: JudgedLaw) -> dict[str, Any]:
         "law": config.law.kind,
         "at_rest": _at_rest(judged.law),
         "dissipates": judged.law.dissipates,
-        "limits": _finite(asdict(config.limits)),
-        "robustness": None if report is None else _finite(asdict(report)),
+        "limits": finite(asdict(config.limits)),
+        "robustness": None if report is None else finite(asdict(report)),
         "delay_margin_searched_s": None if report is None else _searched_s(judged.law),
         "failures": list(judged.failures),
         "remedy": remedy(judged),
@@ -211,13 +212,3 @@ def _at_rest(law: BuiltLaw) -> str | None:
         return None
     learning = " with the parameters it starts from" if law.adapts else ""
     return f"The law is nonlinear: these are the margins of its slope at rest{learning}."
-
-
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    """JSON has no infinity: an unlimited value is null."""
-    return {
-        name: _finite(value)
-        if isinstance(value, dict)
-        else (value if math.isfinite(value) else None)
-        for name, value in values.items()
-    }

@@ -1,11 +1,13 @@
 """What the commands share: loading, failing, telling."""
 
+import json
+import math
 import os
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Final, NoReturn, TypeVar
+from typing import Annotated, Any, Final, NoReturn, TypeVar
 
 import typer
 from pydantic import BaseModel
@@ -56,6 +58,20 @@ Duration = Annotated[
 
 # progress, notes and errors; standard output is for results
 notes: Final = Console(stderr=True, highlight=False)
+
+
+def finite(value: Any) -> Any:
+    """The same for JSON, which has no infinity: a number that is none is null."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def print_json(content: Mapping[str, Any]) -> None:
+    """Print the one JSON object that ``--json`` promises."""
+    sys.stdout.write(json.dumps(finite(content), allow_nan=False) + "\n")
 
 
 def new_app(

@@ -1,15 +1,13 @@
 """``utank-hil export``: frames or signals of a recording for other programs."""
 
-import json
 import os
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from utank_hil.commands.common import Json, fail, notes, shown
+from utank_hil.commands.common import Json, fail, notes, print_json, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of
@@ -64,7 +62,7 @@ def export(
     except (OSError, ValueError) as error:
         fail(error)
     if json_:
-        sys.stdout.write(json.dumps({"file": str(to), unit: count}) + "\n")
+        print_json({"file": str(to), unit: count})
     else:
         notes.print(f"{shown(to)}: {count} {unit}", soft_wrap=True)
 

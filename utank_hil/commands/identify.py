@@ -1,8 +1,6 @@
 """``utank-hil identify``: from a recording to a model, and to a configuration made for it."""
 
-import json
 import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +8,7 @@ import typer
 from rich.console import Console
 
 from utank_hil.assembly import retuning_task
-from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out
+from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.identified import (
     CONTROLLER,
@@ -101,7 +99,7 @@ def identify_log(
     except IdentificationError as error:
         notes.print(f"[red]refused:[/red] {error}", soft_wrap=True)
         if json_:
-            sys.stdout.write(json.dumps({"accepted": False, "reasons": [str(error)]}) + "\n")
+            print_json({"accepted": False, "reasons": [str(error)]})
         raise typer.Exit(ExitCode.REFUSED) from None
     answer = judge(record, found, task)
     about = describe("identify", loaded, out, options=context.params)
@@ -111,7 +109,7 @@ def identify_log(
         fit = found.fit
         files.update(write_identified(out, loaded.vessel, fit.ship, fit.tank, content))
     if json_:
-        sys.stdout.write(json.dumps(about | figures(found, answer, files)) + "\n")
+        print_json(about | figures(found, answer, files))
     else:
         print_report(Console(highlight=False), found, task, answer, files)
     if not isinstance(answer, Candidate):

@@ -10,8 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from utank_hil.arrays import FloatArray
-from utank_hil.commands.common import shown
+from utank_hil.commands.common import finite, shown
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
@@ -53,8 +52,8 @@ def figures(
         "later_s": fit.extra_delay_s.tolist(),
         "pressure_over_command": fit.pressure_gain,
         "dispersion": fit.dispersion,
-        "held_out_fit": _finite(validation.one_step_fit),
-        "simulation_fit": _finite(validation.simulation_fit),
+        "held_out_fit": finite(validation.one_step_fit.tolist()),
+        "simulation_fit": finite(validation.simulation_fit.tolist()),
         "error_correlation": abs(validation.residual_correlation).max(axis=0).tolist(),
         "whiteness_probability": validation.whiteness_probability.tolist(),
         "input_correlation": abs(validation.input_correlation).max(axis=(0, 2)).tolist(),
@@ -74,11 +73,6 @@ def _mode_figures(found: ModalConfidence) -> list[dict[str, float]]:
     }
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]
-
-
-def _finite(values: FloatArray) -> list[float | None]:
-    """JSON has no infinity."""
-    return [value if math.isfinite(value) else None for value in values.tolist()]
 
 
 def print_report(

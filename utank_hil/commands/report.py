@@ -1,7 +1,5 @@
 """``utank-hil report``: a run as one page that can be sent."""
 
-import json
-import sys
 import tempfile
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -9,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from utank_hil.commands.common import Json, fail, notes, shown
+from utank_hil.commands.common import Json, fail, notes, print_json, shown
 
 if TYPE_CHECKING:
     from utank_hil.commands.report_parts import Report, ReportKind
@@ -42,7 +40,7 @@ def report(
         fail(error)
     if json_:
         result: dict[str, Any] = {"page": str(written), "bytes": written.stat().st_size}
-        sys.stdout.write(json.dumps(result) + "\n")
+        print_json(result)
     else:
         notes.print(f"report: {shown(written)}", soft_wrap=True)
 

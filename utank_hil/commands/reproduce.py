@@ -1,7 +1,6 @@
 """``utank-hil reproduce``: the source thesis shown again, figure by figure."""
 
 import json
-import sys
 import time
 from pathlib import Path
 from typing import Annotated, Final
@@ -11,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, shown
+from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, print_json, shown
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
@@ -58,7 +57,7 @@ def reproduce(
     }
     files["numbers"].write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if json_:
-        sys.stdout.write(json.dumps(result) + "\n")
+        print_json(result)
         return
     console = Console(highlight=False)
     print_table(console, _summary(entries, made, seconds))
@@ -98,7 +97,7 @@ def _list(entries: tuple[Entry, ...], as_object: bool) -> None:
     """Print keys and titles."""
     if as_object:
         listed = [entry.as_json() for entry in entries]
-        sys.stdout.write(json.dumps({"figures": listed}) + "\n")
+        print_json({"figures": listed})
         return
     console = Console(highlight=False)
     for entry in entries:
