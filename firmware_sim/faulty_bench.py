@@ -21,6 +21,9 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.lockstep import Trace
 from utank_hil.runtime.panel import TimedAction
 
+Tap = Callable[[ControllerNode], Node]
+"""What is put on the bus for a controller."""
+
 
 class FaultyBench:
     """A bench in lockstep in which faults can be placed, at the start or under way.
@@ -46,12 +49,16 @@ class FaultyBench:
         Who estimates sea and ship.
     commissioned : bool
         Whether the controller may be armed.
+    tapped : Tap, optional
+        Puts something between each controller and its faults.
 
     Attributes
     ----------
     ship : ShipSide
     nodes : dict of str to FaultyNode
         Sensors, drive, valve, panel and controller, as far as there are.
+    node : ControllerNode
+        The controller that runs at present.
     bus : FaultyBus
     lockstep : Lockstep
     """
@@ -70,6 +77,7 @@ class FaultyBench:
         retuner: Retuner | None = None,
         estimating: Retuner | None = None,
         commissioned: bool = True,
+        tapped: Tap = lambda controller: controller,
     ) -> None:
         self._law = law or build_law(config)
         self._config, self._trace, self._seed = config, trace, seed
@@ -78,6 +86,7 @@ class FaultyBench:
         self._commissioned = commissioned
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
         self.breakable: BreakableLaw | None = None
+        self._tapped = tapped
         self._controller = FaultyNode(self._new_controller())
         self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
@@ -85,13 +94,13 @@ class FaultyBench:
         self._joined: list[Node] = []
         self.lockstep = Lockstep(list(self.nodes.values()), self.bus, trace)
 
-    def _new_controller(self) -> ControllerNode:
+    def _new_controller(self) -> Node:
         def controller() -> Controller:
             self.breakable = BreakableLaw(self._law.controller())
             return self.breakable
 
         law = replace(self._law, controller=controller)
-        return build_controller_node(
+        self.node = build_controller_node(
             self._config,
             law,
             retuner=self._retuner,
@@ -100,12 +109,7 @@ class FaultyBench:
             sink_every=self._sink_every,
             commissioned=self._commissioned,
         )
-
-    @property
-    def node(self) -> ControllerNode:
-        """The controller that runs at present."""
-        assert isinstance(self._controller.node, ControllerNode)
-        return self._controller.node
+        return self._tapped(self.node)
 
     def restart_controller(self) -> None:
         """Have a new controller take the place of the old one, as after its process died."""

@@ -10,7 +10,7 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.faulty_bench import FaultyBench, Tap
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
@@ -21,7 +21,6 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.provenance import describe
 from utank_hil.retuning import (
-    Retuner,
     RetuningEvent,
     SimulatedRetuner,
 )
@@ -86,7 +85,7 @@ class Job:
     seed : int
     duration_s : float
     frames : Path or None
-        Where a run in simulated time leaves its frame log, if it is to leave one.
+        Where the run leaves its frame log, if it is to leave one.
     """
 
     name: str
@@ -210,26 +209,24 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
         work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
         for work in works_of(job.controller)
     )
-    if job.scenario.faults and job.name != PASSIVE:
-        return _run_with_faults(job, watch, retuner, estimating)
-    ship, truth, truth_log = _ship(job)
     desks = Tapped(retuner, estimating, wanted=job.frames is not None)
-    controller, log = _controller(job, desks.retuner, desks.estimating)
-    with _frame_log(job, controller, desks) as node:
+    with _frame_log(job, desks, FRAME_BLOCK_NS) as tapped:
+        if job.scenario.faults and job.name != PASSIVE:
+            return _run_with_faults(job, watch, desks, tapped)
+        ship, truth, truth_log = _ship(job)
+        controller, log = _controller(job, desks)
         bus = SimulatedBus(bit_rate=job.controller.bit_rate)
-        lockstep = Lockstep([*ship.nodes, node, truth], bus)
+        lockstep = Lockstep([*ship.nodes, tapped(controller), truth], bus)
         _run_to_the_end(job, lockstep, watch)
     return _lockstep_run(job, lockstep, controller, log, ship, truth, truth_log)
 
 
-def _run_with_faults(
-    job: Job, watch: Watch | None, retuner: Retuner | None, estimating: Retuner | None
-) -> Run:
-    """A run in which the scenario's faults happen; it keeps no log of frames."""
+def _run_with_faults(job: Job, watch: Watch | None, desks: Tapped, tapped: Tap) -> Run:
+    """A run in which the scenario's faults happen."""
     log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
     bench = FaultyBench(
-        job.scenario, job.controller, job.law, seed=job.seed, script=job.script,
-        sink=log.write, sink_every=RECORD_TICKS, retuner=retuner, estimating=estimating,
+        job.scenario, job.controller, job.law, seed=job.seed, script=job.script, sink=log.write,
+        sink_every=RECORD_TICKS, retuner=desks.retuner, estimating=desks.estimating, tapped=tapped,
     )  # fmt: skip
     truth_log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
     truth = TruthRecorder(bench.ship.plant, truth_log, RECORD_NS)
@@ -272,9 +269,8 @@ def run_in_one_process(job: Job, watch: Watch) -> Run:
     _load_kernel(job)
     ship, truth, truth_log = _ship(job)
     statistics = LoopStatistics()
-    with retuner_process(job.controller) as desks, _ring(job) as ring:
-        controller, log = _controller(job, *desks, statistics, ring)
-        loop = _run_loop(job, [*ship.nodes, controller, truth], None, statistics, watch)
+    with _real_time_controller(job, statistics) as (controller, log, node):
+        loop = _run_loop(job, [*ship.nodes, node, truth], None, statistics, watch)
     rows = _side_by_side(log.rows, truth_log.rows)
     return Run(
         job.name,
@@ -300,9 +296,8 @@ def run_ship(job: Job, channel: str, meeting: Meeting) -> ShipRun:
 def run_controller(job: Job, channel: str, meeting: Meeting) -> ControllerRun:
     """Run the controller's side on a SocketCAN interface."""
     statistics = LoopStatistics()
-    with retuner_process(job.controller) as desks, _ring(job) as ring:
-        controller, log = _controller(job, *desks, statistics, ring)
-        loop = _run_loop(job, [controller], channel, statistics, meeting, meeting.begin_ns)
+    with _real_time_controller(job, statistics) as (controller, log, node):
+        loop = _run_loop(job, [node], channel, statistics, meeting, meeting.begin_ns)
     return ControllerRun(
         log.rows,
         controller.start_ns,
@@ -374,8 +369,7 @@ def _ship(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
 
 def _controller(
     job: Job,
-    retuner: Retuner | None,
-    estimating: Retuner | None,
+    desks: Tapped,
     statistics: LoopStatistics | None = None,
     ring: RingWriter | None = None,
 ) -> tuple[ControllerNode, MemoryLog]:
@@ -389,8 +383,8 @@ def _controller(
     node = build_controller_node(
         job.controller,
         job.law,
-        retuner=retuner,
-        estimating=estimating,
+        retuner=desks.retuner,
+        estimating=desks.estimating,
         statistics=statistics,
         sink=shown,
         sink_every=RECORD_TICKS,
@@ -406,18 +400,32 @@ def _ring(job: Job) -> RingWriter:
 
 
 @contextmanager
-def _frame_log(job: Job, controller: ControllerNode, desks: Tapped) -> Iterator[Node]:
-    """The controller as it is put on the bus: with a tap, if the run is to leave a frame log."""
+def _real_time_controller(
+    job: Job, statistics: LoopStatistics
+) -> Iterator[tuple[ControllerNode, MemoryLog, Node]]:
+    """The controller, its rows, and the node that is put on the bus."""
+    with retuner_process(job.controller) as (retuner, estimating):
+        desks = Tapped(retuner, estimating, wanted=job.frames is not None)
+        # the loop waits for no disk: its records are written when it has ended
+        block_ns = job.ticks * TICK_NS + SECOND_NS
+        with _frame_log(job, desks, block_ns) as tapped, _ring(job) as ring:
+            controller, log = _controller(job, desks, statistics, ring)
+            yield controller, log, tapped(controller)
+
+
+@contextmanager
+def _frame_log(job: Job, desks: Tapped, block_ns: int) -> Iterator[Tap]:
+    """Puts a tap on the controller, if the run is to leave a frame log."""
     if job.frames is None:
-        yield controller
+        yield lambda controller: controller
         return
     head = replay_head(
         "bench", job.controller, job.law, job.frames.parent, options={"run": job.name},
         retuner=desks.retuner is not None, estimating=desks.estimating is not None, seed=job.seed,
     )  # fmt: skip
     with FrameLogWriter(job.frames, head) as writer:
-        sink = BlockSink(writer, FRAME_BLOCK_NS)
-        yield NodeTap(controller, sink.write, desks.taps)
+        sink = BlockSink(writer, block_ns)
+        yield lambda controller: NodeTap(controller, sink.write, desks.taps)
         sink.flush()
 
 

@@ -83,8 +83,6 @@ def bench(
 
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
-    if frames and real_time:
-        fail("--frames is for lockstep: in real time `utank-hil run --out` keeps the frame log")
     loaded = load(scenario, Scenario)
     if real_time and loaded.faults:
         fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
@@ -92,8 +90,12 @@ def bench(
         name: admit(controller, scenario, f"controllers.{name}")
         for name, controller in loaded.controllers.items()
     }
-    if frames and loaded.faults:
-        fail("--frames is for scenarios without faults: a log of frames has no word for them")
+    for number, fault in enumerate(loaded.faults if frames else ()):
+        if not fault.replayable:
+            fail(
+                f"{scenario}: faults.{number}: kind {fault.kind} changes the controller itself, so "
+                "its frames can't be replayed: leave --frames out, or the fault"
+            )
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     prepare_out(out, (*REPORT_FILES, *logs))
     if real_time and duration is None:

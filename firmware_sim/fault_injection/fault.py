@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
@@ -58,6 +58,8 @@ NodeName = Annotated[str, AfterValidator(partial(_choice, "node", list(NODE_OF.v
 class Fault(Section, ABC):
     """When a fault is there: `at_s` after the start, for `for_s` or till the end."""
 
+    replayable: ClassVar[bool] = True
+    """Whether a controller without it, handed the same frames, would do the same."""
     at_s: NotNegative = 0.0
     for_s: Positive | None = None
 

@@ -36,6 +36,7 @@ class Hangs(NodeFault):
 class Killed(Fault):
     """The controller's process dies; one that is started anew takes its place in the end."""
 
+    replayable = False
     kind: Literal["killed"]
 
     def node_names(self) -> tuple[str, ...]:
@@ -178,6 +179,7 @@ class Valve(Fault):
 class Law(Fault):
     """The control law raises an error, or answers no number, the opposite or one side."""
 
+    replayable = False
     kind: Literal["law"]
     fails: Literal["raises", "answers_nan", "opposite", "leans"]
     """What it does."""

@@ -1,43 +1,96 @@
-"""A run of the bench in lockstep leaves a frame log, and does the same as without one."""
+"""A run of the bench leaves a frame log, and does the same as without one."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import run_lockstep
+from firmware_sim.fault_injection.kinds import AnyFault
+from firmware_sim.run import Job, run_in_one_process, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.cli import app
 from utank_hil.configuration import load_config
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import entries_of, replay
+from utank_hil.telemetry.replay import ReplayResult, entries_of, replay
 from utank_hil.telemetry.replay_head import causes, recorded_config
 
 STORM = Path("configs/scenarios/storm.yaml")
 
 
-@pytest.mark.parametrize("name", ["passive", "dpc"])
-def test_a_run_is_the_same_with_a_frame_log_which_is_replayed_exactly(
-    tmp_path: Path, name: str
-) -> None:
-    (job,) = (job for job in jobs_of(load_config(STORM, Scenario), 3, 25.0) if job.name == name)
-    file = tmp_path / f"{name}.frames"
-    logged = run_lockstep(replace(job, frames=file))
-    np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
+def job_of(name: str, seconds: float, faults: list[dict[str, object]]) -> Job:
+    scenario = load_config(STORM, Scenario)
+    broken = TypeAdapter(tuple[AnyFault, ...]).validate_python(faults)
+    jobs = jobs_of(scenario.model_copy(update={"faults": broken}), 3, seconds)
+    return next(job for job in jobs if job.name == name)
+
+
+def replayed(file: Path) -> ReplayResult:
+    """The log, replayed by the configuration in it."""
     log = FrameLog(file)
     assert log.head["about"]["seed"] == 3
     with recorded_config(log.head) as config:
         law = build_law(config)
-        result = replay(entries_of(log.blocks()), config, law)
-        assert causes(log.head, config, law, tmp_path) == []
-    assert (result.first, result.ticks) == (None, 2500)
+        assert causes(log.head, config, law, file.parent) == []
+        return replay(entries_of(log.blocks()), config, law)
 
 
-def test_in_real_time_the_frame_log_is_that_of_run() -> None:
-    result = CliRunner().invoke(app, ["bench", str(STORM), "--realtime", "--frames"])
+@pytest.mark.parametrize(
+    ("name", "faults"),
+    [
+        ("passive", []),
+        ("dpc", []),
+        (
+            "dpc",
+            [
+                {
+                    "kind": "offset",
+                    "message": "SENSOR_MOTION",
+                    "signals": ["roll_rad"],
+                    "at_s": 15,
+                    "for_s": 1,
+                    "by": 0.3,
+                },
+                {"kind": "hangs", "node": "controller", "at_s": 20, "for_s": 0.2},
+                {"kind": "link", "node": "controller", "at_s": 22, "for_s": 0.1, "reason": "down"},
+            ],
+        ),
+    ],
+)
+def test_a_run_is_the_same_with_a_frame_log_which_is_replayed_exactly(
+    tmp_path: Path, name: str, faults: list[dict[str, object]]
+) -> None:
+    job = job_of(name, 25.0, faults)
+    file = tmp_path / f"{name}.frames"
+    logged = run_lockstep(replace(job, frames=file))
+    np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
+    result = replayed(file)
+    assert (result.first, result.ticks) == (None, 2480 if faults else 2500)
+
+
+def test_a_run_in_real_time_leaves_a_log_that_is_replayed_exactly(tmp_path: Path) -> None:
+    file = tmp_path / "dpc.frames"
+    run = run_in_one_process(replace(job_of("dpc", 2.0, []), frames=file))
+    assert run.loop is not None
+    result = replayed(file)
+    assert (result.first, result.ticks) == (None, run.loop.statistics.ticks)
+
+
+@pytest.mark.parametrize(
+    "fault", [{"kind": "killed", "for_s": 1}, {"kind": "law", "fails": "leans"}]
+)
+def test_a_fault_of_the_controller_itself_can_t_be_logged(
+    tmp_path: Path, fault: dict[str, object]
+) -> None:
+    content = yaml.safe_load(STORM.read_text().replace("../", f"{STORM.resolve().parents[1]}/"))
+    content["faults"] = [{"kind": "mute", "node": "drive"}, fault]
+    file = tmp_path / "broken.yaml"
+    file.write_text(yaml.safe_dump(content))
+    result = CliRunner().invoke(app, ["bench", str(file), "--frames"])
     assert result.exit_code == 2
-    assert "--frames is for lockstep" in result.stderr
+    assert f"faults.1: kind {fault['kind']} changes the controller itself" in result.stderr

@@ -12,11 +12,15 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Run, run_lockstep
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
+from utank_hil.assembly import build_law
 from utank_hil.canbus import Mode
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry import read_recording
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.replay import entries_of, replay
+from utank_hil.telemetry.replay_head import causes, recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -68,7 +72,7 @@ def attempt(folder: Path) -> Bench:
     scenario = scenario_file(folder)
     program = Program(
         folder, "utank-hil", "bench", scenario, "--realtime", "--bus", CHANNEL,
-        "--duration", DURATION_S, "--out", folder, "--json",
+        "--duration", DURATION_S, "--out", folder, "--frames", "--json",
     )  # fmt: skip
     with running(program):
         # a machine that is busy for long is judged below
@@ -195,3 +199,16 @@ def test_armed_controller_rolls_the_ship_as_in_lockstep(bench) -> None:
     # noise falls on other samples and the law samples at another phase: a hundredth; what ticks are
     # lost, measurements and commands are late
     assert error < (1 / 4 + 2 * lost) * effect
+
+
+@pytest.mark.parametrize("name", ["passive", "gpc"])
+def test_both_runs_are_replayed_bit_for_bit(bench, name: str) -> None:
+    _, report, _ = bench
+    path = Path(report["files"][f"frames of {name}"])
+    log = FrameLog(path)
+    with recorded_config(log.head) as config:
+        law = build_law(config)
+        assert causes(log.head, config, law, path.parent) == []
+        result = replay(entries_of(log.blocks()), config, law)
+    (run,) = (run for run in report["runs"] if run["name"] == name)
+    assert (result.first, result.ticks) == (None, run["loop"]["ticks"])
