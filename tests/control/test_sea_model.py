@@ -95,16 +95,3 @@ def test_a_sea_known_by_its_slope_is_the_sea_known_by_its_height():
     inside = np.linspace(0.5, 2.0, 50)
     difference = np.abs(model.slope_density(inside) - given.slope_density(inside))
     assert difference.max() < 0.05 * given.slope_density(inside).max()
-
-
-def test_a_low_floor_adds_its_share_of_the_maximum_below_the_corner_alone():
-    def density(model: SeaModel, omega_rad_s: float) -> float:
-        z = np.exp(1j * np.array([omega_rad_s]) * TS)
-        shaping = model.shaping_filter(TS)
-        return float(np.abs(state_space_response(shaping, z)[0, 0, 0]) ** 2 * TS / np.pi)
-
-    omega = np.linspace(0.3, 2.0, 2000)
-    most = sea().slope_density(omega).max()
-    low, plain = sea(low_floor=0.1, low_corner_rad_s=0.4, order=24), sea(order=24)
-    assert density(low, 0.2) == pytest.approx(0.1 * most, rel=0.2)
-    assert density(low, 0.7) == pytest.approx(density(plain, 0.7), rel=0.05)

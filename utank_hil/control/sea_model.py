@@ -31,7 +31,6 @@ from utank_hil.sea import Spectrum
 
 # seconds, not samples: a sea is as narrow at any sample time
 _RECORD_S = 1638.4  # the factorization's frequencies are 0.004 rad/s apart
-_LOW_STEEPNESS = 16
 _MEMORY_S = 160.0  # part of the impulse response that counts
 
 
@@ -56,11 +55,6 @@ class SeaModel:
     smoothing_rad_s : float
         Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
         wider than any sea's peak.
-    low_floor : float
-        Added below `low_corner_rad_s`, as a share of the maximum, 100 at most: a ship that rolls
-        more slowly than hers shows motion there that is none of the waves'.
-    low_corner_rad_s : float
-        Frequency below which `low_floor` is added; 0.9 of the ship's roll frequency or less.
 
     Raises
     ------
@@ -74,8 +68,6 @@ class SeaModel:
     order: Annotated[int, Range(least=1, most=32)] = 8
     floor: Annotated[float, Range(above=0, most=100)] = 1.3e-3
     smoothing_rad_s: Annotated[float, Range(above=0, most=1)] = 0.007
-    low_floor: Annotated[float, Range(least=0, most=100)] = 0.0
-    low_corner_rad_s: Positive = 0.45
 
     def __post_init__(self) -> None:
         problems = [*range_problems(self), *self._band_problems()]
@@ -164,8 +156,7 @@ class SeaModel:
         density = gaussian_filter1d(
             self.slope_density(omega), self.smoothing_rad_s / omega[1], mode="wrap"
         )
-        below = 1 / (1 + (omega / self.low_corner_rad_s) ** _LOW_STEEPNESS)
-        density = density + (self.floor + self.low_floor * below) * density.max()
+        density = density + self.floor * density.max()
         cepstrum = np.fft.ifft(np.log(np.pi * density / sample_time_s)).real
         causal = np.zeros(2 * half)
         causal[0] = cepstrum[0] / 2

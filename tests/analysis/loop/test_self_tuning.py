@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from utank_hil.analysis.loop.observer_search import ObserverSearch
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.analysis.loop.sea_response import motion_in_sea
@@ -49,8 +50,9 @@ def test_the_law_has_all_margins_and_its_roll_is_that_of_another_computation():
     motion = motion_in_sea(found.law, system, measured, moment(), PLANT.delay_s, PLANT.lag_s)
     assert found.prediction.roll_rad == pytest.approx(motion.roll_rms_rad, rel=0.03)
     assert found.prediction.level_m == pytest.approx(motion.level_rms_m, rel=0.03)
-    assert found.prediction.pressure_pa == pytest.approx(motion.pressure_rms_pa, rel=0.05)
-    assert found.prediction.roll_rad < 0.5 * found.passive_roll_rad
+    # what the sensors' noise makes of it is in the prediction alone
+    assert 1.0 < found.prediction.pressure_pa / motion.pressure_rms_pa < 1.08
+    assert found.prediction.roll_rad < 0.3 * found.passive_roll_rad
 
 
 def test_passive_roll_is_that_of_the_sum_over_components():
@@ -59,7 +61,13 @@ def test_passive_roll_is_that_of_the_sum_over_components():
     assert passive_roll_rad(PLANT, SEA) == pytest.approx(motion.roll_rms_rad, rel=0.01)
 
 
-def test_a_power_budget_is_kept_and_costs_roll():
+@pytest.fixture
+def short_search(monkeypatch):
+    """An observer that is better than the first, not the best."""
+    monkeypatch.setattr("utank_hil.analysis.loop.observer_search._ITERATIONS", 10)
+
+
+def test_a_power_budget_is_kept_and_costs_roll(short_search):
     free = tuned()
     spared = tuned(0.5 * free.prediction.power_w)
     assert spared.prediction.power_w <= 0.5 * free.prediction.power_w
@@ -86,6 +94,15 @@ def test_another_ship_gets_a_law_with_all_margins_too():
     assert found.passive_roll_rad == pytest.approx(passive_roll_rad(naval, sea))
 
 
+def test_where_no_observer_has_all_margins_the_law_is_the_one_that_the_search_began_with(
+    monkeypatch,
+):
+    monkeypatch.setattr(ObserverSearch, "best", lambda search: -search.start)
+    found = self_tuned(PLANT, SEA)
+    np.testing.assert_array_equal(found.law.observer_gain, found.design.law(PLANT).observer_gain)
+    assert not found.robustness.failures()
+
+
 def test_a_sea_without_waves_is_refused():
     class Still:
         def slope_density(self, omega_rad_s):
@@ -95,7 +112,7 @@ def test_a_sea_without_waves_is_refused():
         self_tuned(PLANT, Still())
 
 
-def test_a_file_names_a_sea_or_none(tmp_path):
+def test_a_file_names_a_sea_or_none(tmp_path, short_search):
     config = load_config(CONTROLLERS / "self_tuned.yaml", ControllerConfig)
     assert isinstance(config.law, SelfTunedDesign)
     assert config.law.sea.spectrum.hs_m == pytest.approx(4.7, abs=0.1)

@@ -96,7 +96,7 @@ def robustness(
     late_radius, late_peak = radius_and_peak(
         law, sample(model, law.sample_time_s, delay_s + EXTRA_DELAY_S, lag_s)
     )
-    variants = list(_variants(plant.ship))
+    variants = list(ship_variants(plant.ship))
     systems = [pump_model(variant, plant.tank, measured) for _, _, variant in variants]
     extra_s = (0.0, EXTRA_DELAY_S)
     radii = np.array(
@@ -116,8 +116,8 @@ def robustness(
     )
 
 
-def _variants(ship: RollShip) -> Iterator[tuple[float, float, RollShip]]:
-    """Scales of period and of inertia, and the ship that has them.
+def ship_variants(ship: RollShip) -> Iterator[tuple[float, float, RollShip]]:
+    """The ships of the grid: scales of period and of inertia, and the ship that has them.
 
     Stability changes the stiffness and with it the period; the load's spread the inertia.
     """

@@ -7,21 +7,23 @@ greatest pressure P and level limit h:
 * white pressure disturbance 11 P s / sqrt(w), white slope 0.046 s / sqrt(w), heel 0.13 s;
 * sample time 0.1 / w, plans of 12 / w of it, level margin h / 20.
 
-What is left to choose is how far the law trusts ship and sea. A doubt is added, noise at all
-frequencies or energy of the sea below the roll frequency, as little of it as gives the law all
-margins. This is done for several shapes of the doubt and two weights of the level. The law with the
-least predicted cost is taken.
+What is left to choose is how far the law trusts ship and sea. As little noise of the slope is added
+as makes it stable on all ships that it must stand. From there its observer is searched for
+(`observer_search`): least predicted cost in the expected sea, robust all the same. Where that has
+not all margins, the law that the search began with is taken.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Final, Literal, NamedTuple, Protocol
+from typing import Annotated, Final, Literal, Protocol
 
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
+from utank_hil.analysis.loop.loop_in_sea import LoopInSea, in_pump_units
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
+from utank_hil.analysis.loop.observer_search import ObserverSearch
 from utank_hil.analysis.loop.robustness import (
     EXTRA_DELAY_S,
     GAINS,
@@ -33,7 +35,6 @@ from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.arrays import FloatArray
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
-from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.lqg import LQGLaw
@@ -49,36 +50,21 @@ _PRESSURE_COST: Final = 0.106
 _LEVEL_COST: Final = 0.33
 
 
-class _Doubt(NamedTuple):
-    """A shape of the doubt, for a knob of one, and the level's weight that goes with it."""
-
-    noise: float
-    """Of the slope, over s / sqrt(w)."""
-    low: float
-    """Low floor of the sea."""
-    corner: float
-    """Of that floor, over w."""
-    level: float
-    """Factor on the level's weight."""
-
-
-_DOUBTS: Final = tuple(
-    _Doubt(*shape, level)
-    for shape in ((1.0, 0.0, 0.9), (0.1, 1.0, 0.9), (0.1, 1.0, 0.8))
-    for level in (1.0, 3.0)
-)
 _KNOB: Final = (1e-4, 3.0)
+"""Least and most of the added noise of the slope, squared, over s^2 / w."""
 _BISECTIONS: Final = 5
 _ORDER: Final = 16
 _LEAST_FLOOR: Final = 1.3e-4
 _OMEGA: Final = np.geomspace(0.05, 30.0, 1500)
 """Over roll frequency: the slope of short waves falls slowly, and they are in the sensors."""
-_UNKNOWN_PERIOD: Final = 0.8
-_UNKNOWN_HEIGHT: Final = 0.019
-"""In m per square second of the roll period: 3 m for a ship of 12.6 s."""
+_UNKNOWN: Final = ((0.5, 0.017), (0.8, 0.017), (1.4, 0.0026))
+"""Systems of a sea that is not known: peak periods over the roll period, and heights in m per
+square second of the peak period: 0.7, 1.7 and 0.8 m at 6, 10 and 18 s for a ship of 12.6 s."""
 _UNKNOWN_SLOPE: Final = 0.5
-_MORE_DOUBT: Final = 1.6
-_MORE_DOUBTS: Final = 6
+_MORE_NOISE: Final = 1.6
+_MORE_NOISES: Final = 6
+_OTHER_SHIPS: Final = (5e-3, 5e-2)
+"""Weights of the other ships in the search for the observer: the first that gives all margins."""
 _COSTLIER: Final = 3.0
 _MOST_STEPS: Final = 8
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
@@ -116,6 +102,7 @@ class SelfTuned:
     ----------
     design : ConstrainedDesign
     law : ConstrainedLaw
+        The design's, with another observer where a better one was found.
     robustness : Robustness
     passive_roll_rad : float
     prediction : Prediction
@@ -157,16 +144,26 @@ def self_tuned(
     NoLawError
         If no law has the margins, or the sea does not roll the ship.
     """
-    search = _Search(plant, sea, noise, sample_time_s)
-    found, doubt = search.best()
-    for power in range(1, _MOST_STEPS + 1):
+    search, gentlest_w = _Search(plant, sea, noise, sample_time_s), math.inf
+    within: SelfTuned | None = None
+    for power in range(_MOST_STEPS + 1):
+        start = search.least_noise(_COSTLIER**power)
+        if start is None:
+            continue
+        gentlest_w = start.prediction.power_w
+        if gentlest_w > mean_power_w:
+            continue
+        within = within or start
+        found = search.with_better_observer(start, _COSTLIER**power)
         if found.prediction.power_w <= mean_power_w:
             return found
-        gentler = search.least_doubt(doubt, _COSTLIER**power)
-        found = gentler or found
+    if within is not None:
+        return within
+    if gentlest_w == math.inf:
+        raise NoLawError("no constrained law has all margins on this ship: choose another tank")
     raise NoLawError(
         f"no law puts less than {mean_power_w:g} W in the mean into the water; the gentlest one "
-        f"puts {found.prediction.power_w:.3g} W"
+        f"puts {gentlest_w:.3g} W"
     )
 
 
@@ -219,14 +216,15 @@ class SelfTunedDesign:
 
 
 def unknown_sea(ship: RollShip) -> SeaModel:
-    """What a law expects of a sea that is not known: broad, its peak above the roll frequency."""
-    period_s = 2 * math.pi / ship.natural_frequency_rad_s
-    spectrum = ittc(_UNKNOWN_HEIGHT * period_s**2, _UNKNOWN_PERIOD * period_s)
-    return SeaModel(
-        tuple(spectrum.frequency_hz.tolist()),
-        tuple(spectrum.density.tolist()),
-        effective_slope=_UNKNOWN_SLOPE,
-    )
+    """What a law expects of a sea that is not known: broad, and mostly above the roll frequency."""
+    w = ship.natural_frequency_rad_s
+    omega, slope = w * _OMEGA, np.zeros(len(_OMEGA))
+    for ratio, height in _UNKNOWN:
+        period_s = ratio * 2 * math.pi / w
+        system = ittc(height * period_s**2, period_s)
+        bands = tuple(system.frequency_hz.tolist()), tuple(system.density.tolist())
+        slope += SeaModel(*bands, effective_slope=_UNKNOWN_SLOPE).slope_density(omega)
+    return SeaModel.of_slope(omega, slope)
 
 
 class _Search:
@@ -253,54 +251,45 @@ class _Search:
             floor=_LEAST_FLOOR,
             smoothing_rad_s=_short(min(0.028 * w, 1.0)),
         )
-        self._truth = sea_plant(
-            self._sea,
-            plant,
-            pressure_noise_pa_rt_s=0.0,
-            slope_noise_rad_rt_s=0.0,
-            heel_std_rad=0.0,
-            heel_time_s=1.0,
-            sample_time_s=self._step_s,
-        )
         self._hard_cases = list(self._longest_and_shortest_period())
 
-    def best(self) -> tuple[SelfTuned, _Doubt]:
-        """The law of least predicted cost, and the doubt that it has."""
-        found = [
-            (self._cost(tuned.prediction), tuned, doubt)
-            for doubt in _DOUBTS
-            if (tuned := self.least_doubt(doubt)) is not None
-        ]
-        if not found:
-            raise NoLawError("no constrained law has all margins on this ship: choose another tank")
-        return min(found, key=lambda each: each[0])[1:]
-
-    def _cost(self, predicted: Prediction) -> float:
-        limits, share = self._plant.limits, self._roll_rad**2
-        return (
-            predicted.roll_rad**2
-            + _LEVEL_COST * share * (predicted.level_m / limits.level_m) ** 2
-            + _PRESSURE_COST * share * (predicted.pressure_pa / limits.pressure_pa) ** 2
-        )
-
-    def least_doubt(self, doubt: _Doubt, costlier: float = 1.0) -> SelfTuned | None:
-        """The law with as little of a doubt as gives it all margins, or None.
+    def least_noise(self, costlier: float) -> SelfTuned | None:
+        """The law with as little noise of the slope as gives it all margins, or None.
 
         The pressure costs so many times its scaled weight.
         """
         low, high = (math.log(end) for end in _KNOB)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
-            if self._stands_hard_cases(self._design(doubt, math.exp(middle), costlier)):
+            if self._stands_hard_cases(self._design(math.exp(middle), costlier)):
                 high = middle
             else:
                 low = middle
-        for _ in range(_MORE_DOUBTS):
-            tuned = self._judged(self._design(doubt, math.exp(high), costlier))
-            if tuned is not None:
-                return tuned
-            high += math.log(_MORE_DOUBT)
+        for _ in range(_MORE_NOISES):
+            design = self._design(math.exp(high), costlier)
+            if self._stands_hard_cases(design):
+                tuned = self._judged(design, design.law(self._plant))
+                if tuned is not None:
+                    return tuned
+            high += math.log(_MORE_NOISE)
         return None
+
+    def with_better_observer(self, start: SelfTuned, costlier: float) -> SelfTuned:
+        """The same law with the observer that is searched for, or as it is if that finds none."""
+        expected = self._design(0.0, costlier)
+        law = expected.law(self._plant)
+        begun = replace(law, observer_gain=start.law.observer_gain)
+        for share in _OTHER_SHIPS:
+            search = ObserverSearch(begun, expected, self._plant, self._weights(costlier), share)
+            found = self._judged(expected, replace(law, observer_gain=search.best()))
+            if found is not None:
+                return found
+        return start
+
+    def _weights(self, costlier: float) -> tuple[float, float, float]:
+        """Of the cost, on the squares of roll, level and pressure per the pump's most."""
+        share, level_m = self._roll_rad**2, self._plant.limits.level_m
+        return 1.0, _LEVEL_COST * share / level_m**2, _PRESSURE_COST * costlier * share
 
     def _stands_hard_cases(self, design: ConstrainedDesign) -> bool:
         try:
@@ -309,33 +298,28 @@ class _Search:
             return False
         return all(closed_loop_radius(law, model, gain) < 1 for model, gain in self._hard_cases)
 
-    def _judged(self, design: ConstrainedDesign) -> SelfTuned | None:
+    def _judged(self, design: ConstrainedDesign, law: ConstrainedLaw) -> SelfTuned | None:
         """A law with all margins, or None."""
-        if not self._stands_hard_cases(design):
-            return None
-        law = design.law(self._plant)
         linear = law.unlimited()
         judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
         if judged.failures():
             return None
         return SelfTuned(design, law, judged, self._roll_rad, self._prediction(linear))
 
-    def _design(self, doubt: _Doubt, knob: float, costlier: float) -> ConstrainedDesign:
+    def _design(self, knob: float, costlier: float) -> ConstrainedDesign:
         limits, roll = self._plant.limits, self._roll_rad
         w = self._plant.ship.natural_frequency_rad_s
         root = math.sqrt(w)
-        sea = replace(
-            self._sea, low_floor=_short(doubt.low * knob), low_corner_rad_s=_short(doubt.corner * w)
-        )
+        _, level, pressure = self._weights(costlier)
         return ConstrainedDesign(
             "constrained_gpc",
-            sea,
+            self._sea,
             measurement_std=self._std,
             pressure_noise_pa_rt_s=_short(11.0 * limits.pressure_pa * roll / root),
-            slope_noise_rad_rt_s=_short((0.046 + doubt.noise * math.sqrt(knob)) * roll / root),
+            slope_noise_rad_rt_s=_short((0.046 + math.sqrt(knob)) * roll / root),
             after_horizon="law",
-            pressure_weight_rad2=_short(_PRESSURE_COST * costlier * roll**2),
-            level_weight_rad2_m2=_short(_LEVEL_COST * doubt.level * roll**2 / limits.level_m**2),
+            pressure_weight_rad2=_short(pressure),
+            level_weight_rad2_m2=_short(level),
             level_margin_m=_short(limits.level_m / 20),
             heel_std_rad=_short(0.13 * roll),
             sample_time_s=self._step_s,
@@ -352,40 +336,17 @@ class _Search:
             yield from ((sampled, gain) for gain in (GAINS[0], GAINS[-1]))
 
     def _prediction(self, law: LQGLaw) -> Prediction:
-        """Of the loop in the sea that was given, by its covariance; pressures in units of P."""
-        from scipy.linalg import solve_discrete_lyapunov
-
-        unit, n = self._plant.limits.pressure_pa, len(law.model.A)
-        pressures = slice(len(STATES), n - _ORDER - 1)
-        scale = np.ones(n)
-        scale[pressures] = unit
-        gain, observer = law.gain * scale / unit, law.observer_gain / scale[:, None]
-        a, c = law.model.A * scale / scale[:, None], law.model.C * scale
-        b, d = law.model.B * unit / scale[:, None], law.model.D * unit
-        truth, process = self._truth
-        whole, reach = truth.C * scale, truth.D * unit
-        rows = [STATES.index(name) for name in _MEASURED]
-        # model and truth differ in the sea alone
-        true_a = truth.A * scale / scale[:, None]
-        closed = np.block(
-            [
-                [true_a, -b @ gain],
-                [
-                    observer @ whole[rows],
-                    a - b @ gain - observer @ (c - d @ gain + reach[rows] @ gain),
-                ],
-            ]
-        )
-        noise = np.zeros((2 * n, 2 * n))
-        noise[:n, :n] = process / scale / scale[:, None]
-        noise[n:, n:] = observer @ np.diag(np.square(self._std)) @ observer.T
-        spread = solve_discrete_lyapunov(closed, noise)
-        command = np.hstack([np.zeros((1, n)), -gain])
-        motion = np.hstack([whole, np.zeros_like(whole)]) + reach @ command
-        rms = np.sqrt(np.diag(motion @ spread @ motion.T))
-        pressure = math.sqrt(float((command @ spread @ command.T)[0, 0]))
+        """Of the loop in the sea that was given, by its covariance."""
+        unit = self._plant.limits.pressure_pa
+        scaled = in_pump_units(law, self._sea, unit)
+        noise = np.diag(np.square(self._std))
+        loop = LoopInSea(self._plant, self._sea, scaled, _MEASURED, noise, self._weights(1.0))
+        spread = loop.spread(scaled.observer_gain)
+        assert spread is not None  # it was judged before
+        rms = np.sqrt(np.diag(loop.motion @ spread @ loop.motion.T))
+        pressure = math.sqrt(float((loop.command @ spread @ loop.command.T)[0, 0]))
         speed = STATES.index("level_rate_m_s")
-        together = float((command @ spread @ motion[speed])[0])
+        together = float((loop.command @ spread @ loop.motion[speed])[0])
         return Prediction(
             roll_rad=float(rms[STATES.index("roll_rad")]),
             level_m=float(rms[STATES.index("level_m")]),
