@@ -37,7 +37,8 @@ MEAN_PERIODS: Final = 6.0
 AMPLIFIED: Final = 1.25
 RECOVERED: Final = 1.05
 """Own roll over the twin's at which a law has lost, and at which that is over."""
-LASTS_PERIODS: Final = 1.0
+LASTS_PERIODS: Final = 0.25
+"""The memory of the mean squares is the patience: longer, and a bad law only rolls her longer."""
 
 
 class PassiveTwin:
@@ -57,7 +58,7 @@ class PassiveTwin:
     roll_rad : float
         The twin's roll.
     amplified : bool
-        The ship rolls more than her twin, for over a roll period.
+        The ship rolls more than her twin, and has for over a quarter of a roll period.
     """
 
     def __init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float) -> None:
