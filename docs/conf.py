@@ -23,7 +23,7 @@ extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.viewc
 myst_heading_anchors = 4
 numpydoc_show_class_members = False
 autodoc_member_order = "bysource"
-autodoc_typehints = "none"  # the docstrings give types, shapes and units
+autodoc_typehints = "signature"  # docstrings repeat no type that says enough there
 
 html_theme = "furo"
 html_title = "utank-hil"

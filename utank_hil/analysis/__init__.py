@@ -66,32 +66,21 @@ __all__ = [
 ]
 
 _LAZY = {
-    "CapsizeMap": "capsize.maps",
-    "Equilibrium": "capsize.threshold",
-    "Loop": "loop.comparison",
-    "Probability": "capsize.threshold",
-    "ResponseAmplitude": "motion.response",
-    "RollDecay": "motion.decay",
-    "StimulatedRoll": "motion.stimulation",
-    "Survival": "capsize.survival",
-    "Threshold": "capsize.threshold",
-    "capsize_map": "capsize.maps",
-    "capsize_probability": "capsize.threshold",
-    "capsize_threshold": "capsize.threshold",
-    "compare": "loop.comparison",
-    "comparison_table": "loop.comparison",
-    "controlled_run": "capsize.survival",
-    "equilibria": "capsize.threshold",
-    "erosion": "capsize.threshold",
-    "largest_survivable_wave": "capsize.survival",
-    "phase_grid": "capsize.maps",
-    "roll_decay": "motion.decay",
-    "safe_basin": "capsize.threshold",
-    "simulated_response": "motion.response",
-    "stacked_seas": "capsize.sea_stack",
-    "stimulate_on_still_water": "motion.stimulation",
-    "tuned_tank": "motion.stimulation",
-    "without_tank": "capsize.threshold",
+    name: module
+    for module, names in {
+        "capsize.maps": ("CapsizeMap", "capsize_map", "phase_grid"),
+        "capsize.sea_stack": ("stacked_seas",),
+        "capsize.survival": ("Survival", "controlled_run", "largest_survivable_wave"),
+        "capsize.threshold": (
+            *("Equilibrium", "Probability", "Threshold", "capsize_probability", "equilibria"),
+            *("capsize_threshold", "erosion", "safe_basin", "without_tank"),
+        ),
+        "loop.comparison": ("Loop", "compare", "comparison_table"),
+        "motion.decay": ("RollDecay", "roll_decay"),
+        "motion.response": ("ResponseAmplitude", "simulated_response"),
+        "motion.stimulation": ("StimulatedRoll", "stimulate_on_still_water", "tuned_tank"),
+    }.items()
+    for name in names
 }
 
 
