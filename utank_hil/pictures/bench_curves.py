@@ -104,18 +104,12 @@ def draw_bench(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
     about : mapping, optional
         As in `picture`.
     bars : sequence of BenchBar
         Of the summary, those of the curves last; there is none without any.
     wrong : sequence of str
         What went wrong, written above the bars.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------

@@ -58,11 +58,6 @@ def draw_campaign(
     title : str
     about : mapping, optional
         As in `picture`.
-
-    Returns
-    -------
-    Path
-        `path`.
     """
     along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
     height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)

@@ -28,12 +28,6 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------

@@ -46,11 +46,6 @@ def draw_identification(
     title : str
     about : mapping, optional
         As in `picture`.
-
-    Returns
-    -------
-    Path
-        `path`.
     """
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx

@@ -40,12 +40,6 @@ def draw_bode(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------

@@ -24,12 +24,6 @@ def draw_time(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------
@@ -75,12 +69,6 @@ def draw_phase(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------

@@ -31,11 +31,6 @@ def draw_roll_statistics(
     path : Path
         The `.png` file; overwritten.
     title : str
-
-    Returns
-    -------
-    Path
-        `path`.
     """
     from scipy.signal import welch
 

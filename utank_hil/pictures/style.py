@@ -53,7 +53,6 @@ def picture(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
     size_in : tuple of float
         Width and height in inches.
     about : mapping, optional

@@ -33,11 +33,6 @@ def draw_tank(
     title : str
     about : mapping, optional
         As in `picture`.
-
-    Returns
-    -------
-    Path
-        `path`.
     """
     with picture(path, title, (12.0, 5.0), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
@@ -87,11 +82,6 @@ def draw_sweep(
     title : str
     about : mapping, optional
         As in `picture`.
-
-    Returns
-    -------
-    Path
-        `path`.
     """
     with picture(path, title, (12.0, 5.0), about) as figure:
         passive = figure.add_subplot(1, 2, 1)

@@ -37,16 +37,10 @@ def draw_trade(
     path : Path
         The `.png` file; overwritten.
     title : str
-        Title of the figure.
     pressure_limit_pa, level_limit_m : float
         Drawn as lines. The RMS values are those of linear theory, without limits.
     about : mapping, optional
         As in `picture`.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------
