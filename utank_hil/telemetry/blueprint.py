@@ -1,14 +1,14 @@
 """Layout of the Rerun viewer: plots, their places and colours."""
 
-import itertools
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Final
 
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 from rerun.encodings import EntityPath
 
+from utank_hil.telemetry.motion_figures import PHASE_AXES, phase_path, spectrum_path
 from utank_hil.telemetry.rerun_log import (
     ARCHETYPE,
     COMPONENT,
@@ -16,22 +16,62 @@ from utank_hil.telemetry.rerun_log import (
     TIME_COLUMN,
     has_state,
     log_path,
+    retuning_path,
     run_paths,
     state_path,
 )
 from utank_hil.telemetry.scene import SceneSize, scene_path, words_path
-from utank_hil.telemetry.units import UNITS, Field, Unit, field_of
+from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
 
 HALF_WINDOW_S: Final = 60.0
-MOST_SCENES: Final = 4
-"""Of several runs, so many ships are shown side by side."""
-WATCHED: Final = (
-    ("roll_rad", "twin_roll_rad"),
-    ("port_level_m", "starboard_level_m"),
-    ("pressure_command_pa", "pressure_actual_pa"),
-)
-"""Columns of the watch's plots."""
+MOST_SHADES: Final = 4
+"""In one plot; of several runs, so many ships are shown side by side."""
+
+_ROLL: Final = ("Roll, °", ("roll_rad", "twin_roll_rad", "true_roll_rad"))
+_LEVEL: Final = ("Tank level, m", ("port_level_m", "starboard_level_m", "true_level_m"))
+_PRESSURE: Final = (
+    "Pump pressure, kPa", ("pressure_command_pa", "pressure_actual_pa", "true_pressure_pa"),
+)  # fmt: skip
+WATCHED: Final = tuple((title, names[:2]) for title, names in (_ROLL, _LEVEL, _PRESSURE))
+"""Titles and columns of the watch's plots."""
+PARTS: Final = {
+    "valve": ("valve_opening",),
+    "pump": ("pressure_command_pa", "pressure_actual_pa", "pump_power_w"),
+}
+"""Columns of parts of the ship that she may not have."""
+ESTIMATES: Final = (
+    "sea_verdict", "significant_height_m", "peak_period_s", "wave_moment_rms_rad",
+    "wave_moment_deviation", "sea_age_s", "ship_verdict", "roll_period_s",
+    "roll_period_deviation_s", "gm_m", "gm_deviation_m", "ship_age_s",
+)  # fmt: skip
+MOTION, OTHERS = "Motion", "Others"
+SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
+    MOTION: (
+        _ROLL,
+        ("Roll, RMS, °", ("roll_rms_rad", "twin_roll_rms_rad")),
+        ("Roll rate, °/s", ("roll_rate_rad_s",)),
+    ),
+    "Tank and pump": (
+        _LEVEL,
+        _PRESSURE,
+        ("Pump power, kW", ("pump_power_w", "true_shaft_power_w")),
+        ("Valve opening, %", ("valve_opening",)),
+    ),
+    "Sea and ship": (
+        ("Wave moment, MN m", ("wave_moment_nm",)),
+        ("Significant wave height, m", ("significant_height_m",)),
+        ("Wave peak period, s", ("peak_period_s",)),
+        ("Roll period and its deviation, s", ("roll_period_s", "roll_period_deviation_s")),
+        ("GM and its deviation, m", ("gm_m", "gm_deviation_m")),
+    ),
+    "Loop and bus": (
+        ("Loop timing, ms", ("wakeup_lateness_s", "tick_duration_s")),
+        ("Overruns", ("overruns",)),
+        ("Bus load, %", ("bus_load",)),
+    ),
+}
+"""Plots of the engineer's tabs: title and columns, the first of them for several runs."""
 
 # Okabe and Ito's colour-blind safe palette, in an order for a dark background
 _PALETTE: Final = (
@@ -51,16 +91,17 @@ def make_blueprint(
     runs: Sequence[str],
     span_s: tuple[float, float] | None = None,
     size: SceneSize | None = None,
+    zero: Collection[tuple[str, str]] = (),
 ) -> rrb.Blueprint:
     """Lay out the views of one run, or of several on one time line.
 
     In the first tab, for the watch, the ship's section rolls beside words and a few plots around
-    the cursor. The others, for the engineer, have every signal.
+    the cursor. The others, for the engineer, have every signal, by subject.
 
     Parameters
     ----------
     columns : sequence of str
-        Telemetry columns, as given to `RunLog`.
+        Telemetry columns to be shown, of those given to `RunLog`.
     runs : sequence of str
         Names of the runs; with several, a colour stands for a run, else for a signal.
     span_s : (float, float), optional
@@ -68,32 +109,56 @@ def make_blueprint(
         around the cursor. By default the view is live and follows the newest data.
     size : SceneSize, optional
         Of the scenes, if the runs have any; without, there is no tab for the watch.
+    zero : collection of (str, str), optional
+        Run and column of the signals that are zero throughout: a line that says nothing.
     """
     boundary = rr.TimeRangeBoundary
     if span_s is None:
         around = boundary.cursor_relative(seconds=-3 * HALF_WINDOW_S), boundary.cursor_relative()
-        pages: list[rrb.Container] = [_page("Live", *around, columns, runs)]
+        ranges = {"Live": around}
     else:
         first, last = (boundary.absolute(seconds=time_s) for time_s in span_s)
         around = (
             boundary.cursor_relative(seconds=-HALF_WINDOW_S),
             boundary.cursor_relative(seconds=HALF_WINDOW_S),
         )
-        pages = [
-            _page("Whole run", first, last, columns, runs),
-            _page("At the cursor", *around, columns, runs),
-        ]
+        ranges = {"At the cursor": around, "Whole run": (first, last)}
+    pages: list[rrb.Container] = []
     if size is not None:
-        pages.insert(0, _watch(*around, runs, size))
-    body = rrb.Tabs(*pages, active_tab=0)
+        pages.append(_watch(*around, runs, size))
+    for name, (start, end) in ranges.items():
+        axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
+        for first_run in range(0, len(runs), MOST_SHADES):
+            shown = range(first_run, min(first_run + MOST_SHADES, len(runs)))
+            beside = "" if len(runs) <= MOST_SHADES else f": {', '.join(runs[i] for i in shown)}"
+            pages.append(_subjects(f"{name}{beside}", axis, columns, runs, shown, zero))
     return rrb.Blueprint(
-        body,
+        rrb.Tabs(*pages, active_tab=0),
         rrb.TimePanel(
             state="collapsed", timeline=TIMELINE, play_state="paused" if span_s else "following"
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
     )
+
+
+def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[str]:
+    """Columns without those of parts that the ship, or the controller, has not.
+
+    Parameters
+    ----------
+    columns : sequence of str
+    about : mapping or None
+        Where they come from (`utank_hil.provenance`).
+    """
+    told = (about or {}).get("configuration", {})
+    vessel = told.get("vessel") or {}
+    missing = {
+        name for part in PARTS if part in vessel and vessel[part] is None for name in PARTS[part]
+    }
+    if "sea_estimate" in told and told["sea_estimate"] is None:
+        missing.update(ESTIMATES)
+    return [column for column in columns if column not in missing]
 
 
 def _watch(
@@ -107,91 +172,155 @@ def _watch(
     bounds = rrb.VisualBounds2D(
         x_range=[-size.reach_m, size.reach_m], y_range=list(size.height_range_m)
     )
-    shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SCENES]
+    shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SHADES]
     scenes = [
         rrb.Spatial2DView(origin=scene_path(path), name=run, visual_bounds=bounds)
         for path, run in shown
     ]
     words = [rrb.TextDocumentView(origin=words_path(path), name=run) for path, run in shown]
     if len(shown) == 1:
-        plots = [_watched_plot([field_of(name) for name in names], runs, axis) for names in WATCHED]
+        plots = [
+            _plot(title, [field_of(name) for name in names], runs, range(1), axis)
+            for title, names in WATCHED
+        ]
         ship = rrb.Vertical(*scenes, *words, row_shares=[3, 2])
         return rrb.Horizontal(ship, rrb.Vertical(*plots), column_shares=[1, 1], name="Watch")
     return rrb.Vertical(
         rrb.Horizontal(*scenes),
         rrb.Horizontal(*words),
-        _watched_plot([field_of(WATCHED[0][0])], runs[:MOST_SCENES], axis),
+        _plot(WATCHED[0][0], [field_of("roll_rad")], runs, range(len(shown)), axis),
         row_shares=[4, 2, 4],
         name="Watch",
     )
 
 
-def _watched_plot(
-    fields: Sequence[Field], runs: Sequence[str], axis: rrb.TimeAxis
-) -> rrb.TimeSeriesView:
-    """A plot that names its colours in its title: a legend would hide what it is about."""
-    plot = _plot(fields[0].unit, fields, runs, axis, legend=False)
-    labels = runs if len(runs) > 1 else _short_labels([field.label for field in fields])
-    names = _COLOR_NAMES if len(runs) > 1 else _COLOR_NAMES[1:]
-    told = ", ".join(
-        f"{label or fields[0].label} {name}" for label, name in zip(labels, names, strict=False)
-    )
-    plot.name = f"{fields[0].unit.plot}: {told}"
-    return plot
-
-
-def _page(
+def _subjects(
     name: str,
-    start: rr.TimeRangeBoundary,
-    end: rr.TimeRangeBoundary,
+    axis: rrb.TimeAxis,
     columns: Sequence[str],
     runs: Sequence[str],
-) -> rrb.Vertical:
-    """Lay out all plots of a time range: main plots left, others right, states below."""
-    axis = rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end))
-    fields = [field_of(c) for c in columns if c not in (TIME_COLUMN, *STATE_COLUMNS)]
-    groups = {unit: [field for field in fields if field.unit is unit] for unit in UNITS}
-    main = [_plot(u, groups[u], runs, axis, True) for u in UNITS if groups[u] and u.main]
-    side = [
-        _plot(u, groups[u], runs, axis, len(runs) == 1) for u in UNITS if groups[u] and not u.main
-    ]
-    halves = [rrb.Vertical(*plots) for plots in (main, side) if plots]
-    rows: list[rrb.Container | rrb.View] = [
-        rrb.Horizontal(*halves, column_shares=[2, 1][: len(halves)])
-    ]
-    shares = [100]
+    shown: range,
+    zero: Collection[tuple[str, str]],
+) -> rrb.Container:
+    """Lay out all plots of a time range, a tab for each subject; states and events below."""
+    left = {
+        column: [i for i in shown if (runs[i], column) not in zero]
+        for column in columns
+        if column not in (TIME_COLUMN, *STATE_COLUMNS)
+    }
+    left = {column: those for column, those in left.items() if those}
+    tabs: list[rrb.Container | rrb.View] = []
+    for subject, plots in SUBJECTS.items():
+        views: list[rrb.View] = []
+        for title, wanted in plots:
+            fields = [field_of(column) for column in wanted if column in left]
+            if len(shown) > 1:
+                fields = fields[:1]  # the others have plots of their own
+            if fields:
+                views.append(_plot(title, fields, runs, left[fields[0].column], axis))
+            for field in fields:
+                del left[field.column]
+        paths = [run_paths(runs)[i] for i in shown]
+        if subject == MOTION and {"roll_rad", "roll_rate_rad_s"} <= set(columns):
+            half = [_phase_plane(paths), _spectra(paths)]
+            tabs.append(rrb.Horizontal(rrb.Vertical(*views), rrb.Vertical(*half),
+                                       column_shares=[2, 1], name=subject))  # fmt: skip
+        elif views:
+            tabs.append(rrb.Vertical(*views, name=subject))
+    others = _others({field_of(column): those for column, those in left.items()}, runs, axis)
+    if others:
+        tabs.append(rrb.Grid(*others, name=OTHERS))
+    rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)]
     if has_state(columns):
-        paths = run_paths(runs)
-        lanes = [state_path(path) for path in paths]
+        paths = [run_paths(runs)[i] for i in shown]
+        lanes = [lane(path) for path in paths for lane in (state_path, retuning_path)]
         rows.append(
             rrb.Horizontal(
-                rrb.StateTimelineView(contents=lanes, name="Mode and fault", time_view=axis),
+                rrb.StateTimelineView(
+                    contents=lanes, name="Mode and fault, retuning", time_view=axis
+                ),
                 rrb.TextLogView(contents=[log_path(path) for path in paths], name="Events"),
                 column_shares=[2, 1],
             )
         )
-        shares.append(15 + 5 * len(runs))
-    return rrb.Vertical(*rows, row_shares=shares, name=name)
+    return rrb.Vertical(*rows, row_shares=[100, 14 + 5 * len(shown)][: len(rows)], name=name)
+
+
+def _others(
+    fields: Mapping[Field, Sequence[int]], runs: Sequence[str], axis: rrb.TimeAxis
+) -> list[rrb.View]:
+    """Plots of what has no place of its own: by unit, of several runs one for each signal."""
+    most = MOST_SHADES if len(runs) == 1 else 1
+    groups = [[field for field in fields if field.unit.plot == plot]
+              for plot in dict.fromkeys(unit.plot for unit in UNITS)]  # fmt: skip
+    return [
+        _plot(group[0].unit.plot, group[first : first + most], runs, fields[group[first]], axis)
+        for group in groups
+        for first in range(0, len(group), most)
+    ]
+
+
+def _phase_plane(paths: Sequence[str]) -> rrb.View:
+    """Roll to the right and its rate upwards, in the last half minute before the cursor."""
+    boundary = rr.TimeRangeBoundary
+    trail = rrb.VisibleTimeRange(
+        TIMELINE,
+        start=boundary.cursor_relative(seconds=-HALF_WINDOW_S / 2),
+        end=boundary.cursor_relative(),
+    )
+    return rrb.Spatial2DView(
+        contents=[phase_path(path) for path in paths] + [f"{PHASE_AXES}/**"],
+        name="Roll rate, °/s, over roll, °: last 30 s",
+        time_ranges=[trail],
+        visual_bounds=rrb.VisualBounds2D(x_range=[-12, 12], y_range=[-10.5, 10.5]),
+    )
+
+
+def _spectra(paths: Sequence[str]) -> rrb.View:
+    """Spectra of the roll in the last minutes before the cursor."""
+    return rrb.BarChartView(
+        contents=[spectrum_path(path) for path in paths],
+        name="Spectrum of the roll in the last 5 min, °²/Hz over Hz",
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
 
 
 def _plot(
-    unit: Unit, fields: Sequence[Field], runs: Sequence[str], axis: rrb.TimeAxis, legend: bool
+    title: str,
+    fields: Sequence[Field],
+    runs: Sequence[str],
+    shown: Sequence[int],
+    axis: rrb.TimeAxis,
 ) -> rrb.TimeSeriesView:
-    """Plot every field of a unit, of every run."""
-    labels = _short_labels([field.label for field in fields])
+    """Plot fields of runs; the title names the colours: a legend would hide what it is about.
+
+    With several runs a colour is a run's and there is one field, else a field's.
+    """
+    paths = run_paths(runs)
+    if len(runs) > 1:
+        colors = {i: [run_color(i)] for i in shown}
+        named = [(runs[i], _COLOR_NAMES[i % MOST_SHADES]) for i in shown]
+    else:
+        colors = {0: list(_PALETTE[1:])}
+        labels = _short_labels([field.label for field in fields])
+        named = list(zip(labels, _COLOR_NAMES[1:], strict=False))
+        named = [(label, color) for label, color in named if label]
     overrides: dict[EntityPath | str, list[rrb.Visualizer]] = {
-        path: [
-            _line(field, f"{run} {label}" if len(runs) > 1 else label or field.label, color)
-            for field, label, color in zip(fields, labels, _colors(number, runs), strict=False)
+        paths[i]: [
+            _line(field, f"{runs[i]} {field.label}", color)
+            for field, color in zip(fields, colors[i], strict=False)
         ]
-        for number, (path, run) in enumerate(zip(run_paths(runs), runs, strict=True))
+        for i in shown
     }
+    if len(runs) > 1 and title == fields[0].unit.plot:
+        title = f"{fields[0].label}: {title}"
+    told = ", ".join(f"{label} {color}" for label, color in named)
     return rrb.TimeSeriesView(
-        contents=run_paths(runs),
+        contents=[paths[i] for i in shown],
         overrides=overrides,
-        name=unit.plot,
+        name=f"{title}: {told}" if told else title,
         axis_x=axis,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 
@@ -199,7 +328,8 @@ def _short_labels(labels: Sequence[str]) -> list[str]:
     """Drop the words that all labels of a plot share: its title has them."""
     words = [label.split() for label in labels]
     shared = set(words[0]).intersection(*words)
-    return [" ".join(word for word in label if word not in shared) for label in words]
+    short = [" ".join(word for word in label if word not in shared) for label in words]
+    return [label or "measured" for label in short] if len(short) > 1 else short
 
 
 def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualizer:
@@ -218,10 +348,6 @@ def _line(field: Field, name: str, color: tuple[int, int, int]) -> rrb.Visualize
     ).visualizer(mappings=[source])
 
 
-def _colors(run: int, runs: Sequence[str]) -> Iterator[tuple[int, int, int]]:
-    """Colour by signal; with several runs by run, darker from signal to signal."""
-    if len(runs) == 1:
-        yield from itertools.cycle(_PALETTE[1:])
-    for strength in itertools.chain((1.0, 0.6), itertools.repeat(0.35)):
-        red, green, blue = (round(part * strength) for part in _PALETTE[run % len(_PALETTE)])
-        yield red, green, blue
+def run_color(number: int) -> tuple[int, int, int]:
+    """Colour of a run among several, counted from 0; the first is grey, the reference."""
+    return _PALETTE[number % MOST_SHADES]

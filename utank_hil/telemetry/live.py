@@ -12,7 +12,7 @@ import rerun as rr
 
 from utank_hil.closing import Closing
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.event_ring import EventReader, is_event_ring
 from utank_hil.telemetry.rerun_log import APPLICATION, LIVE_RUN, RunLog, run_paths, write_about
 from utank_hil.telemetry.ring import RingReader, ring_names
@@ -98,7 +98,9 @@ class LiveStream(Closing):
             self._recording.set_sinks(
                 rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=MEMORY),
                 default_blueprint=make_blueprint(
-                    columns, [LIVE_RUN], size=scene_size(columns, run.about)
+                    columns_of(columns, run.about),
+                    [LIVE_RUN],
+                    size=scene_size(columns, run.about),
                 ),
             )
             stack.callback(self._recording.disconnect)

@@ -9,11 +9,12 @@ import rerun as rr
 
 from utank_hil.arrays import FloatArray
 from utank_hil.closing import Closing
-from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.rerun_log import (
     APPLICATION,
     LIVE_RUN,
+    PICTURES_S,
     RunLog,
     run_paths,
     time_index,
@@ -23,7 +24,6 @@ from utank_hil.telemetry.rotation import Rotation, bytes_of, part_of, remove_old
 from utank_hil.telemetry.scene import scene_size
 
 _FLUSH_TIMEOUT_S: Final = 5.0
-_SCENE_BATCH_S: Final = 60.0  # what a kill may lose of the pictures; the rows are there
 _GROWTH: Final = 1.05
 _RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
 _FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
@@ -118,12 +118,14 @@ class RecordingParts(Closing):
         size = scene_size(self._columns, self._about)
         recording.set_sinks(
             rr.FileSink(self._file),
-            default_blueprint=make_blueprint(self._columns, [LIVE_RUN], size=size),
+            default_blueprint=make_blueprint(
+                columns_of(self._columns, self._about), [LIVE_RUN], size=size
+            ),
         )
         if self._about is not None:
             write_about(recording, self._about)
         path = run_paths([LIVE_RUN])[0]
-        self._log = RunLog(recording, path, self._columns, self._about, _SCENE_BATCH_S)
+        self._log = RunLog(recording, path, self._columns, self._about, PICTURES_S)
 
     def _end(self) -> None:
         """Finish a file."""

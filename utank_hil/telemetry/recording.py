@@ -15,12 +15,14 @@ from rerun.error_utils import RerunWarning
 
 from utank_hil.arrays import FloatArray
 from utank_hil.retuning.law_exchange import RetuningEvent
-from utank_hil.telemetry.blueprint import make_blueprint
+from utank_hil.telemetry.blueprint import MOST_SHADES, columns_of, make_blueprint, run_color
 from utank_hil.telemetry.rerun_log import (
     ABOUT,
     APPLICATION,
     ARCHETYPE,
     COMPONENT,
+    ONE_COLOR,
+    PICTURES_S,
     TIME_COLUMN,
     RunLog,
     run_of,
@@ -76,19 +78,38 @@ def write_recording(
             raise ValueError(f"run {run!r} has no rows")
     time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
     blueprint = make_blueprint(
-        columns, list(runs), span_s=(time_s.min(), time_s.max()), size=scene_size(columns, about)
+        columns_of(columns, about),
+        list(runs),
+        span_s=(time_s.min(), time_s.max()),
+        size=scene_size(columns, about),
+        zero=_zero(columns, runs),
     )
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
     if about is not None:
         write_about(recording, about)
-    for path_of_run, (run, rows) in zip(run_paths(list(runs)), runs.items(), strict=True):
-        log = RunLog(recording, path_of_run, columns, about)
+    for number, (path_of_run, (run, rows)) in enumerate(
+        zip(run_paths(list(runs)), runs.items(), strict=True)
+    ):
+        color = ONE_COLOR if len(runs) == 1 else run_color(number)
+        beside = number % MOST_SHADES, min(len(runs), MOST_SHADES)
+        log = RunLog(recording, path_of_run, columns, about, PICTURES_S, color, beside)
         for start in range(0, len(rows), _BLOCK_ROWS):
             log.write(rows[start : start + _BLOCK_ROWS])
         log.write_events((events or {}).get(run, ()))
+        log.close()
     recording.flush()
     recording.disconnect()
+
+
+def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[str, str]]:
+    """Run and column of the signals that are zero, or unknown, throughout."""
+    return {
+        (run, column)
+        for run, rows in runs.items()
+        for column, seen in zip(columns, (np.nan_to_num(rows) != 0).any(axis=0), strict=True)
+        if not seen
+    }
 
 
 def read_recording(path: Path) -> dict[str, dict[str, FloatArray]]:

@@ -17,8 +17,9 @@ import pyarrow as pa  # it ships no annotations
 import rerun as rr
 
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.event_ring import Event, event_text, warns
+from utank_hil.telemetry.motion_figures import NEEDED, MotionFigures
 from utank_hil.telemetry.scene import Scene, scene_size
 from utank_hil.telemetry.units import field_of
 from utank_hil.telemetry.viewer import TIMELINE
@@ -35,6 +36,10 @@ COMPONENT: Final = "row"
 STATE_COLUMNS: Final = ("mode", "fault")
 """Columns that make up the state lane of a run."""
 
+PICTURES_S: Final = 60.0
+"""Of pictures are written to a file at once: a kill loses as many, the rows are there."""
+ONE_COLOR: Final = (0xE6, 0x9F, 0x00)
+"""Of a run that is alone."""
 _ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
 
 _MODE_COLORS: Final = {
@@ -52,6 +57,11 @@ def _state_name(mode: float, fault: float) -> str:
     if fault == Fault.NONE:
         return name
     return f"{name}: {Fault(int(fault)).name if fault in set(Fault) else f'fault {fault:g}'}"
+
+
+def _retuning_name(state: float) -> str:
+    """Name a state of retuning; an unknown one as a number."""
+    return RetuningState(int(state)).name if state in set(RetuningState) else f"{state:g}"
 
 
 def _level(mode: float, fault: float) -> rr.TextLogLevel:
@@ -74,8 +84,12 @@ class RunLog:
         Names of a row's values; `time_s` must be among them.
     about : mapping, optional
         Where it comes from (`utank_hil.provenance`); with the ship in it there is a scene.
-    scene_batch_s : float, optional
+    batch_s : float, optional
         As in `Scene`; by default pictures are sent at once.
+    color : tuple of int
+        Of the run, among several.
+    beside : (int, int)
+        As in `MotionFigures`.
 
     Raises
     ------
@@ -89,16 +103,24 @@ class RunLog:
         path: str,
         columns: Sequence[str],
         about: Mapping[str, Any] | None = None,
-        scene_batch_s: float = 0.0,
+        batch_s: float = 0.0,
+        color: tuple[int, int, int] = ONE_COLOR,
+        beside: tuple[int, int] = (0, 1),
     ) -> None:
         self._recording = recording
         size = scene_size(columns, about)
-        self._scene = None if size is None else Scene(recording, path, columns, size, scene_batch_s)
+        self._pictures: list[Scene | MotionFigures] = []
+        if size is not None:
+            self._pictures.append(Scene(recording, path, columns, size, batch_s))
+        if set(NEEDED) <= set(columns):
+            self._pictures.append(MotionFigures(recording, path, columns, color, batch_s, beside))
         self._path = path
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
         self._state: list[int] = []
         self._last = np.full(2, np.nan)
+        self._retuning = columns.index("retuning") if "retuning" in columns else None
+        self._last_retuning = float(RetuningState.IDLE)
         if has_state(columns):
             self._state = [columns.index(c) for c in STATE_COLUMNS]
             colors = {_state_name(m, f): _MODE_COLORS[m] for m in Mode for f in Fault}
@@ -120,13 +142,15 @@ class RunLog:
         )
         if self._state:
             self._write_state(time_ns, rows[:, self._state])
-        if self._scene is not None:
-            self._scene.write(rows)
+        if self._retuning is not None:
+            self._write_retuning(time_ns, rows[:, self._retuning])
+        for picture in self._pictures:
+            picture.write(rows)
 
     def close(self) -> None:
         """Send the pictures that are held; idempotent."""
-        if self._scene is not None:
-            self._scene.close()
+        for picture in self._pictures:
+            picture.close()
 
     def _write_state(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
         """Log the state's name wherever mode or fault changes."""
@@ -142,6 +166,18 @@ class RunLog:
                 strict=True,
             )
             self._write_text(time_ns[changed], names, [_level(*state) for state in states[changed]])
+
+    def _write_retuning(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
+        """Log the name of the state of retuning wherever it changes."""
+        changed = np.diff(states, prepend=self._last_retuning) != 0
+        self._last_retuning = float(states[-1])
+        if changed.any():
+            self._recording.send_columns(
+                retuning_path(self._path),
+                [rr.TimeColumn(TIMELINE, duration=time_ns[changed])],
+                rr.StateChange.columns(state=[_retuning_name(state) for state in states[changed]]),
+                strict=True,
+            )
 
     def write_events(self, events: Sequence[Event]) -> None:
         """Log events of retuning and alarms; `time_ns` is on the clock of the rows' `time_s`."""
@@ -204,6 +240,11 @@ def run_of(path: str) -> str:
 def state_path(path: str) -> str:
     """Return the entity path of a run's state lane."""
     return f"{path}/state"
+
+
+def retuning_path(path: str) -> str:
+    """Return the entity path of a run's lane of retuning."""
+    return f"{path}/retuning"
 
 
 def log_path(path: str) -> str:

@@ -20,30 +20,29 @@ class Unit:
     scale : float
         Displayed value per SI value.
     plot : str
-        Title of the plot of all columns of this unit.
-    main : bool
-        Whether that plot is one of the large ones.
+        Title of the plot of those columns of this unit that have none of their own.
     """
 
     suffix: str
     shown_suffix: str
     scale: float
     plot: str
-    main: bool = False
 
 
 # In order of matching: a suffix comes before any shorter one that it ends in.
 UNITS = (
-    Unit("_rad_s", "_deg_s", 180 / math.pi, "Roll rate, °/s"),
-    Unit("_rad", "_deg", 180 / math.pi, "Roll, °", main=True),
-    Unit("_pa", "_kpa", 1e-3, "Pump pressure, kPa", main=True),
-    Unit("_m_s", "_m_s", 1.0, "Level rate, m/s"),
-    Unit("_m", "_m", 1.0, "Tank level, m", main=True),
+    Unit("_rad_s", "_deg_s", 180 / math.pi, "Angular rate, °/s"),
+    Unit("_rad", "_deg", 180 / math.pi, "Angle, °"),
+    Unit("_pa", "_kpa", 1e-3, "Pressure, kPa"),
+    Unit("_m_s", "_m_s", 1.0, "Speed, m/s"),
+    Unit("_m", "_m", 1.0, "Length, m"),
     Unit("_nm", "_mnm", 1e-6, "Moment, MN m"),
-    Unit("_w", "_kw", 1e-3, "Pump power, kW"),
+    Unit("_w", "_kw", 1e-3, "Power, kW"),
     Unit("_opening", "_opening_percent", 100.0, "Valve opening, %"),
     Unit("_load", "_load_percent", 100.0, "Bus load, %"),
-    Unit("_s", "_ms", 1e3, "Loop timing, ms"),
+    Unit("_lateness_s", "_lateness_ms", 1e3, "Loop timing, ms"),
+    Unit("_duration_s", "_duration_ms", 1e3, "Loop timing, ms"),
+    Unit("_s", "_s", 1.0, "Time, s"),
     Unit("", "", 1.0, "Counts"),
 )
 
@@ -54,6 +53,8 @@ class Field:
 
     Attributes
     ----------
+    column : str
+        Its name, in SI units.
     name : str
         Name in the recording, unit included.
     label : str
@@ -61,6 +62,7 @@ class Field:
     unit : Unit
     """
 
+    column: str
     name: str
     label: str
     unit: Unit
@@ -79,7 +81,7 @@ def field_of(column: str) -> Field:
     name = stem + unit.shown_suffix
     if column_of(name) != (column, unit):
         raise ValueError(f"telemetry column {column!r}: columns are in SI units")
-    return Field(name, stem.replace("_", " "), unit)
+    return Field(column, name, stem.replace("_", " "), unit)
 
 
 def column_of(name: str) -> tuple[str, Unit]:
