@@ -1,0 +1,56 @@
+"""A self-tuned law is renewed on the bench, the same each time, and replayed frame by frame."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware_sim.bench import jobs_of
+from firmware_sim.run import Job, run_lockstep
+from firmware_sim.scenario import Scenario
+from utank_hil.assembly import build_law
+from utank_hil.canbus import RetuningState
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.retuning import EstimateSettings, estimating
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.replay import entries_of, replay
+from utank_hil.telemetry.replay_head import causes, recorded_config
+
+pytestmark = pytest.mark.slow
+
+DESIGN, TRIAL = RetuningState.DESIGN, RetuningState.TRIAL
+SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
+
+
+class Unwatched:
+    def stopped(self, done_s: float) -> bool:
+        return False
+
+
+def job_of(duration_s: float) -> Job:
+    """The shipped configuration, which estimates more often and from a shorter record."""
+    config = load_config(Path("configs/controllers/self_tuning.yaml"), ControllerConfig)
+    often = EstimateSettings(every_s=30.0, record_s=300.0, renew=True)
+    config = config.model_copy(update={"sea_estimate": often})
+    scenario = SCENARIO.model_copy(update={"controllers": {"renewed": config}})
+    return jobs_of(scenario, 1, duration_s)[1]
+
+
+def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # three minutes: what is tried here is the exchange, not the estimate
+    monkeypatch.setattr(estimating, "LEAST_PERIODS", 14.0)
+    job = job_of(240.0)
+    file = tmp_path / "renewed.frames"
+    logged = run_lockstep(replace(job, frames=file), Unwatched())
+    assert [event.state for event in logged.retuning] == [DESIGN, TRIAL]
+    assert "renewed for Hs" in logged.retuning[-1].reasons[0]
+    np.testing.assert_array_equal(logged.rows, run_lockstep(job, Unwatched()).rows)
+    log = FrameLog(file)
+    with recorded_config(log.head) as config:
+        law = build_law(config)
+        result = replay(entries_of(log.blocks()), config, law, retuner=True, estimating=True)
+        assert causes(log.head, config, law, tmp_path) == []
+    assert (result.first, result.ticks) == (None, 24_000)
