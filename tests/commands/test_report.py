@@ -84,6 +84,42 @@ def test_the_page_of_a_recording_says_what_happened(recording: Path, tmp_path: P
     assert "kind: gpc" in page  # the whole configuration
 
 
+def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) -> Path:
+    """A recording of a law in charge throughout, whose passive twin rolls twice as much."""
+    rows = np.zeros((len(roll_rad), len(SIGNALS)))
+    for name, values in (
+        ("time_s", 0.05 * np.arange(len(roll_rad))),
+        ("roll_rad", roll_rad),
+        ("twin_roll_rad", 2 * roll_rad),
+        ("mode", Mode.ACTIVE),
+    ):
+        rows[:, SIGNALS.index(name)] = values
+    write_recording(path, SIGNALS, dict.fromkeys(runs, rows))
+    return path
+
+
+def test_gaps_in_the_roll_are_left_out_of_its_figures(tmp_path: Path) -> None:
+    roll = 0.03 * np.sin(0.5 * 0.05 * np.arange(5000))
+    roll[:10] = roll[1000:1500] = np.nan
+    page = write_page([of_roll(tmp_path / "a.rrd", roll)], tmp_path / "a.html").read_text()
+    rms = math.degrees(math.sqrt(np.nanmean(roll**2)))
+    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of her passive twin" in page
+    assert "her roll is known for 89.8% of it" in page
+    assert "Spectra and exceedance" in page
+    page = write_page([of_roll(tmp_path / "b.rrd", np.nan * roll)], tmp_path / "b.html").read_text()
+    assert "In charge for 100% of the time: how much she rolled is not known." in page
+    assert "Spectra and exceedance" not in page
+
+
+def test_what_no_report_can_be_made_of_is_refused(tmp_path: Path) -> None:
+    one = of_roll(tmp_path / "one.rrd", np.array([0.1]))
+    with pytest.raises(ValueError, match=r"one\.rrd: 1 rows are too few for a report"):
+        write_page([one], tmp_path / "page.html")
+    bench = of_roll(tmp_path / "bench.rrd", np.zeros(100), ("passive", "gpc"))
+    with pytest.raises(ValueError, match="holds the runs passive, gpc of a bench: give its folder"):
+        write_page([bench], tmp_path / "page.html")
+
+
 def test_the_page_needs_nothing_else_and_is_whole(recording: Path, tmp_path: Path) -> None:
     written = write_page([recording], tmp_path / "page.html")
     assert written.stat().st_size < 5e6

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.arrays import FloatArray
@@ -23,6 +24,7 @@ from utank_hil.telemetry.highlight import in_service
 
 STEP_S: Final = 0.05
 """Between the samples that are drawn: ample for a ship."""
+LEAST_ROWS: Final = 3
 RUN, LOG = "run-", "log-"
 """Beginnings of the names of a run's recording and of its log of alarms."""
 
@@ -40,11 +42,16 @@ def recording_report(file: Path, scratch: Path) -> Report:
     Raises
     ------
     OSError, ValueError
-        If the file is no recording.
+        If the file is no recording, one of several runs, or one of hardly any rows.
     """
     from utank_hil.telemetry.recording import read_about, read_recording
 
-    ((name, rows),) = list(read_recording(file).items())[:1]
+    runs = read_recording(file)
+    if len(runs) > 1:
+        raise ValueError(f"{file}: holds the runs {', '.join(runs)} of a bench: give its folder")
+    ((name, rows),) = runs.items()
+    if len(rows["time_s"]) < LEAST_ROWS:
+        raise ValueError(f"{file}: {len(rows['time_s'])} rows are too few for a report")
     try:
         about: dict[str, Any] | None = read_about(file)
     except ValueError:
@@ -57,9 +64,11 @@ def recording_report(file: Path, scratch: Path) -> Report:
         _alarm_section(alarms, file),
     ]
     rolls = {"passive twin": rows["twin_roll_rad"], "ship": rows["roll_rad"]}
-    known = {each: roll for each, roll in rolls.items() if np.isfinite(roll).all()}
-    step_s = float(np.median(np.diff(rows["time_s"])))
-    sections.append(roll_figure(known, step_s, scratch))
+    stretches = {each: _longest_known(roll) for each, roll in rolls.items()}
+    known = {each: roll for each, roll in stretches.items() if len(roll) >= LEAST_ROWS}
+    if known:
+        step_s = float(np.median(np.diff(rows["time_s"])))
+        sections.append(roll_figure(known, step_s, scratch))
     sections.append(_deadlines(rows))
     if about is not None:
         sections.append(about_section(about, about["configuration"]))
@@ -72,16 +81,7 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
     lines = []
     active = rows["mode"] == Mode.ACTIVE
     if active.any():
-        roll = roll_statistics(rows["roll_rad"][active])
-        line = f"In charge for {active.mean():.0%} of the time: {_degrees(roll.rms_rad)} RMS"
-        twin_rad = rows["twin_roll_rad"][active]
-        if np.isfinite(twin_rad).all() and (twin := float(np.sqrt(np.mean(twin_rad**2)))) > 0:
-            share = 1 - roll.rms_rad / twin
-            line += (
-                f", {abs(share):.0%} {'less' if share >= 0 else 'more'} than the "
-                f"{_degrees(twin)} of her passive twin"
-            )
-        lines.append(f"{line}; {_degrees(roll.maximum_rad)} at most.")
+        lines.append(f"In charge for {active.mean():.0%} of the time: {_rolled(rows, active)}.")
     else:
         lines.append("The controller was never in charge.")
     codes = np.unique(rows["fault"][in_service(rows)])
@@ -90,6 +90,33 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
     raised = {alarm["fault"] for alarm in alarms if alarm.get("state")}
     lines += [f"Alarm: {name}." for name in sorted(raised - {fault.name for fault in faults})]
     return Verdict(lines, good=not (faults or raised))
+
+
+def _rolled(rows: dict[str, FloatArray], active: npt.NDArray[np.bool_]) -> str:
+    """How much she rolled in these rows, as far as it is known."""
+    known = active & np.isfinite(rows["roll_rad"])
+    if not known.any():
+        return "how much she rolled is not known"
+    roll = roll_statistics(rows["roll_rad"][known])
+    words = f"{_degrees(roll.rms_rad)} RMS"
+    both = known & np.isfinite(rows["twin_roll_rad"])
+    twin = roll_statistics(rows["twin_roll_rad"][both]).rms_rad if both.any() else 0.0
+    if twin > 0:
+        share = 1 - roll_statistics(rows["roll_rad"][both]).rms_rad / twin
+        words += (
+            f", {abs(share):.0%} {'less' if share >= 0 else 'more'} than the "
+            f"{_degrees(twin)} of her passive twin"
+        )
+    words += f"; {_degrees(roll.maximum_rad)} at most"
+    share_known = known.sum() / active.sum()
+    return words if share_known == 1 else f"{words}; her roll is known for {share_known:.1%} of it"
+
+
+def _longest_known(roll_rad: FloatArray) -> FloatArray:
+    """The longest stretch without a gap, which a spectrum needs."""
+    ends = np.flatnonzero(~np.isfinite(np.concatenate([[np.nan], roll_rad, [np.nan]])))
+    longest = int(np.diff(ends).argmax())
+    return roll_rad[ends[longest] : ends[longest + 1] - 1]
 
 
 def _degrees(angle_rad: float) -> str:
