@@ -17,8 +17,10 @@ from firmware_sim.comparison.difference import (
     paired,
     same_runs,
 )
+from firmware_sim.plant_kernel import CAPSIZE_RAD
 from utank_hil.analysis.motion.confidence import batch_means, rms_batches
 from utank_hil.arrays import FloatArray
+from utank_hil.canbus.enumerations import Mode
 from utank_hil.telemetry.recording import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
 
@@ -32,6 +34,9 @@ LEAST_PERIODS: Final = 20
 """The same in a shorter record, down to `LEAST_BATCHES`."""
 MOST_BATCHES, LEAST_BATCHES = 30, 6
 _WAVES: Final = ("sea", "voyage", "vessel")
+
+CHARGE_ALIKE: Final = 0.1
+"""Share of the time in charge by which records may differ without a word."""
 
 LEAST_KNOWN: Final = 0.9
 """Of the values of a column, for a figure to be made from it."""
@@ -129,6 +134,12 @@ def _compared(first: Record, second: Record) -> list[Comparison]:
     for run, other in pairs:
         one, two = first.columns(run), second.columns(other)
         remarks = list(differing(first.about, second.about))
+        capsized = _capsized((first.path, run, one), (second.path, other, two))
+        if capsized:
+            remarks.append(f"not compared: the ship capsized in {' and '.join(capsized)}")
+            found.append(Comparison(str(second.path), run, {}, {}, tuple(remarks)))
+            continue
+        remarks += _in_charge(run, one, two)
         same = together and _at_same_times(one, two)
         if not same:
             remarks.append("not the same waves at the same times: not paired")
@@ -149,6 +160,25 @@ def _compared(first: Record, second: Record) -> list[Comparison]:
             remarks.append(f"no interval: shorter than {LEAST_BATCHES * LEAST_PERIODS} rolls")
         found.append(Comparison(str(second.path), run, {}, figures, tuple(remarks)))
     return found
+
+
+def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
+    """Runs, by name and file, in which the ship capsized: how she lies there is no roll."""
+    return [
+        f"run {run} of {path}"
+        for path, run, columns in records
+        if np.nanmax(np.abs(columns.get("true_roll_rad", 0.0)), initial=0.0) >= CAPSIZE_RAD
+    ]
+
+
+def _in_charge(run: str, one: Columns, two: Columns) -> list[str]:
+    """What is to be said where the law was in charge for longer in one record than in the other."""
+    if "mode" not in one or "mode" not in two:
+        return []
+    first, second = (float(np.mean(each["mode"] == Mode.ACTIVE)) for each in (one, two))
+    if abs(first - second) <= CHARGE_ALIKE:
+        return []
+    return [f"run {run}: in charge for {first:.0%} of the time in the first, {second:.0%} in this"]
 
 
 def _at_same_times(one: Columns, two: Columns) -> bool:
@@ -194,6 +224,8 @@ def batch_count(run: Columns) -> int:
     """Batches of a run: of `BATCH_PERIODS` rolls, or of `LEAST_PERIODS` up to `LEAST_BATCHES`."""
     roll_rad = run.get("true_roll_rad", run["roll_rad"])
     roll_rad = roll_rad[np.isfinite(roll_rad)]
+    if not len(roll_rad):
+        return 0
     roll_rad = roll_rad - roll_rad.mean()
     # noise crosses zero often: a roll is from well to port to well to starboard
     sides = np.sign(roll_rad[np.abs(roll_rad) > roll_rad.std() / 2])

@@ -17,6 +17,7 @@ from firmware_sim.commands.compare import compare
 from firmware_sim.comparison.difference import independent, paired
 from firmware_sim.comparison.records import batch_count
 from utank_hil.analysis.motion.confidence import batch_means, rms_batches
+from utank_hil.canbus.enumerations import Mode
 from utank_hil.commands.common import new_app
 from utank_hil.telemetry import write_recording
 
@@ -192,6 +193,31 @@ def test_gaps_are_left_out_if_they_are_few(tmp_path: Path):
     done = CliRunner().invoke(APP, [str(paths[0]), str(table)])
     assert done.exit_code == 2
     assert "know 90% of the values" in done.stderr
+
+
+def test_capsized_ship_has_no_figures_and_a_law_that_lost_the_pump_is_named(tmp_path: Path):
+    names, roll = ("time_s", "roll_rad", "true_roll_rad", "mode"), waves(5, 600.0)
+    active = np.full(len(roll), Mode.ACTIVE)
+    columns = np.column_stack([np.arange(len(roll)) / 20, roll, roll, active])
+    lost, over = columns.copy(), columns.copy()
+    lost[len(roll) // 2 :, 3] = Mode.FAULT
+    over[len(roll) // 2 :, 2] = math.radians(90.02)
+    paths = [tmp_path / f"{name}.rrd" for name in ("well", "lost", "over")]
+    for path, rows in zip(paths, (columns, lost, over), strict=True):
+        write_recording(path, names, {"gpc": rows})
+    of_lost, of_over = found(*paths)["comparisons"]
+    assert "run gpc: in charge for 100% of the time in the first, 50% in this" in of_lost["remarks"]
+    assert of_lost["figures"]
+    assert of_over["figures"] == {}
+    said = f"not compared: the ship capsized in run gpc of {paths[2]}"
+    assert of_over["remarks"] == [said]
+    done = CliRunner().invoke(APP, list(map(str, paths)), env={"COLUMNS": "200"})
+    assert said in done.stdout
+
+
+def test_record_without_a_known_roll_raises_no_warning(tmp_path: Path, recwarn):
+    assert batch_count({"roll_rad": np.full(100, np.nan)}) == 0
+    assert not recwarn.list
 
 
 def test_table_of_a_bench_fits_eighty_columns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
