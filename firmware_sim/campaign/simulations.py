@@ -27,7 +27,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.control.interface import PRESSURE
-from utank_hil.control.limits import CommandLimiter
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES
 from utank_hil.tick import TICK_NS, TICK_S
 

@@ -135,10 +135,11 @@ def test_the_glossary_s_places_are_right() -> None:
 
 
 def test_a_wrong_place_is_found() -> None:
-    limits = "control/limits.py"
-    assert missing(["CommandLimiter._barrier_pa", "PumpLimits.level_m"], limits) == []
-    assert missing(["CommandLimiter.command_pa"], limits) == []
-    assert missing(["barrier_pa", "CommandLimiter.barrier"], limits) != []
+    limiter = "control/limiter.py"
+    assert missing(["CommandLimiter._barrier_pa"], limiter) == []
+    assert missing(["PumpLimits.level_m"], "control/limits.py") == []
+    assert missing(["CommandLimiter.command_pa"], limiter) == []
+    assert missing(["barrier_pa", "CommandLimiter.barrier"], limiter) != []
     assert missing(["x"], "control/nothing.py") == ["control/nothing.py"]
     assert missing(["SENSOR_MOTION"], "canbus/utank.dbc") == []
     assert is_name("analysis.loop.margins.margins")

@@ -17,7 +17,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
         "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
     },
-    "utank_hil/control/limits.py": {
+    "utank_hil/control/limiter.py": {
         "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
         "if math.isfinite(desired_pa + level_m - level_rate_m_s):": _SUM,
         "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
@@ -83,7 +83,8 @@ TARGETS = (
         (_SUPERVISOR, "tests/runtime/test_safety_limits.py"),
         _NODE,
     ),
-    Target("utank_hil/control/limits.py", ("tests/control/test_limits.py",)),
+    Target("utank_hil/control/limits.py", ("tests/control/test_limiter.py",)),
+    Target("utank_hil/control/limiter.py", ("tests/control/test_limiter.py",)),
     Target(
         "utank_hil/canbus/endpoints.py",
         ("tests/canbus/test_endpoints.py",),

@@ -10,7 +10,8 @@ from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import BuiltLaw, Controller, LawDesign, LinearLaw
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.control.limits import CommandLimiter, PumpLimits
+from utank_hil.control.limiter import CommandLimiter
+from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.optimal_tank import (

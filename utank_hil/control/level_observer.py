@@ -1,7 +1,7 @@
 """Level and its rate from level gauges and pump pressure: an observer with the tank's own model.
 
 An alpha-beta filter alone gives the rate late by two of its time constants, and the level barrier
-(`utank_hil.control.limits`) pays for each tenth of a second with level and with roll. Gravity and
+(`utank_hil.control.limiter`) pays for each tenth of a second with level and with roll. Gravity and
 pump make most of the water's acceleration, so they are fed forward; what is left to the filter is
 the ship's push::
 

@@ -14,7 +14,7 @@ import numpy as np
 from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
-from utank_hil.control.limits import CommandLimiter
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES, coupled_matrices
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.ship import RollShip

@@ -25,7 +25,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.control.limits import CommandLimiter
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
 from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults

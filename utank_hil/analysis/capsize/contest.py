@@ -17,7 +17,8 @@ from utank_hil.control.feedback_linearization import FeedbackLinearization, leve
 from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.interface import Controller
-from utank_hil.control.limits import CommandLimiter, PumpLimits
+from utank_hil.control.limiter import CommandLimiter
+from utank_hil.control.limits import PumpLimits
 from utank_hil.control.passive import PassiveController
 from utank_hil.control.tracking_error import ErrorDynamics
 from utank_hil.dynamics.nonlinear import RollModel

@@ -14,7 +14,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.interface import Controller
-from utank_hil.control.limits import CommandLimiter
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.simulate import WaveMoment, whole_steps
 

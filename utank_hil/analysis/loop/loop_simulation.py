@@ -15,7 +15,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.control.limits import CommandLimiter
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
