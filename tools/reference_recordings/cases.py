@@ -3,29 +3,23 @@
 All are in simulated time and follow from this file, the shipped configurations and their seeds.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic import TypeAdapter
+
+from firmware_sim.fault_injection.faulty_node import FaultyNode, Span
+from firmware_sim.fault_injection.kinds import AnyFault, place_all
+from firmware_sim.fault_injection.place import Bench
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law, works_of
-from utank_hil.canbus import (
-    DriveFault,
-    DriveStatus2,
-    Frame,
-    OperatorCommand,
-    PumpCommand,
-    SensorMotion,
-    SensorTank,
-    Switch,
-    load_catalogue,
-)
+from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime import Lockstep, Node
-from utank_hil.runtime.node import Selective
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
@@ -34,33 +28,12 @@ from utank_hil.telemetry.replay_head import replay_head
 SCENARIOS: Final = Path("configs/scenarios")
 CONTROLLERS: Final = Path("configs/controllers")
 _WHOLE_NS: Final = 1 << 62
-_CATALOGUE: Final = load_catalogue()
+_FAULTS: Final = TypeAdapter(tuple[AnyFault, ...])
 
-Spoil = Callable[[Frame], Iterable[Frame]]
-"""Frames that reach the bus instead of one that its node sent."""
 Script = tuple[tuple[float, Action], ...]
 
 ARM: Final[Script] = ((0.3, Action.ARM),)
 AGAIN: Final[Script] = ((6.0, Action.RESET), (6.5, Action.DISARM), (7.0, Action.ARM))
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """What happens to one node between two times.
-
-    Attributes
-    ----------
-    node : str
-        Its name; the controller's is "controller".
-    begin_s, end_s : float
-    spoil : callable, optional
-        What becomes of its frames; without it, the node does not tick.
-    """
-
-    node: str
-    begin_s: float
-    end_s: float = 1e6
-    spoil: Spoil | None = None
 
 
 @dataclass(frozen=True)
@@ -76,7 +49,10 @@ class Case:
     seconds : float
     script : tuple
         Times and buttons of the operator.
-    troubles : tuple of Trouble
+    faults : tuple of dict
+        As a scenario lists them; not of the controller.
+    late_s : tuple of tuple of float
+        From when to when the controller does not tick.
     scenario : str
         Name of a shipped scenario: ship and sea.
     link_errors_s : tuple of float
@@ -88,125 +64,57 @@ class Case:
     by_tick : bool
         Frames reach the controller with its next tick, as in real time, and not when they end on
         the bus: the times of a long log take no room then.
-    intruder_s : float, optional
-        When a second node begins to send with the controller's address.
     """
 
     name: str
     controller: str
     seconds: float
     script: Script = ARM
-    troubles: tuple[Trouble, ...] = ()
+    faults: tuple[dict[str, Any], ...] = ()
+    late_s: tuple[tuple[float, float], ...] = ()
     scenario: str = "storm"
     link_errors_s: tuple[float, ...] = ()
     retuning: dict[str, Any] = field(default_factory=dict)
     quiet: bool = False
     by_tick: bool = False
-    intruder_s: float | None = None
-
-    def has_troubles(self, node: str) -> bool:
-        """Whether anything happens to a node."""
-        return any(trouble.node == node for trouble in self.troubles)
 
 
-class Troubled:
-    """A node with its troubles.
+class LateNode:
+    """The controller, which may be late: frames then wait for its next tick, as in a socket."""
 
-    Frames that arrive while it does not tick wait for its next tick, as in a socket.
-    """
-
-    def __init__(self, node: Node, case: Case) -> None:
+    def __init__(self, node: NodeTap, case: Case) -> None:
         self.name, self.period_ns = node.name, node.period_ns
-        if isinstance(node, Selective):
-            self.hears = node.hears
         self._node = node
-        self._troubles = [each for each in case.troubles if each.node == node.name]
+        self._late = [Span(round(begin * 1e9), round(end * 1e9)) for begin, end in case.late_s]
         self._link_errors_ns = [round(time_s * 1e9) for time_s in case.link_errors_s]
-        self._by_tick = case.by_tick and isinstance(node, NodeTap)
+        self._by_tick = case.by_tick
         self._waiting: list[Frame] = []
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
-        trouble = self._now(now_ns)
-        if self._by_tick or (trouble is not None and trouble.spoil is None):
+        if self._by_tick or self._is_late(now_ns):
             self._waiting.append(frame)
         else:
             self._node.receive(frame, now_ns)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Run one period."""
-        trouble = self._now(now_ns)
-        if trouble is not None and trouble.spoil is None:
+        if self._is_late(now_ns):
             return ()
         for frame in self._waiting:
             self._node.receive(frame, now_ns)
         self._waiting.clear()
-        if isinstance(self._node, NodeTap) and now_ns in self._link_errors_ns:
+        if now_ns in self._link_errors_ns:
             self._node.link_error(now_ns, "no such device")
-        frames = self._node.tick(now_ns)
-        if trouble is None or trouble.spoil is None:
-            return frames
-        return [left for frame in frames for left in trouble.spoil(frame)]
+        return self._node.tick(now_ns)
 
-    def _now(self, now_ns: int) -> Trouble | None:
-        for trouble in self._troubles:
-            if trouble.begin_s * 1e9 <= now_ns < trouble.end_s * 1e9:
-                return trouble
-        return None
+    def _is_late(self, now_ns: int) -> bool:
+        return any(span.holds(now_ns) for span in self._late)
 
 
-class Intruder:
-    """A second node that sends with the controller's address, from a time on."""
+def _motion(kind: str, at_s: float, for_s: float | None, **keys: Any) -> dict[str, Any]:
+    return {"kind": kind, "message": "SENSOR_MOTION", "at_s": at_s, "for_s": for_s, **keys}
 
-    name, period_ns = "intruder", 20_000_000
-
-    def __init__(self, begin_s: float) -> None:
-        self._begin_ns = round(begin_s * 1e9)
-        self._sender = _CATALOGUE.transmitter(PumpCommand)
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Hear nothing."""
-
-    def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Send commands."""
-        frame = self._sender.frame(PumpCommand(5e3, None, 0.05))
-        return (frame,) if now_ns >= self._begin_ns else ()
-
-
-def dropped(*kinds: type[Any]) -> Spoil:
-    """Loses messages of some kinds, all if none is named."""
-    ids = {_CATALOGUE.codec(kind).can_id for kind in kinds}
-    return lambda frame: () if not ids or frame.can_id in ids else (frame,)
-
-
-def damaged(frame: Frame) -> Iterable[Frame]:
-    """Flips bits of the motion sensor's frames."""
-    if frame.can_id != _CATALOGUE.codec(SensorMotion).can_id:
-        return (frame,)
-    data = bytearray(frame.data)
-    data[3] ^= 0x24
-    return (Frame(frame.can_id, bytes(data)),)
-
-
-def altered(kind: type[Any], change: Callable[[Any], Any]) -> Spoil:
-    """Changes what messages of a kind say, rightly protected and counted."""
-    codec = _CATALOGUE.codec(kind)
-
-    def alter(frame: Frame) -> Iterable[Frame]:
-        if frame.can_id != codec.can_id:
-            return (frame,)
-        data = codec.encode(change(codec.decode(frame.data)), frame.data[1] & 15)
-        return (Frame(frame.can_id, data),)
-
-    return alter
-
-
-_FLIPPED = altered(
-    SensorMotion, lambda m: m._replace(roll_rad=-m.roll_rad, roll_rate_rad_s=-m.roll_rate_rad_s)
-)
-_HIGH = altered(SensorTank, lambda m: m._replace(port_high=Switch.ON))
-_OVERCURRENT = altered(DriveStatus2, lambda m: m._replace(fault=DriveFault.OVERCURRENT))
-_SPIKE = altered(SensorMotion, lambda m: m._replace(roll_rad=m.roll_rad + 0.5))
 
 CASES: Final = (
     Case("every-mode", "gpc", 14, (
@@ -216,27 +124,31 @@ CASES: Final = (
     Case("planned", "constrained_gpc", 12),
     Case("fuzzy", "fuzzy_robust", 12),
     Case("valve-and-pump", "pump_with_valve", 12, scenario="semi_active"),
-    Case("motion-silent", "dpc", 12, (*ARM, *AGAIN), (
-        Trouble("sensors", 3.0, 3.5, dropped(SensorMotion)),
-    )),
+    Case("motion-silent", "dpc", 12, (*ARM, *AGAIN), (_motion("lost", 3.0, 0.5),)),
     Case("frames-lost-and-damaged", "lqg", 12, ARM, (
-        Trouble("sensors", 3.0, 3.02, dropped()),
-        Trouble("sensors", 5.0, 5.02, damaged),
-        Trouble("sensors", 7.0, 8.5, dropped(SensorTank)),
+        {"kind": "mute", "node": "sensors", "at_s": 3.0, "for_s": 0.02},
+        _motion("corrupted", 5.0, 0.02),
+        {"kind": "lost", "message": "SENSOR_TANK", "at_s": 7.0, "for_s": 1.5},
     )),
-    Case("roll-sensor-reversed", "gpc", 25, ARM, (Trouble("sensors", 0.0, spoil=_FLIPPED),)),
+    Case("roll-sensor-reversed", "gpc", 25, ARM, (
+        _motion("sign", 0.0, None, signals=("roll_rad", "roll_rate_rad_s")),
+    )),
     Case("spike-then-high-level", "dpc", 9, ARM, (
-        Trouble("sensors", 3.0, 3.01, _SPIKE), Trouble("sensors", 5.0, 6.0, _HIGH),
+        _motion("offset", 3.0, 0.01, signals=("roll_rad",), by=0.5),
+        {"kind": "value", "message": "SENSOR_TANK", "values": {"port_high": "ON"},
+         "at_s": 5.0, "for_s": 1.0},
     )),
     Case("drive-fault", "pd", 9, (*ARM, (4.0, Action.ACCEPT), (6.5, Action.RESET)), (
-        Trouble("drive", 3.0, 6.0, _OVERCURRENT),
+        {"kind": "value", "message": "DRIVE_STATUS_2", "values": {"fault": "OVERCURRENT"},
+         "at_s": 3.0, "for_s": 3.0},
     )),
-    Case("late-ticks-and-bus-errors", "gpc", 12, (*ARM, *AGAIN), (
-        Trouble("controller", 3.0, 3.02), Trouble("controller", 5.0, 5.04),
-    ), link_errors_s=(9.5, 9.51, 9.52, 9.53)),
+    Case("late-ticks-and-bus-errors", "gpc", 12, (*ARM, *AGAIN),
+         late_s=((3.0, 3.02), (5.0, 5.04)), link_errors_s=(9.5, 9.51, 9.52, 9.53)),
     Case("operator-silent-then-intruder", "gpc", 12, ARM, (
-        Trouble("panel", 3.0, 9.5, dropped(OperatorCommand)),
-    ), intruder_s=10.5),
+        {"kind": "lost", "message": "OPERATOR_CMD", "at_s": 3.0, "for_s": 6.5},
+        {"kind": "impostor", "message": "PUMP_CMD", "at_s": 10.5, "counter": 13,
+         "values": {"pressure_pa": 5e3, "control_word": None, "timeout_s": 0.05}},
+    )),
     Case("retuned-and-undone", "adaptive_dpc", 213,
          (*ARM, (35.0, Action.RETUNE), (208.0, Action.UNDO)),
          scenario="adaptive", quiet=True, by_tick=True,
@@ -296,14 +208,12 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
         )
         node = NodeTap(controller, sink.write, desks.taps)
         script = tuple(TimedAction(*timed) for timed in case.script)
-        nodes: list[Node] = [*build_ship_side(scenario, seed, script).nodes, node]
-        if case.intruder_s is not None:
-            nodes.append(Intruder(case.intruder_s))
-        troubled = [
-            Troubled(each, case) if each is node or case.has_troubles(each.name) else each
-            for each in nodes
-        ]
-        Lockstep(troubled).run_until(round(case.seconds * 1e9))
+        ship = build_ship_side(scenario, seed, script)
+        faulty = {each.name: FaultyNode(each) for each in ship.nodes}
+        bench = Bench(faulty, ship.plant, ship.drive, ship.valve, ship.vessel.version)
+        place_all(_FAULTS.validate_python(case.faults), bench, 0, seed)
+        nodes: list[Node] = [*faulty.values(), LateNode(node, case), *bench.joining]
+        Lockstep(nodes).run_until(round(case.seconds * 1e9))
         node.stop(round(case.seconds * 1e9))
         sink.flush()
     return file
