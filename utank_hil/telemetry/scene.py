@@ -25,14 +25,14 @@ NEEDED: Final = (
 )  # fmt: skip
 
 # shares of the tank's width: of a reservoir, of the hull beyond it, of the keel below the duct
-_RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
+RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
 _ARROW: Final = 0.6
 """Length of the arrow at the pump's greatest pressure, in widths of the tank."""
-_LINES: Final = 8
+LINES: Final = 8
 """That the water in a reservoir is drawn with."""
 
-_HULL, _TWIN, _WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
-_LIMIT, _PUMP, _SEA = (0xF0, 0xE4, 0x42), (0xE6, 0x9F, 0x00), (0x2A, 0x5C, 0x7A)
+HULL, TWIN, WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
+LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xE6, 0x9F, 0x00), (0x2A, 0x5C, 0x7A)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class SceneSize:
 
     def limits(self) -> FloatArray:
         """Marks of full and empty at both reservoirs, shape (4, 2, 2)."""
-        middle, reach = 0.5 * self.width_m, 0.5 * _RESERVOIR * self.width_m
+        middle, reach = 0.5 * self.width_m, 0.5 * RESERVOIR * self.width_m
         still = self.lz_m - self.height_m
         return np.array(
             [
@@ -114,17 +114,17 @@ class SceneSize:
         return np.array([[-half, self.lz_m], [half, self.lz_m]])
 
     def water(self, port_m: FloatArray, starboard_m: FloatArray) -> FloatArray:
-        """Upright lines that fill the reservoirs to their levels, shape (n, 2 `_LINES`, 2, 2)."""
-        line = _RESERVOIR * self.width_m / _LINES
-        across = (np.arange(_LINES) - (_LINES - 1) / 2) * line
+        """Upright lines that fill the reservoirs to their levels, shape (n, 2 `LINES`, 2, 2)."""
+        line = RESERVOIR * self.width_m / LINES
+        across = (np.arange(LINES) - (LINES - 1) / 2) * line
         still, half = self.lz_m - self.height_m, 0.5 * self.width_m
-        strips = np.empty((len(port_m), 2, _LINES, 2, 2))
+        strips = np.empty((len(port_m), 2, LINES, 2, 2))
         strips[..., 0] = np.array([-half, half])[:, None, None] + across[:, None]
         strips[..., 0, 1] = self.lz_m
         # a line ends in a half circle: its tip is at the level
         levels = np.column_stack([port_m, starboard_m])
         strips[..., 1, 1] = (still - levels + line / 2)[:, :, None]
-        return strips.reshape(len(port_m), 2 * _LINES, 2, 2)
+        return strips.reshape(len(port_m), 2 * LINES, 2, 2)
 
     def arrow(self, pressure_pa: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The pump's arrow along the duct: vectors and origins, shape (n, 2)."""
@@ -169,20 +169,20 @@ class Scene:
         """Log what stays as it is: the ship's parts, upright, and how what moves looks."""
         size, place = self._size, scene_path(self._path)
         thin = 0.004 * size.width_m
-        column = 0.7 * _RESERVOIR * size.width_m / _LINES
+        column = 0.7 * RESERVOIR * size.width_m / LINES
         strips, sea = rr.LineStrips2D, [[-3 * size.reach_m, 0.0], [3 * size.reach_m, 0.0]]
         duct, arrow = 0.06 * size.width_m, rr.Arrows2D.from_fields
         for name, looks in (
-            ("sea", strips([sea], colors=_SEA, radii=2 * thin, draw_order=0.0)),
-            ("twin", strips([size.hull()], colors=_TWIN, radii=thin, draw_order=1.0)),
-            ("ship/duct", strips([size.duct()], colors=_WATER, radii=duct, draw_order=2.0)),
-            ("ship/water", strips.from_fields(colors=_WATER, radii=column, draw_order=2.0)),
-            ("ship/hull", strips([size.hull()], colors=_HULL, radii=2 * thin, draw_order=3.0)),
+            ("sea", strips([sea], colors=SEA, radii=2 * thin, draw_order=0.0)),
+            ("twin", strips([size.hull()], colors=TWIN, radii=thin, draw_order=1.0)),
+            ("ship/duct", strips([size.duct()], colors=WATER, radii=duct, draw_order=2.0)),
+            ("ship/water", strips.from_fields(colors=WATER, radii=column, draw_order=2.0)),
+            ("ship/hull", strips([size.hull()], colors=HULL, radii=2 * thin, draw_order=3.0)),
             (
                 "ship/limits",
-                strips(list(size.limits()), colors=_LIMIT, radii=2 * thin, draw_order=4.0),
+                strips(list(size.limits()), colors=LIMIT, radii=2 * thin, draw_order=4.0),
             ),
-            ("ship/pump", arrow(colors=_PUMP, radii=4 * thin, draw_order=5.0)),
+            ("ship/pump", arrow(colors=PUMP, radii=4 * thin, draw_order=5.0)),
         ):
             self._recording.log(f"{place}/{name}", looks, static=True, strict=True)
 
