@@ -14,6 +14,7 @@ from tools.documents import (
     exit_codes,
     fault_campaign,
     faults,
+    monitors,
     tables,
 )
 
@@ -23,6 +24,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     yield catalogue.PAGE, catalogue.page()
     yield faults.PAGE, faults.page()
     yield fault_campaign.PAGE, fault_campaign.page()
+    yield monitors.PAGE, monitors.page()
     yield exit_codes.PAGE, exit_codes.page()
     yield configuration.PAGE, configuration.page()
     yield from tables.pages()

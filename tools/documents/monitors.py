@@ -1,0 +1,62 @@
+"""The thresholds of the shipped ships in docs/monitors.md, as the code computes them."""
+
+import math
+from pathlib import Path
+from typing import Final
+
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.runtime.monitors.thresholds import MonitorThresholds, thresholds_of
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "monitors.md"
+CONTROLLERS: Final = ("gpc", "naval_constrained_gpc", "patti_b_constrained_gpc")
+
+BEGIN = (
+    "<!-- Written by tools/documents/monitors.py (make docs) from utank_hil/runtime/monitors/"
+    "thresholds.py; do not edit down to the end mark. -->\n"
+)
+END = "<!-- End of the generated table. -->\n"
+
+DEGREES: Final = math.degrees(1.0)
+ROWS: Final = (
+    ("period T, s", "roll_period_s", 1.0),
+    ("drift, degrees", "drift_rad", DEGREES),
+    ("a still roll stays within, degrees", "roll_still_rad", DEGREES),
+    ("a still rate stays within, degrees/s", "rate_still_rad_s", DEGREES),
+    ("a still level stays within, m", "level_still_m", 1.0),
+    ("sum of the levels, m", "volume_m", 1.0),
+    ("motion sensor late, s", "motion_late_s", 1.0),
+    ("spike of the roll, degrees in 10 ms", "roll_spike_rad", DEGREES),
+    ("spike of a level, m in 20 ms", "level_spike_m", 1.0),
+    ("error of the pump's pressure, kPa", "pressure_error_pa", 1e-3),
+    ("roll compared with the twin's from, degrees RMS", "amplified_roll_rad", DEGREES),
+)
+"""What it says, of `MonitorThresholds`, and times what; spikes beside what she moves meanwhile."""
+
+
+def thresholds(controller: str) -> tuple[str, MonitorThresholds]:
+    """A shipped controller's vessel, and her thresholds."""
+    path = ROOT / "configs" / "controllers" / f"{controller}.yaml"
+    config = load_config(path, ControllerConfig)
+    found = thresholds_of(config.plant, config.safety.roll_limit_rad, config.sensors)
+    return config.vessel.name, found
+
+
+def page() -> str:
+    """The page as it stands, with the table written anew."""
+    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"{PAGE}: the table must stand between the lines\n{BEGIN}{END}")
+    ships = [thresholds(name) for name in CONTROLLERS]
+    lines = [
+        f"| threshold | {' | '.join(name for name, _ in ships)} |\n",
+        f"|---|{'---|' * len(ships)}\n",
+        *(
+            f"| {words} | "
+            + " | ".join(f"{getattr(each, field) * times:.3g}" for _, each in ships)
+            + " |\n"
+            for words, field, times in ROWS
+        ),
+    ]
+    return "".join([before, BEGIN, *lines, END, after])
