@@ -2,7 +2,8 @@
 
 import os
 
-os.environ["UTANK_HIL_COMPILED"] = "0"  # what is tested can be patched and is covered
+# what is tested can be patched and is covered
+os.environ.setdefault("UTANK_HIL_COMPILED", "0")
 
 from hypothesis import settings
 

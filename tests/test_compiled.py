@@ -71,7 +71,7 @@ def test_modules_are_found_only_if_current_and_not_switched_off(
 
 @pytest.mark.evidence
 @pytest.mark.timeout(1200)
-def test_a_compiled_run_equals_the_plain_one_bit_for_bit() -> None:
+def test_a_compiled_run_equals_the_plain_one_and_codecs_pass_their_tests() -> None:
     def run(compiled: str) -> list[object]:
         environment = {**os.environ, "UTANK_HIL_COMPILED": compiled}
         done = subprocess.run(
@@ -84,3 +84,5 @@ def test_a_compiled_run_equals_the_plain_one_bit_for_bit() -> None:
     assert plain[:2] == [False, ".py"]
     assert fast[:2] == [True, ".so"]
     assert fast[2] == plain[2]
+    run_compiled = [sys.executable, "-m", "pytest", "-q", "tests/canbus", "tests/replay"]
+    subprocess.run(run_compiled, env={**os.environ, "UTANK_HIL_COMPILED": "1"}, check=True)

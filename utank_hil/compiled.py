@@ -2,11 +2,12 @@
 
 mypyc makes extension modules of the same source. They are loaded only while every source file of
 both packages is what they were made of, so that what runs is always what the files say. A run in
-lockstep then takes about half the time and gives the same result, bit for bit. The variable
+lockstep then takes 0.4 of the time and gives the same result, bit for bit. The variable
 UTANK_HIL_COMPILED=0 in the environment leaves them out.
 """
 
 import hashlib
+import importlib
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -15,20 +16,22 @@ from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import Final
+from typing import Any, Final
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 PACKAGES: Final = ("utank_hil", "firmware_sim")
+CODECS: Final = "utank_hil_codecs"
+"""Compiled module of what `utank_hil.canbus.codec` writes for the messages of the catalogue."""
 _MADE: Final = ROOT / ".cache" / "compiled"
 
 
 def folder() -> Path:
-    """Where compiled modules of the present source and interpreter belong."""
+    """Where modules belong that the present compiler makes of the present source."""
     whole = hashlib.sha256(sys.version.encode())
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            content = path.read_bytes()
-            whole.update(f"{path.relative_to(ROOT)} {len(content)}\n".encode() + content)
+    sources = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    for path in [*sources, *ROOT.glob("tools/compiled.py")]:
+        content = path.read_bytes()
+        whole.update(f"{path.relative_to(ROOT)} {len(content)}\n".encode() + content)
     return _MADE / whole.hexdigest()[:16]
 
 
@@ -66,3 +69,11 @@ def use_if_current() -> None:
         return
     if files := modules_in(folder()):
         sys.meta_path.insert(0, _Finder(files))
+
+
+def compiled_codecs() -> dict[str, tuple[Any, Any]]:
+    """Functions that encode and decode a message, by their text; none if nothing is compiled."""
+    if not in_use():
+        return {}
+    functions: dict[str, tuple[Any, Any]] = importlib.import_module(CODECS).FUNCTIONS
+    return functions

@@ -3,6 +3,9 @@
 The messages of the catalogue are compiled at start: one Python function to encode and one to
 decode, over the frame's CRC byte, counter byte and three 16-bit words. They take a tenth of
 cantools' time, which control loop and lockstep runs need. Tests compare both with cantools.
+
+`make compiled` has mypyc compile the same text, for which its names have types; see
+`utank_hil.compiled`.
 """
 
 import math
@@ -14,6 +17,7 @@ from types import NoneType, UnionType
 from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
 from utank_hil.canbus.e2e import WORD_TABLES, first_byte_table
+from utank_hil.compiled import compiled_codecs
 
 T = TypeVar("T", bound=tuple[Any, ...])
 
@@ -83,6 +87,8 @@ class Codec(Generic[T]):
         ``encode(message, counter) -> bytes``, 8 bytes.
     decode : Callable
         ``decode(data) -> message``, or None if the CRC is wrong; `data` must be 8 bytes.
+    source : str
+        Text of both functions.
     """
 
     name: str
@@ -91,6 +97,7 @@ class Codec(Generic[T]):
     protected: bool
     encode: Callable[[T, int], bytes]
     decode: Callable[[bytes], T | None]
+    source: str
 
 
 def compile_codec(
@@ -116,26 +123,20 @@ def compile_codec(
         Sixteen data IDs, or None for an unprotected message.
     """
     signals = tuple(signals)
-    source = "\n".join([*_encoder(signals, data_ids), *_decoder(signals, data_ids)])
-    table_1, table_2, table_3 = WORD_TABLES
-    scope: dict[str, Any] = {
-        "pack": _STRUCT.pack,
-        "unpack": _STRUCT.unpack,
-        "new": tuple.__new__,
-        "Message": message_type,
-        "nan": math.nan,
-        "clamp": _clamp,
-        "A": table_1,
-        "B": table_2,
-        "C": table_3,
-    }
-    if data_ids is not None:
-        scope["F"] = first_byte_table(data_ids)
-    for signal in signals:
-        if issubclass(signal.kind, IntEnum):
-            scope[f"table_{signal.name}"] = _members(signal.kind, signal.length)
-    exec(compile(source, f"<codec of {name}>", "exec"), scope)
-    return Codec(name, can_id, cycle_ns, data_ids is not None, scope["encode"], scope["decode"])
+    kinds = [signal.kind for signal in signals if issubclass(signal.kind, IntEnum)]
+    source = "\n".join(
+        [
+            *_tables(name, message_type, signals, data_ids),
+            *_encoder(name, signals, data_ids is not None),
+            *_decoder(name, signals, data_ids is not None),
+        ]
+    )
+    scope = {**COMMON, **{kind.__name__: kind for kind in (message_type, *kinds)}}
+    functions = compiled_codecs().get(source)
+    if functions is None:
+        exec(compile(source, f"<codec of {name}>", "exec"), scope)
+        functions = scope[f"encode_{name}"], scope[f"decode_{name}"]
+    return Codec(name, can_id, cycle_ns, data_ids is not None, *functions, source)
 
 
 def field_kind(annotation: Any) -> type:
@@ -169,6 +170,20 @@ def _clamp(value: float, signal: tuple[float, int, int, int]) -> int:
     return raw_minimum if value < minimum else raw_maximum
 
 
+COMMON: Final[dict[str, Any]] = {
+    "Any": Any,
+    "Final": Final,
+    "pack": _STRUCT.pack,
+    "unpack": _STRUCT.unpack,
+    "new": tuple.__new__,
+    "nan": math.nan,
+    "clamp": _clamp,
+    "members": _members,
+    **dict(zip("ABC", WORD_TABLES, strict=True)),
+}
+"""What the text of every message names."""
+
+
 def _overlaps(signal: Signal) -> list[tuple[str, int, int]]:
     """Return the parts that contain a signal: name, shift of the signal, number of bits."""
     return [
@@ -178,46 +193,70 @@ def _overlaps(signal: Signal) -> list[tuple[str, int, int]]:
     ]
 
 
-def _encoder(signals: Sequence[Signal], data_ids: bytes | None) -> list[str]:
-    fields = "".join(f"{signal.name}, " for signal in signals)
-    lines = ["def encode(message, counter):", f"    {fields}= message"]
-    terms: dict[str, list[str]] = {part: [] for part, _, _ in _PARTS}
+def _tables(
+    name: str, message_type: type, signals: Sequence[Signal], data_ids: bytes | None
+) -> list[str]:
+    lines = [f"M_{name}: Final[Any] = {message_type.__name__}"]
     if data_ids is not None:
+        lines.append(f"F_{name}: Final[bytes] = {first_byte_table(data_ids)!r}")
+    for signal in signals:
+        if issubclass(signal.kind, IntEnum):
+            members = f"members({signal.kind.__name__}, {signal.length})"
+            lines.append(f"T_{name}_{signal.name}: Final[tuple[Any, ...]] = {members}")
+    return lines
+
+
+def _encoder(name: str, signals: Sequence[Signal], protected: bool) -> list[str]:
+    fields = "".join(f"{signal.name}, " for signal in signals)
+    kinds = [(signal.name, "float" if signal.kind is float else "Any") for signal in signals]
+    lines = [
+        f"def encode_{name}(message: tuple[Any, ...], counter: int) -> bytes:",
+        *[f"    {field}: {kind}; raw_{field}: int" for field, kind in kinds],
+        f"    {fields}= message",
+    ]
+    terms: dict[str, list[str]] = {part: [] for part, _, _ in _PARTS}
+    if protected:
         terms["b1"].append("counter")
     for signal in signals:
-        name, ones = signal.name, signal.not_available
+        value, raw, ones = signal.name, f"raw_{signal.name}", signal.not_available
         low, high = signal.raw_range
         if signal.kind is float:
             limits = (signal.minimum, low, high, ones)
             lines.append(
-                f"    {name} = round(({name} - {signal.offset!r}) / {signal.scale!r}) "
-                f"if {signal.minimum!r} <= {name} <= {signal.maximum!r} "
-                f"else clamp({name}, {limits!r})"
+                f"    {raw} = round(({value} - {signal.offset!r}) / {signal.scale!r}) "
+                f"if {signal.minimum!r} <= {value} <= {signal.maximum!r} "
+                f"else clamp({value}, {limits!r})"
             )
+        elif signal.kind is bool:
+            lines.append(f"    {raw} = 1 if {value} else 0")
         elif signal.kind is int:
-            lines.append(f"    if {name} is None: {name} = {ones}")
-            lines.append(f"    elif not {low} <= {name} <= {high}:")
-            lines.append(f"        {name} = {low} if {name} < {low} else {high}")
-        elif signal.kind is not bool:
-            lines.append(f"    if {name} is None: {name} = {ones}")
+            lines.append(f"    {raw} = {ones} if {value} is None else int({value})")
+            lines.append(f"    if {value} is not None and not {low} <= {raw} <= {high}:")
+            lines.append(f"        {raw} = {low} if {raw} < {low} else {high}")
+        else:
+            lines.append(f"    {raw} = {ones} if {value} is None else {value}")
         for part, shift, bits in _overlaps(signal):
-            term = f"{name} << {shift}" if shift > 0 else f"{name} >> {-shift}" if shift else name
+            term = f"{raw} << {shift}" if shift > 0 else f"{raw} >> {-shift}" if shift else raw
             too_long = shift + signal.length > bits
             terms[part].append(f"({term} & {(1 << bits) - 1})" if too_long else f"({term})")
     lines += [f"    {part} = {' | '.join(terms[part]) or 0}" for part, _, _ in _PARTS]
-    if data_ids is not None:
-        lines.append("    crc = F[b1] ^ A[w1] ^ B[w2] ^ C[w3]")
+    if protected:
+        lines.append(f"    crc = F_{name}[b1] ^ A[w1] ^ B[w2] ^ C[w3]")
     lines.append("    return pack(crc, b1, w1, w2, w3)")
     return lines
 
 
-def _decoder(signals: Sequence[Signal], data_ids: bytes | None) -> list[str]:
-    lines = ["def decode(data):", "    crc, b1, w1, w2, w3 = unpack(data)"]
-    if data_ids is not None:
-        lines.append("    if crc != F[b1] ^ A[w1] ^ B[w2] ^ C[w3]: return None")
+def _decoder(name: str, signals: Sequence[Signal], protected: bool) -> list[str]:
+    lines = [
+        f"def decode_{name}(data: bytes) -> Any:",
+        "    crc: int; b1: int; w1: int; w2: int; w3: int",
+        "    crc, b1, w1, w2, w3 = unpack(data)",
+    ]
+    if protected:
+        lines.append(f"    if crc != F_{name}[b1] ^ A[w1] ^ B[w2] ^ C[w3]: return None")
     values = []
     for signal in signals:
-        name, ones = signal.name, signal.not_available
+        value, ones = signal.name, signal.not_available
         low, high = signal.raw_range
         parts = _overlaps(signal)
         raw = " | ".join(
@@ -230,12 +269,12 @@ def _decoder(signals: Sequence[Signal], data_ids: bytes | None) -> list[str]:
         if signal.kind is bool:
             values.append(f"({raw}) != 0")
         elif signal.kind is int or signal.kind is float:
-            lines.append(f"    {name} = {raw}")
-            within = f"{low} <= {name} <= {high}" if low else f"{name} <= {high}"
-            scaled = f"{name} * {signal.scale!r} + {signal.offset!r}"
-            value, other = (name, "None") if signal.kind is int else (scaled, "nan")
-            values.append(f"({value} if {within} else {other})")
+            lines.append(f"    {value} = {raw}")
+            within = f"{low} <= {value} <= {high}" if low else f"{value} <= {high}"
+            scaled = f"{value} * {signal.scale!r} + {signal.offset!r}"
+            there, other = (value, "None") if signal.kind is int else (scaled, "nan")
+            values.append(f"({there} if {within} else {other})")
         else:
-            values.append(f"table_{name}[{raw}]")
-    lines.append(f"    return new(Message, ({', '.join(values)},))")
+            values.append(f"T_{name}_{value}[{raw}]")
+    lines.append(f"    return new(M_{name}, ({', '.join(values)},))")
     return lines

@@ -13,7 +13,6 @@ from array import array
 from collections import Counter
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from itertools import count
 from typing import Final
 
 from utank_hil.canbus.frame import Frame
@@ -73,7 +72,7 @@ class SimulatedBus:
         self._intermission_ns: Final = INTERMISSION_BITS * self._bit_ns
         # (identifier, order of queueing, frame, sender, queued at, time on the wire)
         self._waiting: list[tuple[int, int, Frame, int, int, int]] = []
-        self._order = count()
+        self._order = 0
         self._in_flight: tuple[int, int, Frame] | None = None
         self._free_ns = 0  # end of the latest transmission
         self._new_delays_ns: list[int] = []  # counted in bulk when a window closes, which is faster
@@ -94,9 +93,8 @@ class SimulatedBus:
             If the identifier or the payload is too long for CAN.
         """
         duration_ns = (frame_bits(frame) + more_bits) * self._bit_ns
-        heappush(
-            self._waiting, (frame.can_id, next(self._order), frame, sender, now_ns, duration_ns)
-        )
+        self._order += 1
+        heappush(self._waiting, (frame.can_id, self._order, frame, sender, now_ns, duration_ns))
         if self._free_ns < now_ns:
             self._free_ns = now_ns
 
