@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import AfterValidator
 
-from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span
+from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span, Spoil, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Address, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
@@ -60,6 +60,9 @@ class Fault(Section, ABC):
 
     replayable: ClassVar[bool] = True
     """Whether a controller without it, handed the same frames, would do the same."""
+    needs: ClassVar[tuple[str, ...]] = ()
+    """Nodes that must be emulated for any fault of the kind."""
+
     at_s: NotNegative = 0.0
     for_s: Positive | None = None
 
@@ -71,7 +74,7 @@ class Fault(Section, ABC):
 
     def node_names(self) -> tuple[str, ...]:
         """Nodes that must be emulated for it."""
-        return ()
+        return self.needs
 
     @abstractmethod
     def place(self, bench: Bench, span: Span, seed: int) -> None:
@@ -91,6 +94,11 @@ class MessageFault(Fault):
     def node_names(self) -> tuple[str, ...]:
         """The sender."""
         return (NODE_OF[self.named.source],)
+
+    def spoil_frames(self, bench: Bench, span: Span, spoil: Spoil) -> None:
+        """Spoil the message's frames where they leave their node."""
+        _, source, codec = self.named
+        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, spoil, codec.can_id))
 
 
 def signal_problems(

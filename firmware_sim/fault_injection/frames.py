@@ -8,8 +8,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from firmware_sim.fault_injection.fault import NODE_OF, MessageFault
-from firmware_sim.fault_injection.faulty_node import Span, Spoil, Spoiled
+from firmware_sim.fault_injection.fault import MessageFault
+from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
@@ -28,8 +28,7 @@ class FrameFault(MessageFault):
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:
         """Spoil the frames where they leave their node."""
-        _, source, codec = self.named
-        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, self.spoil(seed), codec.can_id))
+        self.spoil_frames(bench, span, self.spoil(seed))
 
 
 class Lost(FrameFault):

@@ -37,11 +37,8 @@ class Killed(Fault):
     """The controller's process dies; one that is started anew takes its place in the end."""
 
     replayable = False
+    needs = ("controller",)
     kind: Literal["killed"]
-
-    def node_names(self) -> tuple[str, ...]:
-        """The controller."""
-        return ("controller",)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Hold the controller, then build another."""
@@ -105,6 +102,7 @@ class Link(NodeFault):
 class Pump(Fault):
     """While enabled, the pump presses with `times` its set-point and `plus_pa`, after `lag_s`."""
 
+    needs = ("drive",)
     kind: Literal["pump"]
     times: Finite = 1.0
     """Share of the set-point that it gives; negative for the wrong way."""
@@ -112,10 +110,6 @@ class Pump(Fault):
     """Pressure that it gives besides."""
     lag_s: NotNegative = 0.0
     """Time constant with which it does."""
-
-    def node_names(self) -> tuple[str, ...]:
-        """The drive, which sets the pump's command."""
-        return ("drive",)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the pump, and mend it in the end."""
@@ -135,6 +129,7 @@ class Pump(Fault):
 class Drive(Fault):
     """The drive fails when the fault begins, as DRIVE_STATUS_2 names it; NONE switches it off."""
 
+    needs = ("drive",)
     kind: Literal["drive"]
     fault: str
     """As DRIVE_STATUS_2 names it."""
@@ -146,10 +141,6 @@ class Drive(Fault):
             raise ValueError(f"must be one of {', '.join(DriveFault.__members__)}")
         return name
 
-    def node_names(self) -> tuple[str, ...]:
-        """The drive."""
-        return ("drive",)
-
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Trip it."""
         drive = bench.drive
@@ -160,13 +151,10 @@ class Drive(Fault):
 class Valve(Fault):
     """The valve does not move, or has no power."""
 
+    needs = ("valve",)
     kind: Literal["valve"]
     fails: Literal["stuck", "powerless"]
     """What it does."""
-
-    def node_names(self) -> tuple[str, ...]:
-        """The valve."""
-        return ("valve",)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the valve, and mend it in the end."""
@@ -180,13 +168,10 @@ class Law(Fault):
     """The control law raises an error, or answers no number, the opposite or one side."""
 
     replayable = False
+    needs = ("controller",)
     kind: Literal["law"]
     fails: Literal["raises", "answers_nan", "opposite", "leans"]
     """What it does."""
-
-    def node_names(self) -> tuple[str, ...]:
-        """The controller."""
-        return ("controller",)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the law, and mend it in the end."""

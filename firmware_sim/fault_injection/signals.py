@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
-from firmware_sim.fault_injection.fault import NODE_OF, MessageFault, signal_problems
-from firmware_sim.fault_injection.faulty_node import Span, Spoiled
+from firmware_sim.fault_injection.fault import MessageFault, signal_problems
+from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Frame
+from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import FRAME_BYTES, field_kind
 from utank_hil.parameters import Finite, Positive, refuse
 
@@ -47,21 +48,32 @@ class SignalFault(MessageFault):
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:
         """Alter the message where it leaves its node."""
-        kind, source, codec = self.named
+        kind = self.named.kind
         places = [kind._fields.index(name) for name in self.signals]  # type: ignore[attr-defined]
         change = self.change(seed)
 
-        def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
-            message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
-            if message is None:  # another fault has been at it
-                return (frame,)
+        def changed(message: Any, since_s: float) -> Any:
             values = list(message)
-            changed = change([values[place] for place in places], since_s)
-            for place, value in zip(places, changed, strict=True):
+            new = change([values[place] for place in places], since_s)
+            for place, value in zip(places, new, strict=True):
                 values[place] = value
-            return (Frame(codec.can_id, codec.encode(kind(*values), frame.data[1] & 15)),)
+            return kind(*values)
 
-        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, alter, codec.can_id))
+        self.spoil_frames(bench, span, _altered(self.named, changed))
+
+
+def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
+    """Change a message, which keeps its counter and is protected anew."""
+    codec = named.codec
+
+    def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
+        message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
+        if message is None:  # another fault has been at it
+            return (frame,)
+        data = codec.encode(change(message, since_s), frame.data[1] & 15)
+        return (Frame(codec.can_id, data),)
+
+    return alter
 
 
 class Stuck(SignalFault):
@@ -218,18 +230,10 @@ class Value(MessageFault):
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Alter the message where it leaves its node."""
-        kind, source, codec = self.named
-        hints = get_type_hints(kind)
+        hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
-
-        def alter(frame: Frame, _: float) -> Iterable[Frame]:
-            message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
-            if message is None:
-                return (frame,)
-            altered = message._replace(**values)
-            return (Frame(codec.can_id, codec.encode(altered, frame.data[1] & 15)),)
-
-        bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, alter, codec.can_id))
+        alter = _altered(self.named, lambda message, _: message._replace(**values))
+        self.spoil_frames(bench, span, alter)
 
 
 def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:

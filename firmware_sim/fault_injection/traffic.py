@@ -39,11 +39,9 @@ Identifier = Annotated[str, AfterValidator(_identifier)]
 
 
 class BusFault(Fault):
-    """A fault of the modelled bus; there is none of a real one."""
+    """A fault of the modelled bus; a real one has none, and no controller beside it."""
 
-    def node_names(self) -> tuple[str, ...]:
-        """Lockstep alone has a bus that can fail; it has the controller, too."""
-        return ("controller",)
+    needs = ("controller",)
 
 
 class Disturbed(BusFault):
