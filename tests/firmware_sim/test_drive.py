@@ -159,7 +159,10 @@ def test_refused_command_changes_nothing_and_is_not_echoed(command: tuple[float,
     assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
 
 
-@pytest.mark.parametrize("word", [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE])
+STOPS = [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN]
+
+
+@pytest.mark.parametrize("word", STOPS)
 def test_a_word_that_says_stop_stops_whatever_pressure_came_with_it(word: ControlWord) -> None:
     bench = armed(20e3)
     bench.command(math.nan, word)
@@ -169,7 +172,7 @@ def test_a_word_that_says_stop_stops_whatever_pressure_came_with_it(word: Contro
 
 
 @pytest.mark.parametrize("lost", [3, 4, 12])
-@pytest.mark.parametrize("word", [ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE])
+@pytest.mark.parametrize("word", STOPS)
 def test_a_stop_out_of_sequence_is_heard_and_an_enable_is_not(lost: int, word: ControlWord) -> None:
     bench = armed(20e3)
     for _ in range(lost):
@@ -362,6 +365,7 @@ def test_steps_toward_zero_are_never_refused() -> None:
 
 
 def test_refusals_in_a_row_trip_the_drive_and_one_good_command_forgives() -> None:
+    assert MISCODED_COMMANDS_TO_TRIP == 5
     bench = armed()
     for _ in range(MISCODED_COMMANDS_TO_TRIP - 1):
         bench.command(60e3)
@@ -387,6 +391,7 @@ def test_corrupted_and_foreign_frames_are_as_if_never_sent() -> None:
         data[position // 8] ^= 1 << position % 8
         bench.drive.receive(Frame(frame.can_id, bytes(data)), bench.now_ns)
     bench.drive.receive(Frame(frame.can_id + 1, frame.data), bench.now_ns)
+    assert bench.drive.hears == {frame.can_id}
     bench.ticks(2)
     assert bench.told.state is DriveState.OPERATION_ENABLED
     assert bench.told.command_echo == good

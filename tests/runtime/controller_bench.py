@@ -34,6 +34,7 @@ from utank_hil.canbus import (
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
 from utank_hil.runtime.controller_node import ControllerNode, ControllerSettings
+from utank_hil.runtime.redundancy import NO_REDUNDANCY
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import SafetyLimits, Supervisor
@@ -98,7 +99,14 @@ class ControllerBench:
             self.level,
             CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
             Supervisor(SafetyLimits()),
-            ControllerSettings(VERSION, level_limit_m=VESSEL.tank.level_limit_m, commissioned=True),
+            ControllerSettings(
+                VERSION,
+                commissioned=True,
+                command_timeout_s=0.05,
+                bit_rate=250_000,
+                level_limit_m=VESSEL.tank.level_limit_m,
+                redundancy=NO_REDUNDANCY,
+            ),
             CATALOGUE,
             statistics=statistics,
             sink=lambda row: self.rows.append(row.copy()),

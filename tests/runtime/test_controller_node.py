@@ -1,4 +1,5 @@
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -21,6 +22,7 @@ from utank_hil.canbus import (
     ControlWord,
     DriveFault,
     DriveState,
+    DriveStatus2,
     Fault,
     Heartbeat,
     Mode,
@@ -320,3 +322,61 @@ def test_every_law_but_the_pulses_is_judged_by_the_twin_of_its_own_ship(
     bench.run(100)
     assert set(followed) == {noted.laws.active.found}
     assert bool(excused) is (state is RetuningState.IDENTIFY)
+
+
+def monitored() -> ControllerBench:
+    """An armed controller with monitors, whose law asks for nothing."""
+    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+    bench = ControllerBench(START_NS, monitors=Monitors(plant, 0.35, SensorFigures(), 250_000))
+    bench.arm()
+    return bench
+
+
+def test_a_spike_does_not_reach_the_law() -> None:
+    bench = monitored()
+    bench.motion = SensorMotion(0.3, 0.0, Quality.GOOD)
+    bench.tick()
+    assert bench.node.inbox.roll_rad == 0.0
+
+
+def test_a_second_sender_of_any_message_is_found() -> None:
+    bench = monitored()
+    bench.spoil = lambda kind, frame: (frame,) * (2 if kind is SensorMotion else 1)
+    bench.run(1000)
+    assert bench.node.fault is Fault.FOREIGN_SENDER
+
+
+def test_a_message_that_is_expected_is_missed() -> None:
+    bench = monitored()
+    bench.run(1000)
+    assert not bench.node.supervisor.degraded
+    bench.silent.add(DriveStatus2)
+    bench.run(1500)
+    assert bench.node.supervisor.degraded
+
+
+def test_frames_of_other_kinds_fill_the_bus_too() -> None:
+    bench = monitored()
+    for _ in range(200):
+        bench.node.other_frames(3)
+        bench.tick()
+    assert bench.node.fault is Fault.UNKNOWN_IDENTIFIERS
+    assert bench.node.inbox.foreign == 600
+    assert bench.node.seen.bus_load > 0.15
+
+
+@dataclass
+class PlanningLaw(ToyLaw):
+    fallbacks: int = 3
+
+
+def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert ControllerBench(law=PlanningLaw()).node.fallbacks == 3
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    assert bench.node.fallbacks is None
+    assert bench.node.retuning_state is RetuningState.IDLE
+    noted.state = RetuningState.TRIAL
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    assert bench.node.retuning_state is RetuningState.TRIAL

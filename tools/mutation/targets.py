@@ -115,6 +115,7 @@ TARGETS = (
             "tests/runtime/test_alarms.py",
             "tests/runtime/test_lockstep.py",
             "tests/runtime/test_invariants.py",
+            "tests/runtime/test_estimates_on_the_bus.py",
             "tests/firmware_sim/test_vessel_without_pump.py",
             "tests/faults/test_retuning_events.py",
         ),

@@ -36,7 +36,7 @@ from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
-from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
+from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.runtime.signals import SIGNALS, values_of
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
@@ -85,10 +85,10 @@ class ControllerSettings:
 
     configuration_version: int
     commissioned: bool
-    command_timeout_s: float = 0.05
-    bit_rate: int = 250_000
-    level_limit_m: float = math.inf
-    redundancy: Redundancy = NO_REDUNDANCY
+    command_timeout_s: float
+    bit_rate: int
+    level_limit_m: float
+    redundancy: Redundancy
 
 
 class ControllerNode:
