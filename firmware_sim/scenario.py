@@ -25,6 +25,7 @@ from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.steady_heel import steady_heel
 from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
@@ -50,7 +51,6 @@ SAILED: Final = (
 LONGEST_S: Final = 86_400.0
 """Longest run: its rows are kept in memory."""
 
-_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))
 _TINY: Final = 1e-30
 _NO_MOMENT: Final = 1e-9
 """Share of the waves' slope below which the ship feels nothing of it."""
@@ -293,22 +293,16 @@ class Scenario(Section):
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
         """Why a ship's steady heel is refused: she finds none, or the water is at the roof."""
-        tank, model = self.vessel.tank, RollModel(ship, self.vessel.tank)
         if ship.heeling_moment_nm == 0:
             return []
-        roll_rad = math.copysign(1.0, ship.heeling_moment_nm) * _HEELS_RAD
-        flat_m = np.tan(roll_rad) * tank.width_m / 2  # the water's level, where there is room
-        level_m = np.clip(flat_m, -tank.level_limit_m, tank.level_limit_m)
-        at_rest = np.zeros_like(roll_rad)
-        states = np.stack([roll_rad, at_rest, level_m, at_rest], axis=-1)
-        held = np.flatnonzero(model.derivative(states, stopped=True)[:, 1] * roll_rad < 0)
-        if held.size and abs(flat_m[held[0]]) <= tank.level_limit_m:
+        heel = steady_heel(RollModel(ship, self.vessel.tank))
+        if heel is not None and not heel.at_the_end:
             return []
         remedy = f"lower {' or '.join(SAILED[-2:])}"
-        if not held.size:
+        if heel is None:
             return [f"capsizes her without a wave, as no righting moment holds it: {remedy}"]
         return [
-            f"heels steadily by {math.degrees(abs(roll_rad[held[0]])):.0f} degrees, at which the "
+            f"heels steadily by {math.degrees(abs(heel.roll_rad)):.0f} degrees, at which the "
             f"tank is full or empty at one side: {remedy}"
         ]
 

@@ -53,6 +53,22 @@ def test_figures_are_those_of_a_hand_calculation(tmp_path: Path) -> None:
     assert periods[0] > found["roll_period_s"] > found["tank_period_s"] > periods[1]
 
 
+def test_heel_that_the_pump_holds_is_one_that_she_can_have(tmp_path: Path) -> None:
+    found = json.loads(invoke("check", ship(tmp_path), "--json").stdout)
+    level_m = 50e3 / (2 * 1000 * G)  # in the upright ship; both grow until she rests
+    upright_rad = 1000 * G * 17.11 * 17.1 * level_m / (4.81875e8 + 9.1e5)
+    assert found["pump_heel_rad"] == pytest.approx(upright_rad / (1 - 0.0508), rel=0.01)
+    assert found["pump_heel_at_the_end"] is False
+    patti_b = CONFIGS / "ships" / "patti_b.yaml"
+    for made, said in (
+        (lambda: ship(tmp_path), "0.92°"),
+        (lambda: ship(tmp_path, tank__headroom_m=1.0), "0.34°, a reservoir full or empty"),
+        (lambda: patti_b, "capsizes her"),
+    ):
+        path = made()
+        assert f"holds │ {said} │" in " ".join(invoke("check", path).stdout.split())
+
+
 def test_figures_are_printed_for_ship_controller_and_scenario(tmp_path: Path) -> None:
     text = invoke("check", ship(tmp_path, ship__displacement_n=4e8)).stdout
     for row in ("GM │ 1.20 m", "in the tank │ 273 t", "displacement │ 0.67%", "in metres of water",

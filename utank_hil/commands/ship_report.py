@@ -1,6 +1,7 @@
 """What ``utank-hil check`` says of a ship: what ship, tank and pump are to each other."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,11 +9,12 @@ from rich.console import Console
 from rich.markup import escape
 
 from utank_hil.analysis.tank_design import tank_figures
-from utank_hil.arrays import FloatArray
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
-from utank_hil.dynamics.linear import coupled_matrices, state_matrices
+from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.steady_heel import steady_heel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import added_damping_ratio
 from utank_hil.dynamics.water import water_moments
@@ -39,14 +41,14 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         two motions that they make together (`modes`, from slow to fast); ratios as in
         `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
         reservoir is full or empty. Metacentric height and the water's share of the displacement
-        are None where that is not given, what is of the pump without one: heel and head that its
-        greatest pressure holds; power that holds it in still water; flow that moves the level from
-        limit to limit at the roll period, and power of pressure and flow, without losses. Damping
-        ratios that a valve adds, None without one.
+        are None where that is not given, what is of the pump without one: heel that its greatest
+        pressure holds by her restoring curve, None also where it capsizes her, and whether a
+        reservoir is full or empty then; head that it holds; power that holds it in still water;
+        flow that moves the level from limit to limit at the roll period, and power of pressure and
+        flow, without losses. Damping ratios that a valve adds, None without one.
     """
     ship, tank = vessel.ship, vessel.tank
     figures = tank_figures(ship, tank)
-    _, _, stiffness = coupled_matrices(ship, tank)
     free = np.linalg.eigvals(state_matrices(ship, tank)[0])
     frequency = ship.natural_frequency_rad_s
     water_kg = float(water_moments(tank, 0.0).mass_kg)
@@ -75,7 +77,7 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         "coupling_ratio": figures.coupling_ratio,
         "stability_taken": free_surface_nm_rad(ship, tank) / ship.stiffness_nm_rad,
         "level_limit_m": tank.level_limit_m,
-        **_pump_figures(vessel, stiffness),
+        **_pump_figures(vessel),
         **_valve_figures(vessel),
     }
 
@@ -92,17 +94,20 @@ def _valve_figures(vessel: Vessel) -> dict[str, float | None]:
     }
 
 
-def _pump_figures(vessel: Vessel, stiffness: FloatArray) -> dict[str, float | None]:
+def _pump_figures(vessel: Vessel) -> dict[str, Any]:
     """What the pump can do with this tank and ship."""
     pump, tank = vessel.pump, vessel.tank
-    names = ("heel_rad", "head_m", "flow_m3_s", "power_asked_w", "power_held_w", "power_w")
+    names = ("heel_rad", "heel_at_the_end", "head_m", "flow_m3_s", "power_asked_w",
+             "power_held_w", "power_w")  # fmt: skip
     if pump is None:
         return {f"pump_{name}": None for name in names}
     pressure_pa = pump.max_pressure_pa
-    heel_rad, _ = np.linalg.solve(stiffness, [0.0, tank.reservoir_area_m2 * pressure_pa])
+    upright = replace(vessel.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
+    heel = steady_heel(RollModel(upright, tank), pressure_pa)
     flow_m3_s = tank.reservoir_area_m2 * tank.level_limit_m * vessel.ship.natural_frequency_rad_s
     figures = (
-        float(abs(heel_rad)),
+        None if heel is None else abs(heel.roll_rad),
+        None if heel is None else heel.at_the_end,
         pressure_pa / (tank.density_kg_m3 * GRAVITY_M_S2),
         flow_m3_s,
         pressure_pa * flow_m3_s,
@@ -118,12 +123,18 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
     return [
         ("pump's greatest pressure", f"{vessel.pump.max_pressure_pa / 1e3:.1f} kPa"),
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
-        ("heel that it holds", f"{math.degrees(figures['pump_heel_rad']):.2f}°"),
+        ("heel that it holds", _held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"])),
         ("flow from full to empty at the roll period", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
         ("power of pressure and flow, without losses", _power(figures["pump_power_asked_w"])),
         ("power to hold the pressure in still water", _power(figures["pump_power_held_w"])),
         ("power of the motor", _power(figures["pump_power_w"])),
     ]
+
+
+def _held(heel_rad: float | None, at_the_end: bool | None) -> str:
+    if heel_rad is None:
+        return "capsizes her"
+    return f"{math.degrees(heel_rad):.2f}°" + (", a reservoir full or empty" if at_the_end else "")
 
 
 def _valve_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]:

@@ -1,0 +1,64 @@
+"""The steady heel, against ships that are pushed slowly and left alone."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.dynamics import RollModel, simulate
+from utank_hil.dynamics.steady_heel import steady_heel
+
+SHIPS = Path("configs/ships")
+RISE_S, HOLD_S = 1000.0, 200.0
+
+
+def vessel(name: str) -> Vessel:
+    return load_config(SHIPS / f"{name}.yaml", Vessel)
+
+
+def left_alone(model: RollModel, pressure_pa: float) -> tuple[np.ndarray, float]:
+    """Last state under a pressure that rises slowly and stays, and when she capsized."""
+    steps = pressure_pa * np.linspace(0, 1, round(RISE_S / 0.2))
+    damped = RollModel(replace(model.ship, damping_nms_rad=20 * model.ship.damping_nms_rad),
+                       model.tank)  # fmt: skip
+    run = simulate(damped, RISE_S + HOLD_S, pressure_pa=steps, hold_s=0.2, record_every=50)
+    return run.state[-1], run.time_s[-1]
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0, -1.0])
+@pytest.mark.parametrize("name", ["thesis_first", "naval_vessel"])
+def test_pressure_that_rises_slowly_ends_there(name: str, share: float) -> None:
+    given = vessel(name)
+    model, pressure_pa = RollModel(given.ship, given.tank), share * given.pump.max_pressure_pa
+    heel = steady_heel(model, pressure_pa)
+    state, _ = left_alone(model, pressure_pa)
+    assert heel.roll_rad == pytest.approx(state[0], rel=2e-3)
+    assert heel.at_the_end == (abs(state[2]) > 0.999 * given.tank.level_limit_m)
+
+
+def test_water_at_the_roof_holds_less_than_the_pump_could() -> None:
+    given = vessel("thesis_first")
+    low = RollModel(given.ship, replace(given.tank, headroom_m=1.0))
+    heel, state = steady_heel(low, 50e3), left_alone(low, 50e3)[0]
+    assert heel.at_the_end
+    assert heel.roll_rad == pytest.approx(state[0], rel=2e-3)
+    assert heel.roll_rad < 0.5 * steady_heel(RollModel(given.ship, given.tank), 50e3).roll_rad
+
+
+def test_pump_that_is_stronger_than_the_righting_moment_capsizes_her() -> None:
+    given = vessel("patti_b")
+    model = RollModel(given.ship, given.tank)
+    assert steady_heel(model, 20e3) is None
+    assert left_alone(model, 20e3)[1] < RISE_S + HOLD_S
+    assert steady_heel(model, 2e3).roll_rad == pytest.approx(left_alone(model, 2e3)[0][0], rel=2e-3)
+
+
+def test_upright_ship_stays_and_wind_heels_her() -> None:
+    given = vessel("thesis_first")
+    assert steady_heel(RollModel(given.ship, given.tank)) == (0.0, False)
+    windy = replace(given.ship, wind_moment_nm=-2e7)
+    heel = steady_heel(RollModel(windy, given.tank))
+    assert math.degrees(heel.roll_rad) == pytest.approx(-2.5, abs=0.1)
