@@ -83,6 +83,10 @@ def _survives(each: Run) -> bool:
     return math.isinf(each.result.capsized_s)
 
 
+def _figure(panel: Panel, *checks: Check) -> Figure:
+    return Figure(METHOD, OPEN, (panel,), checks=checks, columns=1)
+
+
 def _kn(amplitude_nm: float) -> str:
     return f"{amplitude_nm / 1e3:.1f} kN m"
 
@@ -90,36 +94,25 @@ def _kn(amplitude_nm: float) -> str:
 def figure_4_6() -> Figure:
     """Histories in the wave that capsizes the ship without tank."""
     runs = _runs(WEAK_NM)
-    return Figure(
-        METHOD,
-        OPEN,
-        (_history("", runs),),
-        checks=(
-            Check(
-                "the ship without tank capsizes at 5.0860e4 N m",
-                Verdict.of(not _survives(runs["no tank"])),
-                _told(runs),
-            ),
-            Check(
-                "the tank improves the ship's ability to survive",
-                Verdict.of(_survives(runs["passive"]) and not _survives(runs["no tank"])),
-                f"with the tank {told(runs['passive'].result)}",
-            ),
+    return _figure(
+        _history("", runs),
+        Check(
+            "the ship without tank capsizes at 5.0860e4 N m",
+            Verdict.of(not _survives(runs["no tank"])),
+            _told(runs),
         ),
-        columns=1,
+        Check(
+            "the tank improves the ship's ability to survive",
+            Verdict.of(_survives(runs["passive"]) and not _survives(runs["no tank"])),
+            f"with the tank {told(runs['passive'].result)}",
+        ),
     )
 
 
 def figure_4_7() -> Figure:
     """The same in the phase plane."""
     runs = _runs(WEAK_NM)
-    return Figure(
-        METHOD,
-        OPEN,
-        (_plane("", runs),),
-        checks=(_nested(runs),),
-        columns=1,
-    )
+    return _figure(_plane("", runs), _nested(runs))
 
 
 def _nested(runs: dict[str, Run]) -> Check:
@@ -142,31 +135,20 @@ def _nested(runs: dict[str, Run]) -> Check:
 def figure_4_8() -> Figure:
     """Histories in the middle wave."""
     runs = _runs(MIDDLE_NM)
-    return Figure(
-        METHOD,
-        OPEN,
-        (_history("", runs),),
-        checks=(
-            Check(
-                "the ship with the passive tank survives 7.8601e4 N m (implied)",
-                Verdict.of(_survives(runs["passive"])),
-                _told(runs),
-            ),
+    return _figure(
+        _history("", runs),
+        Check(
+            "the ship with the passive tank survives 7.8601e4 N m (implied)",
+            Verdict.of(_survives(runs["passive"])),
+            _told(runs),
         ),
-        columns=1,
     )
 
 
 def figure_4_9() -> Figure:
     """The same in the phase plane."""
     runs = _runs(MIDDLE_NM)
-    return Figure(
-        METHOD,
-        OPEN,
-        (_plane("", runs),),
-        checks=(_nested(runs),),
-        columns=1,
-    )
+    return _figure(_plane("", runs), _nested(runs))
 
 
 def figure_4_10() -> Figure:
@@ -279,44 +261,34 @@ def figure_4_14() -> Figure:
         law: survived / passive_nm - 1
         for law, survived in zip((SMALL_GAIN, ROBUST), fuzzy_nm, strict=True)
     }
-    return Figure(
-        METHOD,
-        OPEN,
-        (_history("", runs),),
-        checks=(
-            Check(
-                "the two direct fuzzy laws give close results (4.6)",
-                Verdict.of(ratio < 1.2),
-                _told(runs) + ": it is their gains, which the source does not give, that decide",
-            ),
-            Check(
-                "adaptive fuzzy control does not significantly help her to survive, compared with "
-                "the passive tank",
-                Verdict.of(all(gain < 0.1 for gain in gains.values())),
-                f"with a pump of {PUMP_PA / 1e3:g} kPa the greatest wave survived is, per that of "
-                "the passive tank: "
-                + ", ".join(f"{law} {1 + gain:.2f}" for law, gain in gains.items()),
-            ),
+    return _figure(
+        _history("", runs),
+        Check(
+            "the two direct fuzzy laws give close results (4.6)",
+            Verdict.of(ratio < 1.2),
+            _told(runs) + ": it is their gains, which the source does not give, that decide",
         ),
-        columns=1,
+        Check(
+            "adaptive fuzzy control does not significantly help her to survive, compared with "
+            "the passive tank",
+            Verdict.of(all(gain < 0.1 for gain in gains.values())),
+            f"with a pump of {PUMP_PA / 1e3:g} kPa the greatest wave survived is, per that of "
+            "the passive tank: "
+            + ", ".join(f"{law} {1 + gain:.2f}" for law, gain in gains.items()),
+        ),
     )
 
 
 def figure_4_15() -> Figure:
     """The same in the phase plane."""
     runs = _small_gain_runs()
-    return Figure(
-        METHOD,
-        OPEN,
-        (_plane("", runs),),
-        checks=(
-            Check(
-                "the law keeps her within the passive tank's trajectory (implied)",
-                Verdict.of(
-                    runs["fuzzy (4.20)"].result.max_roll_rad < runs["passive"].result.max_roll_rad
-                ),
-                _told(runs),
+    return _figure(
+        _plane("", runs),
+        Check(
+            "the law keeps her within the passive tank's trajectory (implied)",
+            Verdict.of(
+                runs["fuzzy (4.20)"].result.max_roll_rad < runs["passive"].result.max_roll_rad
             ),
+            _told(runs),
         ),
-        columns=1,
     )
