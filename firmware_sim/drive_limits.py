@@ -21,11 +21,6 @@ class DriveLimits:
         the safety manual has a dead controller's pressure on its way to zero.
     bus_voltage_v : float
         Direct-current bus the drive feeds from; 4 to 1000, the range of DRIVE_STATUS_2.
-
-    Raises
-    ------
-    ValueError
-        If a limit is out of its range.
     """
 
     pressure_pa: Positive = 50e3

@@ -3,7 +3,7 @@
 A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands what else must hold to
 `refuse`. A configuration file checks each field by its annotation as it reads it, so that every
 wrong number is found at once and at its own key; everything made in code is checked by
-`range_problems`.
+`range_problems`. A number that is out of its range raises `ParameterError`, a ValueError.
 """
 
 import math

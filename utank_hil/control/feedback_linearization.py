@@ -68,11 +68,6 @@ class FeedbackLinearizationDesign:
         l.
     level_damping_ratio : float
         zeta_h; 0 for the exact linear response.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range.
     """
 
     frequency_rad_s: Positive

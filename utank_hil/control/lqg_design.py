@@ -34,11 +34,6 @@ class LQGDesign:
     washout_rad_s : float
         Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
         the ship's roll frequency at most; 0 for none.
-
-    Raises
-    ------
-    ValueError
-        If a weight is out of its range.
     """
 
     predictor: Predictor
@@ -58,13 +53,7 @@ class LQGDesign:
         refuse("LQG design", problems)
 
     def law(self, plant: DesignPlant) -> LinearLaw:
-        """The law for a plant.
-
-        Raises
-        ------
-        ValueError
-            If a parameter is out of its range.
-        """
+        """The law for a plant."""
         return washed(self._lqg_law(plant), self.washout_rad_s, plant.ship)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

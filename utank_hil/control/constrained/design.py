@@ -84,11 +84,6 @@ class ConstrainedDesign:
     iteration_limit : int
         Budget of a quadratic programme, 200 at most.
     sample_time_s : float
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
     """
 
     kind: Literal["constrained_gpc"]
@@ -133,13 +128,7 @@ class ConstrainedDesign:
         refuse("constrained design", problems)
 
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
-        """The law for a plant, planning within its limits.
-
-        Raises
-        ------
-        ValueError
-            If a parameter is out of its range.
-        """
+        """The law for a plant, planning within its limits."""
         limits = plant.limits
         if not self.level_margin_m < limits.level_m:
             reason = (

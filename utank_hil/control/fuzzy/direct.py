@@ -47,11 +47,6 @@ class SmallGainFuzzy(FuzzyLaw):
         Gamma and sigma.
     initial : float
         lambda_0, zero or more.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range.
     """
 
     gamma: _Gamma
@@ -102,11 +97,6 @@ class RobustFuzzy(FuzzyLaw):
         Gamma_1, Gamma_2 and sigma_1, sigma_2.
     initial : tuple of float
         lambda_0, theta_0, zero or more.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range.
     """
 
     gamma: _Gamma

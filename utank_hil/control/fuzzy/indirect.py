@@ -44,11 +44,6 @@ class IndirectFuzzy(FuzzyLaw):
         Least ghat, in nominal ones; above 0, below 1.
     prior : tuple of float, optional
         What every rule knows of f before learning: a constant, then a factor for each input.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range.
     """
 
     adaptation_f: Positive

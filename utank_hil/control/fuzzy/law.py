@@ -48,11 +48,6 @@ class FuzzyLaw(ABC):
     brake_pa_s_m : float
         Pump pressure per level rate against the flow (`level_brake`); 0 for the source's law.
     sample_time_s : float
-
-    Raises
-    ------
-    ValueError
-        If a parameter is out of its range.
     """
 
     error: ErrorDynamics

@@ -112,11 +112,6 @@ class Predictor:
     pressure_noise_pa_rt_s : float
         Root of the two-sided density of the white pressure disturbance.
     sample_time_s : float
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
     """
 
     measured: tuple[str, ...]
@@ -222,13 +217,7 @@ class PredictiveDesign:
         return []
 
     def law(self, plant: DesignPlant) -> LinearLaw:
-        """The law for a plant.
-
-        Raises
-        ------
-        ValueError
-            If a parameter is out of its range.
-        """
+        """The law for a plant."""
         return washed(self._predictive_law(plant), self.washout_rad_s, plant.ship)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
