@@ -21,6 +21,7 @@ from utank_hil.canbus import (
     Mode,
     Quality,
     SensorMotion,
+    SensorPump,
     ValveCommand,
     ValveControl,
     ValveFault,
@@ -323,3 +324,15 @@ def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position()
     bench.hear(list(bench.node.stop(bench.now_ns)))
     assert bench.control is ValveControl.FAIL_POSITION
     assert bench.pressure_pa == 0
+
+
+def test_the_level_is_observed_with_what_the_valve_holds_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = ValveBench()
+    bench.pump = SensorPump(3e3, 0.0, Quality.GOOD)
+    driven: list[float] = []
+    monkeypatch.setattr(bench.node._valve, "held_pa", lambda *_: 2e3)
+    monkeypatch.setattr(bench.level, "update", lambda level_m, pa, cycles: driven.append(pa))
+    bench.run(100)
+    assert set(driven) == {1e3}
