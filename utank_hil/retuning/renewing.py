@@ -57,6 +57,8 @@ class RenewingController(LawExchange):
 
     Attributes
     ----------
+    renewed : RenewedLaw or None
+        Latest admitted law.
     fallbacks : int
         As of `Plans`, of whichever law was in charge.
     """
@@ -77,7 +79,7 @@ class RenewingController(LawExchange):
         self._latest: MotionEstimate | None = None
         self._due = ""
         self._asked: MotionEstimate | None = None
-        self._renewed: RenewedLaw | None = None
+        self.renewed: RenewedLaw | None = None
         self.fallbacks = 0
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
@@ -136,7 +138,7 @@ class RenewingController(LawExchange):
         except (ValueError, ArithmeticError) as error:
             return str(error)
         assert self._asked is not None
-        self._renewed, ship = answer, self._asked.ship
+        self.renewed, ship = answer, self._asked.ship
         assert ship is not None
         found = None if ship is self._configured else ship
         service = MonitoredLaw(controller, ChangeMonitor(ship), found, self._asked)
@@ -148,7 +150,7 @@ class RenewingController(LawExchange):
         Its roll follows that of the passive ship, and is never taken as more than hers. The
         pressure may be what is predicted of the new law.
         """
-        before, renewed = self._baseline, self._renewed
+        before, renewed = self._baseline, self.renewed
         assert renewed is not None
         roll_rad = before.roll_rad
         if min(before.passive_roll_rad, tried.passive_roll_rad) > NOISE_FLOOR.roll_rad:
@@ -162,7 +164,7 @@ class RenewingController(LawExchange):
         )
 
     def _on_trial(self) -> str:
-        renewed, asked = self._renewed, self._asked
+        renewed, asked = self.renewed, self._asked
         assert renewed is not None
         assert asked is not None
         assert asked.ship is not None
