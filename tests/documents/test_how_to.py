@@ -5,12 +5,14 @@ A page is walked from top to bottom in a folder that has ``configs`` only:
 * a block that names a file, after the fence or in a line "`path`:" above it, becomes that file; if
   the repository has the file, the block must be quoted from it;
 * the commands of an ``sh`` block are run, if all are ``utank-hil`` or ``firmware-sim`` without a
-  bus; those of ``sh slow`` in the slow tests only;
+  bus, or ``sed``; those of ``sh slow`` in the slow tests only, those of ``exits-6`` end so;
 * other ``python`` blocks are run.
 """
 
+import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -29,7 +31,7 @@ def commands(block: Block) -> list[list[str]]:
         return []
     lines = [shlex.split(line, comments=True) for line in block.text.splitlines()]
     found = [line for line in lines if line]
-    here = all(line[0] in COMMANDS and not {"--bus", "&"} & set(line) for line in found)
+    here = all(line[0] in {*COMMANDS, "sed"} and not {"--bus", "&"} & set(line) for line in found)
     return found if here else []
 
 
@@ -44,17 +46,21 @@ def walk(page: Path, folder: Path, *, slow: bool) -> None:
             (folder / block.file).write_text(block.text, encoding="utf-8")
         elif block.language == "python":
             run_python(page, block)
-        elif block.note == "slow" and not slow:
+        elif "slow" in block.note.split() and not slow:
             continue
         else:
+            expected = re.search(r"\bexits-(\d+)", block.note)
             for name, *arguments in commands(block):
+                if name not in COMMANDS:
+                    subprocess.run([name, *arguments], check=True)
+                    continue
                 result = CliRunner().invoke(COMMANDS[name], arguments)
                 said = f"{where}: {shlex.join(arguments)}\n{result.output}"
-                assert result.exit_code == 0, said
+                assert result.exit_code == (int(expected[1]) if expected else 0), said
 
 
 def has_slow_steps(page: Path) -> bool:
-    return any(block.note == "slow" for block in blocks(page.read_text(encoding="utf-8")))
+    return any("slow" in block.note.split() for block in blocks(page.read_text(encoding="utf-8")))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,82 @@
+"""The tutorial: its commands work one after the other, and give the figures that it shows."""
+
+import json
+import math
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from pages import ROOT, blocks
+from test_how_to import commands, walk
+
+import utank_hil.telemetry
+
+PAGE = ROOT / "docs" / "tutorial.md"
+BLOCKS = blocks(PAGE.read_text(encoding="utf-8"))
+
+
+class ClosedAtOnce:
+    """A viewer that its user closes at once."""
+
+    url = None
+    failed = False
+
+    def __init__(self, source: Path | str, at_s: float | None = None) -> None:
+        shown.append((str(source), at_s))
+
+    def __enter__(self) -> "ClosedAtOnce":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def wait(self, longest_s: float) -> bool:
+        return True
+
+
+shown: list[tuple[str, float | None]] = []
+
+
+def table_rows(text: str) -> dict[str, float]:
+    """Roll by run, of a table as it is printed."""
+    return {name: float(roll) for name, roll in re.findall(r"│ ([\w ]+?) +│ +([\d.]+) │", text)}
+
+
+@pytest.mark.slow
+def test_its_quick_commands_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    walk(PAGE, tmp_path, slow=False)
+    assert (tmp_path / "patrol" / "narrow").is_dir()
+
+
+@pytest.mark.evidence
+@pytest.mark.timeout(900)
+def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(utank_hil.telemetry, "open_viewer", ClosedAtOnce)
+    shown.clear()
+    walk(PAGE, tmp_path, slow=True)
+    printed = [table_rows(block.text) for block in BLOCKS if "│" in block.text]
+    assert [len(table) for table in printed] == [3, 3]
+    for folder, table in zip(("out", "narrow"), printed, strict=True):
+        report = json.loads((tmp_path / "patrol" / folder / "bench.json").read_text())
+        rolls = {run["name"]: math.degrees(run["roll"]["rms_rad"]) for run in report["runs"]}
+        rolls["no tank"] = math.degrees(report["no_tank"]["rms_rad"])
+        assert {name: round(roll, 2) for name, roll in rolls.items()} == table
+    watched, faulty = shown
+    assert watched[0] == "patrol/out/bench.rrd"
+    assert faulty == ("patrol/faulty/bench.rrd", pytest.approx(100.4, abs=0.06))
+    assert "sensor: alignment" in (tmp_path / "patrol/faulty/report.html").read_text()
+
+
+def test_no_command_of_it_is_left_out() -> None:
+    """Those that are not walked are of `make`, which has them, or need a bus or two terminals."""
+    made = re.findall(r"^make (\w+)$", PAGE.read_text(encoding="utf-8"), re.M)
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert made
+    assert all(re.search(rf"^{name}:", makefile, re.M) for name in made)
+    left = [block for block in BLOCKS if block.language == "sh" and not commands(block)]
+    assert ["make bench" in left[0].text, left[1].note] == [True, "vcan"]
+    assert len(left) == 2
