@@ -504,7 +504,7 @@ FAULTS: Final = (
         "Check the cable, its plugs and termination, gateways between the nodes, and the load.",
         _found(
             Reaction.WARN,
-            "over 1% of a message's frames missing by its counter, five too many",
+            "over 0.1% of a message's frames missing by its counter, five too many",
             Finding.FRAMES_LOST,
         ),
     ),
