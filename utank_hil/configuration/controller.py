@@ -27,6 +27,8 @@ from utank_hil.tick import TICK_S, is_whole_ticks
 
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 
+MOST_PRESSURE_PA: Final = 250e3
+"""What PUMP_CMD can ask for: the codec cuts what is more, and the controller would not know."""
 MOST_PULSES_S: Final = 3600.0
 """Longest identification: the pulses and the record are kept in memory."""
 
@@ -90,26 +92,33 @@ class ControllerConfig(Section):
 
     def _limit_problems(self) -> list[Problem]:
         pump = self.vessel.pump
-        pressure_pa = math.inf if pump is None else pump.max_pressure_pa
+        pressure_pa = said_pa = math.inf
+        if pump is not None:
+            pressure_pa, said_pa = pump.max_pressure_pa, MOST_PRESSURE_PA
         level_m = self.vessel.tank.level_limit_m
         return [
             (
                 f"limits.{name}",
-                f"is {value:g}, but the vessel's {why}: set it to {most:g} or less, or leave it "
-                "out",
+                f"is {value:g}, but {why}: set it to {most:g} or less, or leave it out",
             )
             for name, value, most, why in (
                 (
                     "pressure_pa",
                     self.limits.pressure_pa,
                     pressure_pa,
-                    f"pump gives {pressure_pa:g} at most",
+                    f"the vessel's pump gives {pressure_pa:g} at most",
+                ),
+                (
+                    "pressure_pa",
+                    min(self.limits.pressure_pa, pressure_pa),
+                    said_pa,
+                    f"PUMP_CMD can ask for {said_pa:g} at most",
                 ),
                 (
                     "level_m",
                     self.limits.level_m,
                     level_m,
-                    f"tank is full or empty at {level_m:g}",
+                    f"the vessel's tank is full or empty at {level_m:g}",
                 ),
             )
             if value > most
