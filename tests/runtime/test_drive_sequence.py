@@ -2,7 +2,7 @@ import pytest
 
 from firmware_sim.drive_states import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
-from utank_hil.runtime.drive_sequence import DriveSequence
+from utank_hil.runtime.drive_sequence import QUICK_STOPS, DriveSequence
 
 S, C = DriveState, ControlWord
 
@@ -79,3 +79,25 @@ def test_reset_requested_of_a_healthy_drive_is_not_saved_for_later() -> None:
     states.trip(DriveFault.STALL)
     states.tick()
     assert set(led(states, sequence, wanted=False)) == {S.FAULT}
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_drive_that_stays_in_quick_stop_is_switched_off_when_it_had_its_time(
+    wanted: bool,
+) -> None:
+    states, sequence = DriveStates(), DriveSequence()
+    states.tick()
+    led(states, sequence, wanted=True)
+    words = []
+    for _ in range(QUICK_STOPS + 5):
+        words.append(sequence.next_word(states.state, wanted=wanted and bool(words)))
+        states.command(words[-1])
+        states.tick(stopped=False)  # by its quick stop option code it waits for a word
+    assert words[: QUICK_STOPS + 1] == [C.QUICK_STOP] * (QUICK_STOPS + 1)
+    assert words[QUICK_STOPS + 1] is C.DISABLE_VOLTAGE
+    assert states.state is (S.OPERATION_ENABLED if wanted else S.SWITCH_ON_DISABLED)
+    # the next stop has its time again
+    led(states, sequence, wanted=True)
+    for _ in range(QUICK_STOPS):
+        states.command(sequence.next_word(states.state, wanted=False))
+        assert states.state is S.QUICK_STOP_ACTIVE

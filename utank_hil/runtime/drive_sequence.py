@@ -1,6 +1,12 @@
 """Leads the pump drive through its CiA 402 states to where the supervisor wants it."""
 
+from typing import Final
+
 from utank_hil.canbus import ControlWord, DriveState
+
+QUICK_STOPS: Final = 25
+"""Commands, half a second of them: a drive that brakes for longer, or waits for a word, is off."""
+
 
 _TOWARDS_ENABLED = {
     DriveState.SWITCH_ON_DISABLED: ControlWord.SHUTDOWN,
@@ -18,6 +24,7 @@ class DriveSequence:
 
     def __init__(self) -> None:
         self._resetting = False
+        self._stops = 0
 
     def request_reset(self) -> None:
         """Reset the drive's fault with the next commands; only ever on an operator's order."""
@@ -36,6 +43,9 @@ class DriveSequence:
         if self._resetting and state is DriveState.FAULT:
             return ControlWord.FAULT_RESET
         self._resetting = False
+        self._stops = self._stops + 1 if state is DriveState.QUICK_STOP_ACTIVE else 0
+        if self._stops > QUICK_STOPS:
+            return ControlWord.DISABLE_VOLTAGE
         if wanted and state is not None:
             return _TOWARDS_ENABLED.get(state, ControlWord.DISABLE_VOLTAGE)
         if state in _STOPPING:
