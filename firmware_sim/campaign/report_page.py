@@ -59,7 +59,7 @@ def _verdict(told: dict[str, Any]) -> Verdict:
             f"{interval(pair['share_below'], 100, 1)} % below the passive tank, mean of "
             f"{pair['share_below']['cases']} pairs."
             for pair in group["paired"]
-            if pair["against"] == PASSIVE
+            if pair["against"] == PASSIVE and pair["share_below"]["cases"]
         ]
     wrong = []
     if told["interrupted"]:

@@ -11,6 +11,7 @@ from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Results
 from firmware_sim.campaign.study import Case, Scalar, Stop
 from firmware_sim.campaign.work import FAILED, OK
+from firmware_sim.figures import LEAST_ROLL_RAD
 from firmware_sim.report_tables import NO_TANK
 from utank_hil.analysis.motion.confidence import mean_interval
 
@@ -160,7 +161,7 @@ def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
     """Rolls of one, and of another in the same waves."""
     return {
         "roll_rms_difference_rad": figure([one - other for other, one in both]),
-        "share_below": figure([1 - one / other for other, one in both if other > 0]),
+        "share_below": figure([1 - one / other for other, one in both if other >= LEAST_ROLL_RAD]),
     }
 
 

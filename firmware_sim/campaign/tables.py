@@ -65,7 +65,7 @@ def pairs_table(groups: list[dict[str, Any]]) -> Table:
                 pair["run"],
                 against,
                 *(_short(value) for value in group["parameters"].values()),
-                str(pair["share_below"]["cases"]),
+                str(pair["roll_rms_difference_rad"]["cases"]),
                 interval(pair["share_below"], 100, 1),
                 interval(pair["roll_rms_difference_rad"], 180 / math.pi, 3),
             )

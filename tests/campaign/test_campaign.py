@@ -17,6 +17,7 @@ from typer.testing import CliRunner, Result
 from firmware_sim.campaign.cluster import workers
 from firmware_sim.campaign.driver import Count, Driver, batch_of
 from firmware_sim.campaign.store import Store, read_results
+from firmware_sim.campaign.tables import pairs_table
 from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
 from tools.evidence import campaign_part
@@ -135,6 +136,20 @@ def test_command_resumes_counts_failures_and_compares_in_the_same_waves(run, tmp
     mean, width = (100 * shares[name] for name in ("mean", "half_width"))
     assert f"gpc (sea.heading_deg 90.0): {mean:.1f} ± {width:.1f} % below the passive" in page
     assert "3 cases have no result." in page
+
+
+def test_share_of_no_roll_is_no_figure(run, tmp_path: Path):
+    calm = {"kind": "jonswap", "hs_m": 1e-5, "tp_s": 9.0, "effective_slope": {"coefficient": 0.5}}
+    done = run(written(tmp_path, set={"sea": calm}, grid={"seed": [1, 2]}), "--json")
+    (group,) = json.loads(done.stdout)["groups"]
+    (pair,) = group["paired"]
+    assert group["runs"]["gpc"]["roll_below_passive"]["cases"] == 0
+    assert pair["share_below"] == {"mean": None, "half_width": None, "cases": 0}
+    assert pair["roll_rms_difference_rad"]["cases"] == 2
+    cells = [list(column.cells) for column in pairs_table([group]).columns]
+    assert cells[2:4] == [["2"], [""]]
+    page = write_page([tmp_path / "out"], tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "% below the passive" not in page
 
 
 def test_groups_of_the_same_waves_are_compared_with_the_first(run, tmp_path: Path):
