@@ -70,6 +70,7 @@ def test_set_point_is_zero_within_the_frames_own_timeout_and_one_tick(
     while bench.told.state is DriveState.OPERATION_ENABLED:
         bench.tick()
         assert bench.now_ns - last_ns < 200 * MS
+    assert bench.drive.setpoint_pa == 0.0
     tripped_ns = bench.sent_ns[-1]
     assert timeout_ms * MS < tripped_ns - last_ns <= timeout_ms * MS + TICK_NS
     assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
@@ -267,6 +268,8 @@ def test_whatever_ends_it_no_set_point_is_left(end: str) -> None:
     bench.tick()
     assert bench.drive.setpoint_pa == 0.0
     assert not bench.drive.enabled
+    tripped = end in ("silence", "fault")
+    assert (bench.told.state is DriveState.FAULT_REACTION_ACTIVE) is tripped
 
 
 @pytest.mark.parametrize("wrong", ["refused", "out of sequence"])
@@ -284,9 +287,27 @@ def test_only_a_good_command_enables(wrong: str) -> None:
     assert bench.told.state is DriveState.SWITCHED_ON
 
 
+def test_a_new_drive_has_no_set_point_and_warns_of_nothing() -> None:
+    bench = DriveBench()
+    assert bench.drive.setpoint_pa == 0.0
+    bench.tick()
+    assert bench.status_2 is not None
+    assert not bench.status_2.command_warning
+
+
+def test_the_pressure_limit_holds_but_for_half_a_step_of_the_bus() -> None:
+    for beyond_pa, refused in ((3.5, 0), (4.5, 1)):
+        bench = DriveBench(DriveLimits(pressure_pa=2000.0 - beyond_pa))
+        bench.enable()
+        bench.command(2000.0)
+        assert bench.drive.refused == refused
+
+
 def test_a_drive_that_is_switched_off_by_itself_is_in_no_fault() -> None:
     bench = armed()
     bench.drive.fail(DriveFault.NONE)
+    bench.tick()
+    assert bench.told.state is DriveState.SWITCH_ON_DISABLED  # at once, without braking
     bench.command(20e3)
     bench.ticks(20)
     assert bench.told.state is DriveState.SWITCH_ON_DISABLED
@@ -296,13 +317,16 @@ def test_a_drive_that_is_switched_off_by_itself_is_in_no_fault() -> None:
 
 def test_status_2_comes_every_100_ms_and_warns_of_refused_commands_only() -> None:
     bench = armed()
-    sent = []
-    for _ in range(30):
-        bench.command(60e3 if len(sent) == 1 else 20e3)
+    sent: dict[int, Frame] = {}
+    for k in range(30):
+        # one is refused, just before the second status
+        bench.command(60e3 if k - 10 in sent and len(sent) == 1 else 20e3)
         bench.tick()
-        sent += [f for f in bench.frames if f.can_id == CATALOGUE.codec(DriveStatus2).can_id]
+        for frame in bench.frames:
+            if frame.can_id == CATALOGUE.codec(DriveStatus2).can_id:
+                sent[k] = frame
     assert len(sent) == 3
-    warned = [CATALOGUE.codec(DriveStatus2).decode(frame.data) for frame in sent]
+    warned = [CATALOGUE.codec(DriveStatus2).decode(frame.data) for frame in sent.values()]
     assert [each.command_warning for each in warned if each is not None] == [False, True, False]
     for each in warned:
         assert each is not None
@@ -430,7 +454,8 @@ def test_drive_claims_its_address_and_tells_its_fault_in_the_heartbeat() -> None
         heard = [beats.accept(frame) for frame in bench.frames if frame.can_id == beats.can_id]
         states += [beat.state for beat in heard if beat is not None]
         assert claim.can_id not in [frame.can_id for frame in bench.frames]
-    assert NodeState.FAULT in states  # no command came
+    assert states[0] is NodeState.OPERATIONAL
+    assert states[-1] is NodeState.FAULT  # no command came
 
 
 @given(

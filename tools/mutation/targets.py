@@ -7,6 +7,13 @@ _SET_FIRST = "set before it is read, on every way there"
 _OF_40_MS = "a millisecond of the 40 that are allowed"
 _SUM = "a difference of numbers is finite exactly where their sum is"
 _TOUCHING = "a millimetre from the limit the barrier asks for the whole brake on either side"
+_A_QUARTER = "a quarter more or less of what is as good as nothing"
+_A_NANOSECOND = "a nanosecond, where ticks are ten milliseconds apart"
+_BETWEEN = "no measurement and no set-point of the bus is exactly there"
+_SAME = "the same set-point is no step either way"
+_FALSE = "None is as false as False"
+_ROUNDED = "less than a step of the set-point on the bus"
+_PHASE = "in which tick a status of every second tick comes is the same to all"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
@@ -47,6 +54,48 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
         "motion.roll_rate_rad_s) and (self._gates is None or "
         "self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
+    },
+    "firmware_sim/drive.py": {
+        ": STOPPED_SHARE = 0.02 -> STOPPED_SHARE = 0.025": _A_QUARTER,
+        ": LONGEST_STOP_NS = 500000000 -> LONGEST_STOP_NS = 500000001": _A_NANOSECOND,
+        "PumpDrive.__init__: self._accepted_ns = 0 -> self._accepted_ns = 1": _A_NANOSECOND,
+        "PumpDrive.__init__: self._timeout_ns = 0 -> self._timeout_ns = 1": _A_NANOSECOND,
+        "PumpDrive.__init__: self._moving_ns = 0 -> ": _SET_FIRST,
+        "PumpDrive.__init__: self._moving_ns = 0 -> self._moving_ns = 1": _SET_FIRST,
+        "PumpDrive.__init__: self._setpoint_pa = 0.0 -> ": _SET_FIRST,
+        "PumpDrive.__init__: self._shown_state = self._states.state -> ": _SET_FIRST,
+        "PumpDrive._permitted: if not abs(pressure_pa) <= limits.pressure_pa + "
+        "ROUNDING_PA: -> if not abs(pressure_pa) < limits.pressure_pa + ROUNDING_PA:": _BETWEEN,
+        "PumpDrive._permitted: return False -> return None": _FALSE,
+        "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
+        "+ 2 * ROUNDING_PA -> return step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA": _ROUNDED,
+        "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
+        "+ 2 * ROUNDING_PA -> return step_pa == 1.0 or step_pa <= self._reach_pa(now_ns) + "
+        "2 * ROUNDING_PA": _ROUNDED,
+        "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
+        "+ 2 * ROUNDING_PA -> return step_pa == 0.0 or step_pa < self._reach_pa(now_ns) + "
+        "2 * ROUNDING_PA": _ROUNDED,
+        "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
+        "+ 2 * ROUNDING_PA -> return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) + "
+        "3 * ROUNDING_PA": _ROUNDED,
+        "PumpDrive._step_away_pa: toward_zero = abs(pressure_pa) <= abs(setpoint_pa) and "
+        "pressure_pa * setpoint_pa >= 0.0 -> toward_zero = abs(pressure_pa) < "
+        "abs(setpoint_pa) and pressure_pa * setpoint_pa >= 0.0": _SAME,
+        "PumpDrive._step_away_pa: return 0.0 if toward_zero else abs(pressure_pa - "
+        "setpoint_pa) -> return 1.0 if toward_zero else abs(pressure_pa - setpoint_pa)": _ROUNDED,
+        "PumpDrive.tick: if self._ticks % self._status_1_ticks == 0 or states.state is not "
+        "self._shown_state: -> if self._ticks % self._status_1_ticks != 0 or states.state "
+        "is not self._shown_state:": _PHASE,
+        "PumpDrive.tick: if self._ticks % self._status_1_ticks == 0 or states.state is not "
+        "self._shown_state: -> if self._ticks % self._status_1_ticks == 1 or states.state "
+        "is not self._shown_state:": _PHASE,
+        "PumpDrive.tick: self._ticks += 1 -> self._ticks -= 1": _PHASE,
+        "PumpDrive._stopped: return share < STOPPED_SHARE or now_ns - self._moving_ns > "
+        "LONGEST_STOP_NS -> return share <= STOPPED_SHARE or now_ns - self._moving_ns > "
+        "LONGEST_STOP_NS": _BETWEEN,
+        "PumpDrive._stopped: return share < STOPPED_SHARE or now_ns - self._moving_ns > "
+        "LONGEST_STOP_NS -> return share < STOPPED_SHARE or now_ns - self._moving_ns >= "
+        "LONGEST_STOP_NS": _BETWEEN,
     },
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
