@@ -11,7 +11,7 @@ from firmware_sim import starter_text
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from firmware_sim.starter_ship import StarterShip
-from utank_hil.analysis.loop.scaled_law import FirstLaw, first_law
+from utank_hil.analysis.loop.self_tuning import SelfTuned, SelfTunedDesign
 from utank_hil.analysis.tank_prediction import (
     RollPrediction,
     SeaState,
@@ -59,9 +59,9 @@ class StarterProject:
     sized : SizedTank
     demand : PumpDemand
         What the pump was made for.
-    law : FirstLaw
+    law : SelfTuned
     prediction : RollPrediction
-        In the scenario's sea.
+        In the scenario's sea; with the pump, of a gentle LQG law that stays within the limits.
     sea : dict
         Of the scenario.
     texts : dict of str to str
@@ -71,7 +71,7 @@ class StarterProject:
     vessel: Vessel
     sized: SizedTank
     demand: PumpDemand
-    law: FirstLaw
+    law: SelfTuned
     prediction: RollPrediction
     sea: dict[str, Any]
     texts: dict[str, str]
@@ -141,19 +141,20 @@ def make_starter(
     texts = {SHIP: starter_text.ship_file(ship, written, room, sized, demand, pump)}
     # from here on with the numbers as they stand in the files
     vessel = _valid(Vessel, yaml.safe_load(texts[SHIP]))
-    content: dict[str, Any] = {"name": ship.name, "vessel": vessel, "law": {"kind": "passive"}}
     usable_m = float(f"{usable_level_m(vessel.ship, vessel.tank):.3g}")
     limits = {}
     if usable_m < (1 - _LEAST_LEVEL_CHANGE) * vessel.default_limits["level_m"]:
         limits["level_m"] = usable_m
-    config = _valid(ControllerConfig, content | {"limits": limits})
     sea = starter_sea(ship.length_m, ship.period_s, hs_m, tp_s)
+    texts[CONTROLLER] = starter_text.controller_file(ship.name, sea, limits)
+    written_law = yaml.safe_load(texts[CONTROLLER])
+    config = _valid(ControllerConfig, written_law | {"vessel": vessel})
     texts[SCENARIO] = starter_text.scenario_file(ship.name, sea)
-    parts = {"vessel": vessel, "controllers": {"lqg": config}}
+    parts = {"vessel": vessel, "controllers": {"self_tuned": config}}
     scenario = _valid(Scenario, yaml.safe_load(texts[SCENARIO]) | parts)
     state = SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
-    law = first_law(config.plant, state.slope_rad, state.peak_rad_s)
-    texts[CONTROLLER] = starter_text.controller_file(ship.name, law, limits)
+    assert isinstance(config.law, SelfTunedDesign)
+    law = config.law.tuned(config.plant)
     texts[README] = starter_text.readme(ship.name)
     prediction = predict_roll(config.plant, state)
     return StarterProject(vessel, sized, demand, law, prediction, sea, texts)

@@ -5,7 +5,6 @@ import math
 from typing import Any
 
 from firmware_sim.starter_ship import StarterShip
-from utank_hil.analysis.loop.scaled_law import FirstLaw
 from utank_hil.analysis.tank_sizing import (
     LOADINGS,
     PUMP_SLOPE_RAD,
@@ -77,35 +76,22 @@ pump:
 """
 
 
-def controller_file(name: str, law: FirstLaw, limits: dict[str, float]) -> str:
-    """The controller: its law in parameters."""
-    design, predictor = law.design, law.design.predictor
-    asked = "as scaled"
-    if law.weight_factor < 1:
-        asked = f"{law.weight_factor:g} of the scaled ones, at which all margins are met"
-    text = f"""\
-# The shipped LQG law, scaled to this ship and sea. Weights on roll, roll rate, level and its
-# rate: {asked}.
-name: {json.dumps(f"{name}, LQG")}
+def controller_file(name: str, sea: dict[str, Any], limits: dict[str, float]) -> str:
+    """The controller: a law that designs itself for the scenario's sea."""
+    level = f"level_m: {number(limits['level_m'])}, " if limits else ""
+    remark = "# level_m: beyond it the water in the duct would be too fast\n" if limits else ""
+    return f"""\
+# A law that finds its numbers for ship, pump and sea, with all margins. Without the section sea it
+# expects no sea in particular. mean_power_w in W, beside it, bounds what the pump spends.
+name: {json.dumps(f"{name}, self-tuned")}
 vessel: ship.yaml
 law:
-  kind: lqg
-  predictor:
-    measured: [{", ".join(predictor.measured)}]
-    measurement_std: [{", ".join(map(number, predictor.measurement_std))}]
-    order: {predictor.order}
-    wave_peak_rad_s: {number(predictor.wave_peak_rad_s)}
-    wave_damping_ratio: {number(predictor.wave_damping_ratio)}
-    wave_slope_rad: {number(predictor.wave_slope_rad)}
-    pressure_noise_pa_rt_s: {number(predictor.pressure_noise_pa_rt_s)}
-    sample_time_s: {number(predictor.sample_time_s)}
-  state_weight: [{", ".join(map(number, design.state_weight))}]
-  washout_rad_s: {number(design.washout_rad_s)}
+  kind: self_tuned
+  sea: {{kind: jonswap, hs_m: {number(sea["hs_m"])}, tp_s: {number(sea["tp_s"])}, \
+effective_slope: {number(sea["effective_slope"]["coefficient"])}}}
+# the plan keeps the limits itself: the level barrier behind it acts late and hard
+{remark}limits: {{{level}brake_share: 1.0, sharpness: 4.0}}
 """
-    if limits:
-        text += "# beyond it the water in the duct would be too fast\n"
-        text += f"limits: {{level_m: {number(limits['level_m'])}}}\n"
-    return text
 
 
 def scenario_file(name: str, sea: dict[str, Any]) -> str:
@@ -120,7 +106,7 @@ sea:
   tp_s: {number(sea["tp_s"])}
   effective_slope: {{coefficient: {number(sea["effective_slope"]["coefficient"])}}}
 controllers:
-  lqg: controller.yaml
+  self_tuned: controller.yaml
 operator:
   - {{time_s: 5.0, action: arm}}
 duration_s: 900
@@ -144,7 +130,6 @@ def readme(name: str) -> str:
 utank-hil check controller.yaml      # is the law robust enough for this ship
 utank-hil bench scenario.yaml        # without tank, passive, active: table, picture, recording
 utank-hil design tank ship.yaml --scenario scenario.yaml    # would another tank be better
-utank-hil design controller controller.yaml --scenario scenario.yaml
 ```
 
 After a change in `ship.yaml` run `check` again: a law that misses its margins is refused.

@@ -212,8 +212,7 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
             "max_power_w": pump.max_power_w,
         },
         "law": {
-            "kind": law.design.kind,
-            "weight_factor": law.weight_factor,
+            "kind": "self_tuned",
             "peak_sensitivity": law.robustness.nominal.peak_sensitivity,
             "worst_radius": law.robustness.worst_radius,
         },
@@ -227,7 +226,9 @@ def _table(project: "StarterProject") -> Table:
     sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
     assert pump is not None
     sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"
-    caption = f"roll: linear prediction in a sea of {sea}"
+    caption = (
+        f"roll: linear prediction in a sea of {sea}, with a gentler law than the self-tuned one"
+    )
     table = new_table(escape(project.vessel.name), "", caption=caption)
     table.show_header = False
     ship, tank = project.vessel.ship, project.vessel.tank
@@ -246,7 +247,7 @@ def _table(project: "StarterProject") -> Table:
             f"{pump.max_pressure_pa / 1e3:.3g} kPa, {demand.flow_m3_s:.3g} m³/s, "
             f"{power(pump.max_power_w)}",
         ),
-        ("law", f"LQG, weights ×{law.weight_factor:.3g}"),
+        ("law", "self-tuned"),
         ("peak sensitivity, 2 at most", f"{law.robustness.nominal.peak_sensitivity:.2f}"),
         *roll_rows(project.prediction),
     ]

@@ -54,7 +54,7 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     peak = judged.robustness.nominal.peak_sensitivity
     assert told["law"]["peak_sensitivity"] == pytest.approx(peak)
     scenario = load_config(tmp_path / "scenario.yaml", Scenario)
-    assert scenario.controllers["lqg"] == controller
+    assert scenario.controllers["self_tuned"] == controller
     found = told["linear_prediction"]
     assert found["passive_below_no_tank"] > 0.2
     assert found["active_below_passive"] > 0.2

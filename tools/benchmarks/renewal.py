@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tools.printing import command_line, show
 
+from tools.printing import command_line, show
 from tools.studies.trial_setup import shipped
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.assembly import build_law, retuner_work

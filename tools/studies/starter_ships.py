@@ -67,7 +67,6 @@ def on_the_bench(ship: StarterShip, hs_m: float | None, duration_s: float) -> di
         "max_pressure_pa": pump.max_pressure_pa,
         "max_power_w": pump.max_power_w,
         "sea": project.sea,
-        "weight_factor": project.law.weight_factor,
         "no_tank_deg": math.degrees(bare.rms_rad),
         "passive_deg": math.degrees(passive.roll.rms_rad),
         "active_deg": math.degrees(active.roll.rms_rad),

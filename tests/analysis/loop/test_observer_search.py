@@ -67,6 +67,24 @@ def test_the_cost_is_that_of_the_sum_over_components(plant):
     assert found.passive_cost == pytest.approx(passive, rel=0.05)
 
 
+def test_a_ship_that_capsizes_with_her_tank_passive_has_no_cost_to_compare_with():
+    """Patti-B with 0.59 of her stiffness: the law's own cost stands in for it."""
+    config = load_config(Path("configs/controllers/patti_b_constrained_gpc.yaml"), ControllerConfig)
+    own = config.plant
+    soft = dataclasses.replace(own.ship, stiffness_nm_rad=own.ship.stiffness_nm_rad / 1.3**2)
+    law, sea = config.law.law(own), config.law.sea
+    scaled = in_pump_units(law.unlimited(), sea, own.limits.pressure_pa)
+    plants = [own, dataclasses.replace(own, ship=soft)]
+    costs = [
+        LoopInSea(plant, sea, scaled, config.law.measured, NOISE, WEIGHTS).passive_cost
+        for plant in plants
+    ]
+    assert costs[0] > 0
+    assert costs[1] is None
+    search = ObserverSearch(law, config.law, own, WEIGHTS, 5e-3)
+    assert 0 < search.value(scaled.observer_gain)[0] < 10
+
+
 def test_the_loop_has_the_modes_of_the_sampled_loop():
     law, found = loop(SLOWER, pump_gain=1.2)
     modes = np.linalg.eigvals(found.closed(law.observer_gain))

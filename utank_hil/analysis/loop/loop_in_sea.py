@@ -59,7 +59,14 @@ class LoopInSea:
         Pressure that a command of one ends in.
     forecast : ndarray, shape (F, n), optional
         From the law's state to what it foresees; its error's square is in the cost.
+
+    Attributes
+    ----------
+    passive_cost : float or None
+        With the tank passive; None for a ship that is unstable then.
     """
+
+    passive_cost: float | None
 
     def __init__(
         self,
@@ -102,11 +109,10 @@ class LoopInSea:
         self._cost = np.sqrt(weights)[:, None] * np.vstack([self.motion[picked], self.command])
         if forecast is not None:
             self._cost = np.vstack([self._cost, np.hstack([forecast, -forecast])])
-        passive = covariance(true.A, self._process[:outer, :outer])
-        if passive is None:
-            raise ValueError("the ship with her passive tank is unstable")
-        size_of = self._cost[:2, :outer]
-        self.passive_cost = float(np.trace(size_of @ passive @ size_of.T))
+        passive, size_of = covariance(true.A, self._process[:outer, :outer]), self._cost[:2, :outer]
+        self.passive_cost = None
+        if passive is not None:
+            self.passive_cost = float(np.trace(size_of @ passive @ size_of.T))
 
     def closed(self, observer_gain: FloatArray) -> FloatArray:
         """Matrix A of the loop."""

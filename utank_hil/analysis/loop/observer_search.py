@@ -7,12 +7,12 @@ one. Here its gain L is what a search (L-BFGS-B) varies. It makes least::
 
 j_0 is the cost in the expected sea (`loop_in_sea`) on the ship as she is known, j_v that on ships
 of other stiffness or inertia with other pump gains, each as a share of the same ship's cost with
-her tank passive. f is the cost of the error of the plan and of the motion that it starts from: mean
-squares over the horizon. Without f the observer is good for the law's own command alone, and where
-limits bind a plan needs more than that. S is the sensitivity, with the usual delay and with
-`EXTRA_DELAY_S` more. A loop that is nearly unstable on one of the ships costs much there, so a
-search that begins where all of them are stable stays there. The heel's row of L stays as it was: no
-heel is in the cost.
+her tank passive; of the known one's where that is unstable. f is the cost of the error of the plan
+and of the motion that it starts from: mean squares over the horizon. Without f the observer is good
+for the law's own command alone, and where limits bind a plan needs more than that. S is the
+sensitivity, with the usual delay and with `EXTRA_DELAY_S` more. A loop that is nearly unstable on
+one of the ships costs much there, so a search that begins where all of them are stable stays there.
+The heel's row of L stays as it was: no heel is in the cost.
 """
 
 import math
@@ -29,6 +29,7 @@ from utank_hil.analysis.loop.robustness import (
     PEAK_SENSITIVITY,
     ship_variants,
 )
+from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.arrays import FloatArray
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -89,10 +90,13 @@ class ObserverSearch:
             return LoopInSea(ship, sea, self._law, measured, self._noise, weights, gain, forecast)
 
         self._own = loop(plant, forecast=self._forecast(constrained, measured, weights, unit))
-        self._loops = [(1 / self._own.passive_cost, self._own)]
+        scale = self._own.passive_cost
+        if scale is None:
+            raise NoLawError("the ship is unstable with her tank passive")
+        self._loops = [(1 / scale, self._own)]
         for ship, gain in _others(plant):
             other = loop(ship, gain)
-            self._loops.append((others_share / other.passive_cost, other))
+            self._loops.append((others_share / (other.passive_cost or scale), other))
         low = plant.ship.natural_frequency_rad_s * law.sample_time_s * _LOW_OMEGA
         angle = np.concatenate([low, np.geomspace(low[-1], np.pi, _POINTS + 1)[1:]])
         self._points = np.exp(1j * angle)
