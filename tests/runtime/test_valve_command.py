@@ -336,3 +336,14 @@ def test_the_level_is_observed_with_what_the_valve_holds_back(
     monkeypatch.setattr(bench.level, "update", lambda level_m, pa, cycles: driven.append(pa))
     bench.run(100)
     assert set(driven) == {1e3}
+
+
+def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> None:
+    bench = throttling()
+    valve_law(bench).answer_pa = math.inf
+    bench.run(300)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.node.law_error == "its answer is inf Pa"
+    valve_law(bench).answer_pa, valve_law(bench).loss = 0.0, math.nan
+    bench.run(300)
+    assert bench.node.law_error == "its answer is inf Pa"

@@ -7,6 +7,7 @@ _SET_FIRST = "set before it is read, on every way there"
 _OF_40_MS = "a millisecond of the 40 that are allowed"
 _SUM = "a difference of numbers is finite exactly where their sum is"
 _TOUCHING = "a millimetre from the limit the barrier asks for the whole brake on either side"
+_NOBODY_SETS = "nobody sets what it holds"
 _A_QUARTER = "a quarter more or less of what is as good as nothing"
 _A_NANOSECOND = "a nanosecond, where ticks are ten milliseconds apart"
 _BETWEEN = "no measurement and no set-point of the bus is exactly there"
@@ -54,6 +55,29 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
         "motion.roll_rate_rad_s) and (self._gates is None or "
         "self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
+    },
+    "utank_hil/runtime/controller_node.py": {
+        ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
+            _A_NANOSECOND
+        ),
+        "ControllerSettings: @dataclass(frozen=True, slots=True) -> "
+        "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
+        "ControllerSettings: @dataclass(frozen=True, slots=True) -> "
+        "@dataclass(frozen=True, slots=2)": _NOBODY_SETS,
+        "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> ": _SET_FIRST,
+        "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> "
+        "self.start_ns = self.last_ns = 1": _SET_FIRST,
+        "ControllerNode.__init__: self._law_pa = self._law_loss = 0.0 -> ": _SET_FIRST,
+        "ControllerNode.__init__: self._law_pa = self._law_loss = 0.0 -> "
+        "self._law_pa = self._law_loss = 1.0": _SET_FIRST,
+        "ControllerNode.__init__: self._frames_sent = 0 -> self._frames_sent = 1": (
+            "a frame more in the first second's load"
+        ),
+        "ControllerNode.stop: self.command_pa = 0.0 -> self.command_pa = 1.0": _ROUNDED,
+        "ControllerNode._control: if not math.isfinite(self._law_pa + self._law_loss): -> "
+        "if not math.isfinite(self._law_pa - self._law_loss):": _SUM,
+        "ControllerNode._estimate: if (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s: "
+        "-> if (now_ns - inbox.tank_ns) * NANOSECONDS >= level.next_due_s:": _BETWEEN,
     },
     "firmware_sim/drive.py": {
         ": STOPPED_SHARE = 0.02 -> STOPPED_SHARE = 0.025": _A_QUARTER,
