@@ -380,3 +380,10 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
     noted.state = RetuningState.TRIAL
     monkeypatch.setattr(bench.node, "_retuning", noted)
     assert bench.node.retuning_state is RetuningState.TRIAL
+
+
+def test_without_a_pump_nothing_is_ever_commanded() -> None:
+    bench = ControllerBench(START_NS, pump=False)
+    bench.run(300)
+    assert bench.node.command_pa == 0.0
+    assert not bench.commands
