@@ -1,5 +1,6 @@
 """Figures that documents give for shipped files and laws are those of the files and laws."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +38,21 @@ def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
               pump.max_power_w / 1e3)  # fmt: skip
     for written, value in zip(found.groups(), values, strict=True):
         assert float(written) == pytest.approx(value, rel=5e-3)
+
+
+def test_roll_in_the_readme_is_that_of_the_measured_rows() -> None:
+    measured = json.loads((ROOT / "docs/evidence/shipped_scenarios.json").read_text())
+    rows = {
+        row["run"]: row["roll_below_passive"]
+        for row in measured["result"]["rows"]
+        if row["scenario"] == "storm_all" and row["plant"] is None
+    }
+    text = " ".join((ROOT / "README.md").read_text().split())
+    pattern = r"LQG (\d+) %, DPC (\d+) %, GPC (\d+) %, and (\d+) % for the GPC that plans"
+    found = re.search(pattern, text)
+    assert found is not None
+    for written, law in zip(found.groups(), ("lqg", "dpc", "gpc", "constrained"), strict=True):
+        assert int(written) == round(100 * rows[law])
 
 
 @pytest.mark.slow
