@@ -1,13 +1,21 @@
 """Settings of all tests."""
 
 import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 # what is tested can be patched and is covered
 os.environ.setdefault("UTANK_HIL_COMPILED", "0")
 
+import pytest
 from hypothesis import settings
 
 import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads
+from utank_hil.pictures import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # machines are shared: an example that takes long says nothing about the code
 settings.register_profile("search", deadline=None, print_blob=True)
@@ -15,3 +23,19 @@ settings.register_profile("search", deadline=None, print_blob=True)
 settings.register_profile("same", settings.get_profile("search"), derandomize=True)
 settings.register_profile("few", settings.get_profile("same"), max_examples=10)  # make test-fast
 settings.load_profile("same")
+
+
+@pytest.fixture(autouse=True)
+def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Look at each picture that is drawn, whichever test has it drawn (`legible`)."""
+    save, found = style._save, []
+
+    def looked_at(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
+        save(figure, path, metadata)
+        from legible import flaws
+
+        found.extend(f"{path.name}: {flaw}" for flaw in flaws(figure))
+
+    monkeypatch.setattr(style, "_save", looked_at)
+    yield
+    assert not found, "\n".join(found)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from utank_hil.pictures.style import COLORS, picture
+from utank_hil.pictures.style import BELOW, COLORS, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +81,7 @@ def draw_campaign(
         right.set_xlabel("Roll RMS of a case (°)")
         right.set_ylabel("Share of the cases above it")
         right.set_yscale("log")
-        left.legend(frameon=False)
+        figure.legend(*left.get_legend_handles_labels(), **BELOW)
     return path
 
 
@@ -106,4 +106,5 @@ def _exceedance(axes: "Axes", run: CampaignRun, color: str) -> None:
     rolls = np.sort([math.degrees(roll) for roll in run.rolls_rad])
     if len(rolls):
         above = 1.0 - np.arange(len(rolls)) / len(rolls)
-        axes.step(rolls, above, where="pre", color=color, label=run.name)
+        mark = "o" if len(rolls) == 1 else None  # a step has no width then
+        axes.step(rolls, above, where="pre", color=color, label=run.name, marker=mark)

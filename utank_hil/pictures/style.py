@@ -25,6 +25,9 @@ COLORS: Final = (
 )
 DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
 """Of the curves with these colours, so that they can be told in print without them."""
+DPI: Final = 130
+BELOW: "Final[dict[str, Any]]" = {"loc": "outside lower left", "ncols": 4, "frameon": False}
+"""Where a legend covers no data."""
 NO_TANK: Final = "#BBBBBB"
 WRONG: Final = "#A40000"
 HIGHLIGHT: Final = "#F0E442"
@@ -72,5 +75,8 @@ def picture(
         FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
         yield figure
         figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
-        metadata = {} if about is None else {"Description": json.dumps(about)}
-        figure.savefig(path, dpi=130, metadata={"Software": headline(), **metadata})
+        _save(figure, path, {} if about is None else {"Description": json.dumps(about)})
+
+
+def _save(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
+    figure.savefig(path, dpi=DPI, metadata={"Software": headline(), **metadata})

@@ -9,7 +9,7 @@ import numpy as np
 
 from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
 from utank_hil.analysis.loop.trade import Trade, TradePoint
-from utank_hil.pictures.style import COLORS, HIGHLIGHT, picture
+from utank_hil.pictures.style import BELOW, COLORS, HIGHLIGHT, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,7 +89,7 @@ def _draw_trade(axes: "Axes", points: list[TradePoint], trade: Trade) -> None:
                 va="center",
                 color="#777777",
             )
-    axes.legend(marks.values(), marks.keys(), loc="lower right", frameon=False)
+    axes.figure.legend(marks.values(), marks.keys(), **BELOW)
     axes.set_ylim(min(0.0, *reduction) - 3, max(reduction) + 6)
     axes.set_xlabel("Peak sensitivity")
     axes.set_ylabel("Roll RMS below the passive tank (%)")
