@@ -45,12 +45,15 @@ def controller(
 
     **Example:** utank-hil design controller configs/controllers/gpc.yaml
     """
+    from utank_hil.analysis.auto_tuning import AutoDesign
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.loop.trade import Design, trade
     from utank_hil.pictures.trade import draw_trade
 
     loaded = load(config, ControllerConfig)
     law = loaded.law
+    if isinstance(law, AutoDesign):
+        law = law.tuned(loaded.plant)
     if not isinstance(law, Design):
         fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
     vessel = loaded.vessel

@@ -34,6 +34,21 @@ def test_what_is_named_passes_when_it_is_written(tmp_path: Path, change: dict[st
     assert mended["remedy"] is None
 
 
+def test_where_no_gentler_weight_passes_the_law_that_finds_its_numbers_is_named(
+    tmp_path: Path,
+) -> None:
+    refused = check(tmp_path, "lqg", "thesis_first", state_weight=[1e30, 0.0, 0.0, 0.0])
+    assert not refused["accepted"]
+    law, found, _ = refused["remedy"].removeprefix("law: ").partition(" passes")
+    assert found
+    mended = yaml.safe_load((tmp_path / "controller.yaml").read_text()) | {
+        "law": yaml.safe_load(law)
+    }
+    file = tmp_path / "mended.yaml"
+    file.write_text(yaml.safe_dump(mended))
+    assert json.loads(CliRunner().invoke(app, ["check", str(file), "--json"]).stdout)["accepted"]
+
+
 def test_ship_that_no_law_can_mend_is_told_so(tmp_path: Path) -> None:
     """Patti-B with 0.59 of her stiffness loses more to the free surface than she has left."""
     refused = check(tmp_path, "gpc", "patti_b")

@@ -147,6 +147,8 @@ def _alone(hint: Any) -> Iterator[Any]:
     elif origin in (Union, UnionType):
         for each in get_args(hint):
             yield from _alone(each)
+    elif origin is Annotated and _is_section(get_args(hint)[0]):
+        yield get_args(hint)[0]
     elif hint is not NoneType:
         yield hint
 
@@ -166,8 +168,9 @@ def _sections(hint: Any) -> Iterator[type]:
 def _value(hint: Any) -> str:
     """What a value must be, in words."""
     members = list(_alone(hint))
-    kinds = [kind for each in members if _is_section(each) and (kind := _kind(each))]
-    if len(kinds) > 1:
+    named = [kind for each in members if _is_section(each) and (kind := _kind(each))]
+    kinds = dict.fromkeys(kind for each in named for kind in each.split(", "))
+    if len(named) > 1:
         return "section of one `kind`: " + ", ".join(kinds)
     return " or ".join(dict.fromkeys(_one(each) for each in members))
 

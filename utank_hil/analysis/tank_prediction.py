@@ -14,7 +14,7 @@ import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.robustness import PERIOD_SCALES
-from utank_hil.analysis.loop.scaled_law import FirstLaw, NoLawError, first_law
+from utank_hil.analysis.loop.scaled_law import FirstLaw, LinearDesign, NoLawError, first_law
 from utank_hil.analysis.loop.sea_response import (
     CalmSeaError,
     MotionInSea,
@@ -25,7 +25,6 @@ from utank_hil.analysis.loop.sea_response import (
 from utank_hil.analysis.tank_sizing import EFFICIENCY, MOST_STABILITY_SHARE, stability_taken
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.ship import RollShip
@@ -226,7 +225,7 @@ def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> Rol
     if not pump:
         return RollPrediction(without, passive, None, None, None, "there is no pump")
 
-    def within_limits(design: LQGDesign) -> bool:
+    def within_limits(design: LinearDesign) -> bool:
         motion = _active(plant, design, waves)
         return (
             2 * motion.pressure_rms_pa <= plant.limits.pressure_pa
@@ -308,7 +307,7 @@ def _varied(ship: RollShip, tank: Tank, share: float, ratio: float) -> Tank | No
 
 def _active(
     plant: DesignPlant,
-    design: LQGDesign,
+    design: LinearDesign,
     waves: Harmonics,
     *,
     design_plant: DesignPlant | None = None,
@@ -324,7 +323,7 @@ def _active(
     )
 
 
-def _mean_power_w(plant: DesignPlant, design: LQGDesign, waves: Harmonics) -> float:
+def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) -> float:
     """Mean hydraulic power of a linear loop per efficiency."""
     law, system = design.law(plant), coupled_model(plant.ship, plant.tank)
     w = waves.frequency_rad_s

@@ -1,14 +1,21 @@
-"""What would make a refused law pass: the same design, asked for less until its margins hold."""
+"""What would make a refused law pass: the same design, asked for less until its margins hold.
+
+Where no gentler one does, the law of the kind that finds its own numbers.
+"""
 
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from utank_hil.analysis.auto_tuning import AutoDesign
 from utank_hil.analysis.loop.robustness import robustness
+from utank_hil.analysis.loop.scaled_law import NoLawError
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.loop.trade import Design, scaled, varied
 from utank_hil.commands.gate import MOST_STEP_S, JudgedLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
 
@@ -47,7 +54,21 @@ def remedy(judged: JudgedLaw) -> str | None:
             continue  # can't be designed or judged either
         if not found.failures():
             return f"{_keys(gentler)} passes; a value between may, too"
-    return f"no gentler {varied(design)} passes: choose another law, or another tank"
+    return _automatic(design, plant) or (
+        f"no gentler {varied(design)} passes: choose another law, or another tank"
+    )
+
+
+def _automatic(design: Design, plant: DesignPlant) -> str | None:
+    """The law of the kind that finds its own numbers; None if there is none."""
+    try:
+        if isinstance(design, ConstrainedDesign):
+            SelfTunedDesign("self_tuned", design.sea).tuned(plant)
+            return "law.kind: self_tuned with the same sea in place of the other numbers passes"
+        AutoDesign(design.kind, "auto").tuned(plant)
+    except NoLawError:
+        return None
+    return f"law: {{kind: {design.kind}, tuning: auto}} passes"
 
 
 def _keys(design: Design) -> str:

@@ -78,7 +78,7 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
 
 def _one_of(context: Any, key: str) -> str:
     """The choices of an error, and the one that was meant if it can be told."""
-    choices = re.findall(r"'([^']*)'", context[key])
+    choices = re.findall(r"'([^' ]*)'", context[key])
     near = nearest(str(context.get("tag", "")).lower(), choices)
     return f"one of {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
 

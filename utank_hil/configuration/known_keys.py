@@ -38,9 +38,8 @@ def known_keys(model: type[BaseModel], location: Iterable[str | int]) -> set[str
 
 def kinds_at(model: type[BaseModel], location: Iterable[str | int]) -> list[str]:
     """Kinds of sections that may stand at a place."""
-    return [
-        kind for place in _places(model, location) for kind in get_args(_members(place).get("kind"))
-    ]
+    kinds = (get_args(_members(place).get("kind")) for place in _places(model, location))
+    return list(dict.fromkeys(kind for each in kinds for kind in each))
 
 
 def _places(model: type[BaseModel], location: Iterable[str | int]) -> list[Any]:
@@ -81,13 +80,15 @@ def _inside(place: Any, part: str | int) -> Iterator[Any]:
     if origin is Annotated:
         yield from _inside(arguments[0], part)
     elif origin in (Union, UnionType):
-        chosen = [kind for kind in arguments if part in get_args(_members(kind).get("kind"))]
+        # a kind, or another key and its value
+        key, _, value = str(part).rpartition(" ")
+        members = [*_alone(place)]
+        chosen = [each for each in members if value in get_args(_members(each).get(key or "kind"))]
         if chosen:
             yield from chosen
         else:
-            for kind in arguments:
-                if kind is not NoneType:
-                    yield from _inside(kind, part)
+            for each in members:
+                yield from _inside(each, part)
     elif origin is dict:
         yield arguments[1]
     elif origin in (tuple, list):

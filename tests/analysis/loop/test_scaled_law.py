@@ -4,10 +4,17 @@ from pathlib import Path
 import pytest
 
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.scaled_law import STEP, NoLawError, first_law, scaled_law
+from utank_hil.analysis.loop.scaled_law import (
+    STEP,
+    LinearKind,
+    NoLawError,
+    first_law,
+    scaled_law,
+)
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.lqg_design import LQGDesign
+from utank_hil.control.predictive.design import PredictiveDesign
 
 SHIPPED = load_config(Path("configs/controllers/lqg.yaml"), ControllerConfig)
 LAW = SHIPPED.law
@@ -42,7 +49,7 @@ def froude(plant: DesignPlant, scale: float) -> DesignPlant:
 
 
 def test_the_first_ship_has_the_shipped_law() -> None:
-    found = scaled_law(SHIPPED.plant, SLOPE, PEAK)
+    found = scaled_law("lqg", SHIPPED.plant, SLOPE, PEAK)
     assert found.state_weight == pytest.approx(LAW.state_weight, rel=0.01)
     assert found.washout_rad_s == pytest.approx(LAW.washout_rad_s)
     mine, theirs = found.predictor, LAW.predictor
@@ -53,12 +60,30 @@ def test_the_first_ship_has_the_shipped_law() -> None:
     assert first_law(SHIPPED.plant, SLOPE, PEAK).weight_factor == 1.0
 
 
+@pytest.mark.parametrize("kind", ["gpc", "dpc"])
+def test_the_first_ship_has_the_other_shipped_laws_but_for_their_wave_peaks(
+    kind: LinearKind,
+) -> None:
+    shipped = load_config(Path(f"configs/controllers/{kind}.yaml"), ControllerConfig)
+    law = shipped.law
+    assert isinstance(law, PredictiveDesign)
+    found = scaled_law(kind, shipped.plant, law.predictor.wave_slope_rad, PEAK)
+    assert isinstance(found, PredictiveDesign)
+    assert found.output_weight == pytest.approx(law.output_weight, rel=0.01)
+    given = law.predictor
+    std, noise = given.measurement_std, given.pressure_noise_pa_rt_s
+    assert found.predictor.measurement_std == pytest.approx(std, rel=0.01)
+    assert found.predictor.pressure_noise_pa_rt_s == pytest.approx(noise, rel=0.01)
+    same = dataclasses.replace(law, predictor=found.predictor, output_weight=found.output_weight)
+    assert found == same
+
+
 @pytest.mark.parametrize("scale", [0.25, 4.0])
 def test_a_ship_of_another_size_has_the_same_loop(scale: float) -> None:
     """Froude similarity: nothing dimensionless of the loop depends on the size."""
-    own = scaled_law(SHIPPED.plant, SLOPE, PEAK)
+    own = scaled_law("lqg", SHIPPED.plant, SLOPE, PEAK)
     larger = froude(SHIPPED.plant, scale)
-    found = scaled_law(larger, SLOPE, PEAK / scale**0.5)
+    found = scaled_law("lqg", larger, SLOPE, PEAK / scale**0.5)
     measured = own.predictor.measured
     mine = robustness(own.law(SHIPPED.plant), SHIPPED.plant, measured).nominal
     theirs = robustness(found.law(larger), larger, measured).nominal

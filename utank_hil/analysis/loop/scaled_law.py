@@ -1,13 +1,14 @@
-"""A first law for any ship: the shipped LQG law by similarity, asked for less until it is accepted.
+"""A first law for any ship: a shipped law by similarity, asked for less until it is accepted.
 
-The parameters of ``configs/controllers/lqg.yaml`` are those of one ship in one sea. Made
-dimensionless by roll frequency w, effective wave slope s, greatest pressure P and level limit h,
-they serve another ship in another sea:
+The parameters of ``lqg.yaml``, ``gpc.yaml`` and ``dpc.yaml`` in ``configs/controllers`` are those
+of one ship in one sea. Made dimensionless by roll frequency w, effective wave slope s, greatest
+pressure P and level limit h, they serve another ship in another sea:
 
-* measurement noise 0.0907 s, 0.133 s w, 0.0143 h on roll, roll rate and level;
-* pressure noise 0.0246 P / sqrt(w); sample time 0.1 / w; corner of the washout 0.04 w;
-* weights P^2 times 0.35 / s^2, 0.175 / (s w)^2, 0.00534 / h^2, 0.000296 / (h w)^2 on roll, level
-  and their rates, and 1 on the square of the pressure.
+* measurement noise on roll over s, on roll rate over s w, on level over h;
+* pressure noise over P / sqrt(w); sample time 0.1 / w; corner of the washout 0.04 w; horizons in
+  samples as they are;
+* weights over P^2, times s^2 on roll, (s w)^2 on roll rate, h^2 on level, (h w)^2 on its rate, with
+  1 on the square of the pressure.
 
 Similarity is not robustness. A law that misses a required margin is asked for less, by smaller
 weights on the motion, until it meets them all.
@@ -15,20 +16,49 @@ weights on the motion, until it meets them all.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple, get_args
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
+from utank_hil.analysis.loop.trade import scaled
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
-from utank_hil.control.predictive.design import Predictor
+from utank_hil.control.predictive.design import PredictiveDesign, Predictor
+from utank_hil.dynamics.linear import STATES
 from utank_hil.tick import TICK_S
+
+LinearKind = Literal["gpc", "dpc", "lqg"]
+LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
+LinearDesign = PredictiveDesign | LQGDesign
 
 STEP: Final = 2.0
 """From one trial of the weights to the next."""
 MOST_TRIALS: Final = 16
 
-_MEASURED = ("roll_rad", "roll_rate_rad_s", "level_m")
+
+class _Shipped(NamedTuple):
+    """A shipped law without its dimensions."""
+
+    measured: tuple[str, ...]
+    noise: tuple[float, ...]
+    order: int
+    wave_damping_ratio: float
+    pressure_noise: float
+    weight: tuple[float, ...]
+
+
+_SHIPPED: Final[dict[LinearKind, _Shipped]] = {
+    "gpc": _Shipped(("roll_rad",), (0.0778,), 90, 0.0117, 0.0293, (1.43,)),
+    "dpc": _Shipped(("roll_rad", "level_m"), (0.0389, 0.0127), 90, 0.0178, 0.00877, (1.56, 0.125)),
+    "lqg": _Shipped(
+        ("roll_rad", "roll_rate_rad_s", "level_m"),
+        (0.0907, 0.133, 0.0143),
+        1,
+        0.0051,
+        0.0246,
+        (0.35, 0.175, 0.00534, 0.000296),
+    ),
+}
 
 
 class NoLawError(ValueError):
@@ -41,22 +71,25 @@ class FirstLaw:
 
     Attributes
     ----------
-    design : LQGDesign
+    design : PredictiveDesign or LQGDesign
     weight_factor : float
         Of the weights that similarity gives; 1 where those were accepted.
     robustness : Robustness
     """
 
-    design: LQGDesign
+    design: LinearDesign
     weight_factor: float
     robustness: Robustness
 
 
-def scaled_law(plant: DesignPlant, slope_rad: float, peak_rad_s: float) -> LQGDesign:
-    """The shipped LQG law for another ship, not judged.
+def scaled_law(
+    kind: LinearKind, plant: DesignPlant, slope_rad: float, peak_rad_s: float
+) -> LinearDesign:
+    """The shipped law of a kind for another ship, not judged.
 
     Parameters
     ----------
+    kind : {"gpc", "dpc", "lqg"}
     plant : DesignPlant
         With the limits of its pump.
     slope_rad : float
@@ -64,39 +97,46 @@ def scaled_law(plant: DesignPlant, slope_rad: float, peak_rad_s: float) -> LQGDe
     peak_rad_s : float
         Of the sea's spectrum.
     """
-    w, s = plant.ship.natural_frequency_rad_s, slope_rad
-    p, h = plant.limits.pressure_pa, plant.limits.level_m
+    w, shipped, limits = plant.ship.natural_frequency_rad_s, _SHIPPED[kind], plant.limits
+    sizes = slope_rad, slope_rad * w, limits.level_m, limits.level_m * w
+    size = dict(zip(STATES, sizes, strict=True))
     predictor = Predictor(
-        measured=_MEASURED,
-        measurement_std=(_short(0.0907 * s), _short(0.133 * s * w), _short(0.0143 * h)),
-        order=1,
+        measured=shipped.measured,
+        measurement_std=tuple(
+            _short(noise * size[name])
+            for name, noise in zip(shipped.measured, shipped.noise, strict=True)
+        ),
+        order=shipped.order,
         wave_peak_rad_s=_short(peak_rad_s),
-        wave_damping_ratio=0.0051,
-        wave_slope_rad=_short(s),
-        pressure_noise_pa_rt_s=_short(0.0246 * p / math.sqrt(w)),
+        wave_damping_ratio=shipped.wave_damping_ratio,
+        wave_slope_rad=_short(slope_rad),
+        pressure_noise_pa_rt_s=_short(shipped.pressure_noise * limits.pressure_pa / math.sqrt(w)),
         sample_time_s=round(TICK_S * max(2, round(0.1 / w / TICK_S)), 2),
     )
-    weights = 0.35 / s**2, 0.175 / (s * w) ** 2, 0.00534 / h**2, 0.000296 / (h * w) ** 2
-    return LQGDesign(
-        predictor,
-        state_weight=tuple(p**2 * weight for weight in weights),
-        washout_rad_s=_short(0.04 * w),
+    weighed = STATES if kind == "lqg" else shipped.measured
+    weight = tuple(
+        _short(limits.pressure_pa**2 * share / size[name] ** 2)
+        for name, share in zip(weighed, shipped.weight, strict=True)
     )
+    washout_rad_s = _short(0.04 * w)
+    if kind == "lqg":
+        return LQGDesign(predictor, weight, washout_rad_s=washout_rad_s)
+    control, first = (58, 28) if kind == "gpc" else (57, 0)
+    return PredictiveDesign(kind, predictor, control, 71, weight, first, washout_rad_s)
 
 
 def first_law(
     plant: DesignPlant,
     slope_rad: float,
     peak_rad_s: float,
-    suits: Callable[[LQGDesign], bool] = lambda _: True,
+    suits: Callable[[LinearDesign], bool] = lambda _: True,
+    kind: LinearKind = "lqg",
 ) -> FirstLaw:
     """The law of `scaled_law` with the greatest weights at which it meets the required margins.
 
-    Its numbers have three digits, as they stand in a file.
-
     Parameters
     ----------
-    plant, slope_rad, peak_rad_s
+    plant, slope_rad, peak_rad_s, kind
         As `scaled_law` takes them.
     suits : callable, optional
         What a law with all margins must be besides; smaller weights suit more.
@@ -106,18 +146,19 @@ def first_law(
     NoLawError
         If no weights do.
     """
-    design = scaled_law(plant, slope_rad, peak_rad_s)
+    design = scaled_law(kind, plant, slope_rad, peak_rad_s)
     failures: tuple[str, ...] = ()
     for trial in range(MOST_TRIALS):
         factor = STEP**-trial
-        weight = tuple(_short(factor * each) for each in design.state_weight)
-        asked = replace(design, state_weight=weight)
-        judged = robustness(asked.law(plant), plant, _MEASURED, with_delay_margin=False)
+        asked = scaled(design, factor)
+        judged = robustness(
+            asked.law(plant), plant, asked.predictor.measured, with_delay_margin=False
+        )
         failures = judged.failures()
         if not failures and suits(asked):
             return FirstLaw(asked, factor, judged)
     gentlest = failures[0] if failures else "beyond the limits of pump and tank"
-    raise NoLawError(f"no LQG law will do on this ship; the gentlest one is {gentlest}")
+    raise NoLawError(f"no {kind.upper()} law will do on this ship; the gentlest one is {gentlest}")
 
 
 def _short(value: float) -> float:

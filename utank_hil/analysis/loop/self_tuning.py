@@ -37,6 +37,7 @@ from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
+from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES, pump_model, state_matrices
@@ -177,6 +178,18 @@ def passive_roll_rad(plant: DesignPlant, sea: SlopeDensity) -> float:
     return math.sqrt(float(np.trapezoid(np.abs(roll) ** 2 * sea.slope_density(w), w)))
 
 
+def cost_weights(passive_rad: float, limits: PumpLimits) -> tuple[float, float, float]:
+    """What a law's motion costs: per square of roll, level, and pressure over the pump's most.
+
+    Parameters
+    ----------
+    passive_rad : float
+        Roll RMS with the passive tank.
+    limits : PumpLimits
+    """
+    return 1.0, _LEVEL_COST * (passive_rad / limits.level_m) ** 2, _PRESSURE_COST * passive_rad**2
+
+
 @dataclass(frozen=True, slots=True)
 class SelfTunedDesign:
     """A constrained law that is designed for its ship and sea by itself.
@@ -288,8 +301,8 @@ class _Search:
 
     def _weights(self, costlier: float) -> tuple[float, float, float]:
         """Of the cost, on the squares of roll, level and pressure per the pump's most."""
-        share, level_m = self._roll_rad**2, self._plant.limits.level_m
-        return 1.0, _LEVEL_COST * share / level_m**2, _PRESSURE_COST * costlier * share
+        roll, level, pressure = cost_weights(self._roll_rad, self._plant.limits)
+        return roll, level, costlier * pressure
 
     def _stands_hard_cases(self, design: ConstrainedDesign) -> bool:
         try:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import Harmonics
 
 Design = PredictiveDesign | ConstrainedDesign | LQGDesign
+DesignT = TypeVar("DesignT", bound=Design)
 
 WEIGHT_FACTORS: Final = tuple(float(factor) for factor in np.geomspace(1e-2, 1e2, 17))
 HORIZON_FACTORS: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0)
@@ -74,7 +75,7 @@ def varied(design: Design) -> str:
     return "output weight"
 
 
-def scaled(design: Design, factor: float) -> Design:
+def scaled(design: DesignT, factor: float) -> DesignT:
     """The same design with its `varied` parameter multiplied.
 
     A horizon is rounded to whole samples and its window of targets keeps its length. A constrained
