@@ -32,7 +32,7 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.runtime.supervisor import Demand
-from utank_hil.tick import TICK_NS
+from utank_hil.tick import TICK_NS, TICK_S
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit
@@ -377,3 +377,44 @@ def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history)
                     or Mode.INIT in modes  # disarmed, and then not even ready
                 )
             modes.clear()
+
+
+def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = ControllerBench()
+    bench.drive_at(20e3)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("of what")
+
+    monkeypatch.setattr(bench.law, "step", fail)
+    while not bench.node.law_error:
+        assert bench.node.command_pa == 20e3
+        bench.tick()
+    assert bench.node.mode is Mode.ACTIVE  # it is seen in the next tick
+    assert bench.node.command_pa == 20e3 - LIMITS.rate_pa_s * TICK_S
+    bench.tick()
+    assert bench.node.command_pa == 0.0
+
+
+def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming() -> None:
+    bench = ControllerBench()
+    bench.law.answer_pa = math.nan
+    bench.run(400)
+    bench.law.answer_pa = 0.0
+    bench.arm()
+    assert bench.node.law_error == "its answer is nan Pa"
+
+
+def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = ControllerBench()
+    bench.law.answer_pa = math.nan
+    bench.run(400)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("of what")
+
+    monkeypatch.setattr(bench.law, "step", fail)
+    bench.run(400)
+    assert bench.node.law_error == "its answer is nan Pa"
