@@ -387,3 +387,16 @@ def test_without_a_pump_nothing_is_ever_commanded() -> None:
     bench.run(300)
     assert bench.node.command_pa == 0.0
     assert not bench.commands
+
+
+def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    event = RetuningEvent(START_NS, RetuningState.IDLE, ())
+    monkeypatch.setattr(noted, "take_events", lambda: [event])
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    bench.run(300)
+    assert noted.fresh
+    heard: list[object] = []
+    monkeypatch.setattr(bench.node, "_event_sink", lambda event, start_ns: heard.append(event))
+    bench.run(300)
+    assert event in heard
