@@ -64,7 +64,8 @@ check: setup
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
-test: check site
+test: setup
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
 	$(PARALLEL) -m "not socketcan and not evidence"
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-retuning test-bus
 	$(PYTHON) -m tools.mutation.run --changed HEAD~1 --within 60
