@@ -73,6 +73,8 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "ControllerNode.__init__: self._frames_sent = 0 -> self._frames_sent = 1": (
             "a frame more in the first second's load"
         ),
+        "ControllerNode._note_applied: if name == VALVE and self._valve is not None: -> "
+        "if name == VALVE:": "a law that commands a valve has one",
         "ControllerNode.stop: self.command_pa = 0.0 -> self.command_pa = 1.0": _ROUNDED,
         "ControllerNode._control: if not math.isfinite(self._law_pa + self._law_loss): -> "
         "if not math.isfinite(self._law_pa - self._law_loss):": _SUM,
