@@ -8,10 +8,7 @@ every three minutes. The others were designed for one sea and one loading each. 
 clairvoyant bound for the passive ship's own record, from 20 minutes after each change on.
 """
 
-import argparse
-import json
 import math
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from datetime import datetime
@@ -19,18 +16,16 @@ from multiprocessing import get_context
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.run import RECORD_S, Job, Run, run_lockstep
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.voyage import Waypoint
-from tools.studies.trial_setup import CONFIGS
+from tools.printing import command_line, show
+from tools.studies.trial_setup import CONFIGS, measured_hour, shipped
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of, self_tuned
 from utank_hil.arrays import FloatArray
-from utank_hil.canbus import RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.retuning import EstimateSettings
@@ -74,7 +69,7 @@ def told(config: ControllerConfig, time: str, stiffness_nm_rad: float | None = N
     law = config.law
     assert isinstance(law, SelfTunedDesign)
     assert law.sea is not None
-    spectrum = hour(time).spectrum()
+    spectrum = measured_hour(f"2019-02-10T{time}")
     sea = replace(
         law.sea,
         frequency_hz=tuple(spectrum.frequency_hz.tolist()),
@@ -97,10 +92,7 @@ def hour(time: str) -> Any:
 def jobs(seed: int) -> list[Job]:
     """Passive, renewed, and the laws that were told."""
     base = load_config(CONFIGS / "scenarios" / "storm.yaml", Scenario)
-    renewing, knowing = (
-        load_config(CONFIGS / "controllers" / f"{name}.yaml", ControllerConfig)
-        for name in ("self_tuning", "self_tuned")
-    )
+    renewing, knowing = shipped("self_tuning"), shipped("self_tuned")
     renewing = renewing.model_copy(update={"sea_estimate": EstimateSettings(renew=True)})
     slower = base.vessel.ship.inertia_kg_m2 * (2 * math.pi / SLOWER_S) ** 2
     loads = ({"stiffness_nm_rad": slower}, {"stiffness_nm_rad": base.vessel.ship.stiffness_nm_rad})
@@ -189,35 +181,16 @@ def judge(runs: dict[str, Run], plant: DesignPlant) -> list[dict[str, Any]]:
 
 def main() -> None:
     """Sail and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    parser = command_line(__doc__)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
         runs = {run.name: run for run in pool.map(sail, jobs(arguments.seed))}
-    plant = load_config(CONFIGS / "controllers" / "self_tuned.yaml", ControllerConfig).plant
-    stages = judge(runs, plant)
-    events: list[dict[str, Any]] = [
-        {"time_s": event.time_ns * 1e-9, "state": event.state.name, "reasons": event.reasons}
+    events = {
+        f"{event.time_ns * 1e-9:.0f} s, {event.state.name}": "; ".join(event.reasons)
         for event in runs[RENEWED].retuning
-        if event.state is not RetuningState.TRIAL
-    ]
-    if arguments.json:
-        sys.stdout.write(json.dumps({"stages": stages, "events": events}) + "\n")
-        return
-    table = Table("stage", "bound", "passive", "told", "renewed", "share told", "renewed")
-    for each in stages:
-        cells = (each[f"{name}_deg"] for name in ("bound", "passive", "told", "renewed"))
-        shares = (each["told_share"], each["renewed_share"])
-        table.add_row(
-            each["stage"], *(f"{cell:.3f}" for cell in cells), *(f"{one:.1%}" for one in shares)
-        )
-    console = Console(width=max(120, Console().width))
-    console.print(table)
-    for event in events:
-        console.print(f"{event['time_s']:.0f} s {event['state']}: {'; '.join(event['reasons'])}")
+    }
+    show({"stages": judge(runs, shipped("self_tuned").plant), "events": events}, arguments)
 
 
 if __name__ == "__main__":
