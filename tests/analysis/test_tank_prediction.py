@@ -10,14 +10,16 @@ from utank_hil.analysis.tank_prediction import (
     SeaState,
     loading_sensitivity,
     predict_roll,
+    pump_moments,
     sweep_tank,
 )
-from utank_hil.analysis.tank_sizing import EFFICIENCY, TankRoom, size_tank, stability_taken
+from utank_hil.analysis.tank_sizing import TankRoom, size_tank, stability_taken
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics import RollModel, coupled_model, simulate
 from utank_hil.dynamics.linear import state_matrices
+from utank_hil.dynamics.pump import AT_REST, Pump, pump_step
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
 
 SHIP = WrittenShip(displacement_t=1900, gm_m=0.9, roll_period_s=9.5, damping_ratio=0.05).ship()
@@ -88,7 +90,29 @@ def test_power_is_what_the_stepped_loop_gives_the_water() -> None:
         moment = 2e5 * math.cos(frequency * (step + 0.5) * step_s)
         state = (turn @ [*state, pressure, moment])[:4]
     mean_w = energy_j / (steps / 2 * step_s)
-    assert found.mean_power_w == pytest.approx(mean_w / EFFICIENCY, rel=0.03)
+    _, _, water_w = pump_moments(PLANT, found.law.design, wave)
+    assert water_w == pytest.approx(mean_w, rel=0.03)
+
+
+def test_shaft_power_is_what_the_stepped_pump_draws_in_the_same_waves() -> None:
+    """Pressure and flow of the linear loop in time, and a rotor that has to follow them."""
+    assert FOUND.law is not None
+    pump = Pump.for_duct(TANK.duct_area_m2, PLANT.limits.pressure_pa)
+    pressure_rms_pa, flow_rms_m3_s, water_w = pump_moments(PLANT, FOUND.law.design, WAVES)
+    rng, step_s = np.random.default_rng(1), 0.02
+    # two narrow-banded signals of these RMS and this correlation
+    t = np.arange(60_000) * step_s
+    w, phase = rng.uniform(0.55, 0.75, 100), rng.uniform(0, math.tau, 100)
+    lead = math.acos(water_w / (pressure_rms_pa * flow_rms_m3_s))
+    angle = np.outer(t, w) + phase
+    pressure = pressure_rms_pa * np.cos(angle).sum(axis=1) / math.sqrt(50)
+    flow = flow_rms_m3_s * np.cos(angle + lead).sum(axis=1) / math.sqrt(50)
+    state, drawn_w = AT_REST, 0.0
+    for wanted, stream in zip(pressure.tolist(), flow.tolist(), strict=True):
+        state = pump_step(state, wanted, stream, step_s, pump.coefficients)
+        drawn_w += max(state.power_w, 0.0)
+    assert FOUND.mean_power_w == pytest.approx(drawn_w / len(t), rel=0.15)
+    assert FOUND.mean_power_w > 1.5 * water_w
 
 
 def test_a_vessel_without_a_pump_has_no_active_tank() -> None:

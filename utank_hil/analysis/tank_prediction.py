@@ -22,11 +22,13 @@ from utank_hil.analysis.loop.sea_response import (
     rms,
     roll_response_without_tank,
 )
-from utank_hil.analysis.tank_sizing import EFFICIENCY, MOST_STABILITY_SHARE, stability_taken
+from utank_hil.analysis.shaft_power import mean_shaft_power_w
+from utank_hil.analysis.tank_sizing import MOST_STABILITY_SHARE, stability_taken
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model
+from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.sea import Harmonics
@@ -88,7 +90,7 @@ class RollPrediction:
     active : MotionInSea or None
         None where there is no pump or no law.
     mean_power_w : float or None
-        Of the pump's shaft, for what it gives the water.
+        That the shaft of a pump similar to the first ship's draws, see `mean_shaft_power_w`.
     law : FirstLaw or None
         Of the active tank.
     no_law : str
@@ -323,8 +325,10 @@ def _active(
     )
 
 
-def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) -> float:
-    """Mean hydraulic power of a linear loop per efficiency."""
+def pump_moments(
+    plant: DesignPlant, design: LinearDesign, waves: Harmonics
+) -> tuple[float, float, float]:
+    """RMS of pressure in Pa and flow in m^3/s, and mean power to the water in W; linear loop."""
     law, system = design.law(plant), coupled_model(plant.ship, plant.tank)
     w = waves.frequency_rad_s
     seen = (w > 0) & (w < math.pi / law.sample_time_s)
@@ -332,5 +336,16 @@ def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) ->
         law, system, design.predictor.measured, w[seen], plant.delay_s, plant.lag_s
     )
     rate = motions[:, system.output_labels.index("level_rate_m_s")]
-    per_wave = plant.tank.reservoir_area_m2 * (pressure * rate.conj()).real / 2
-    return float(np.sum(per_wave * waves.amplitude[seen] ** 2)) / EFFICIENCY
+    flow = plant.tank.reservoir_area_m2 * rate
+    square = waves.amplitude[seen] ** 2 / 2
+    return (
+        math.sqrt(float(np.sum(np.abs(pressure) ** 2 * square))),
+        math.sqrt(float(np.sum(np.abs(flow) ** 2 * square))),
+        float(np.sum((pressure * flow.conj()).real * square)),
+    )
+
+
+def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) -> float:
+    """Mean shaft power of a pump of the duct, similar to the first ship's."""
+    pump = Pump.for_duct(plant.tank.duct_area_m2, plant.limits.pressure_pa)
+    return mean_shaft_power_w(pump, *pump_moments(plant, design, waves))
