@@ -131,6 +131,11 @@ class RunRecording:
             self._ring.write(row)
 
     @property
+    def recorder_pid(self) -> int | None:
+        """Process of the recorder, if there is one."""
+        return None if self._recorder is None else self._recorder.pid
+
+    @property
     def keeps_records(self) -> bool:
         """Whether a frame log is being written."""
         return self._records is not None

@@ -269,6 +269,11 @@ class RecorderProcess(Closing):
             )
             raise RecorderError(f"the recorder of {file} did not start: {reason}")
 
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
     def stop(self) -> RecorderReport:
         """Write the last rows and wait for the end of the process; idempotent.
 
