@@ -65,6 +65,12 @@ PARTS = (
         30,
     ),
     Part(
+        "renewed_voyage",
+        "python -m tools.studies.renewed_voyage --json",
+        "the self-tuned law renewed through a sea and a load that change, both ways",
+        8,
+    ),
+    Part(
         "forecast_errors",
         "python -m tools.studies.forecast_errors --seeds 8 --json",
         "how far ahead predictors see the roll, by their sea",
