@@ -15,6 +15,7 @@ _SAME = "the same set-point is no step either way"
 _FALSE = "None is as false as False"
 _ROUNDED = "less than a step of the set-point on the bus"
 _PHASE = "in which tick a status of every second tick comes is the same to all"
+_SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
@@ -24,6 +25,14 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Supervisor.__init__: self._zero_at_ns = _NEVER_NS -> ": _SET_FIRST,
         "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
         "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
+    },
+    "utank_hil/runtime/judging.py": {
+        "_to_look_at: states = tuple((coded for coded in conditions if not coded[1].findings)) -> "
+        "states = tuple((coded for coded in conditions if True))": _SHORTCUT,
+        "_to_look_at: return lambda seen: conditions if seen.found & mask else states -> "
+        "return lambda seen: conditions if True else states": _SHORTCUT,
+        "_to_look_at: return lambda seen: conditions if seen.found & mask else states -> "
+        "return lambda seen: conditions if seen.found | mask else states": _SHORTCUT,
     },
     "utank_hil/control/limiter.py": {
         "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
