@@ -36,4 +36,4 @@ def test_a_recording_has_dots_in_time_and_spectra_of_what_was(tmp_path: Path) ->
     np.testing.assert_allclose(np.linalg.norm(dots, axis=1), np.degrees(0.1), rtol=1e-6)
     assert dots[0] == pytest.approx([0.0, -np.degrees(0.1)])  # a positive rate is upwards
     charts = [c for c in _read_chunks(file, "BarChart:values") if not c.is_static]
-    assert sum(chart.num_rows for chart in charts) == 10  # from 100 s on, every 10 s
+    assert sum(chart.num_rows for chart in charts) == 5  # from 100 s on, every 20 s

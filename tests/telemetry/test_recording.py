@@ -104,6 +104,8 @@ def test_a_recording_cut_anywhere_gives_back_the_rows_before_the_cut(tmp_path: P
 @pytest.mark.slow
 def test_an_hour_of_three_runs_takes_little_more_room_than_its_numbers(tmp_path: Path) -> None:
     runs = {name: random_run(72_000, i) for i, name in enumerate(("passive", "dpc", "gpc"))}
+    for rows in runs.values():
+        rows[:, COLUMNS.index("retuning")] = 0  # whose changes are kept in words
     file = tmp_path / "hour.rrd"
     write_recording(file, COLUMNS, runs)
     assert file.stat().st_size < 1.1 * sum(rows.nbytes for rows in runs.values())

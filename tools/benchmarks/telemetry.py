@@ -68,7 +68,7 @@ def recording() -> dict[str, float]:
     rows = np.random.default_rng(1).standard_normal((72_000, len(SIGNALS)))
     rows[:, 0] = np.arange(len(rows)) / 20
     rows[:, SIGNALS.index("mode")] = 2
-    rows[:, SIGNALS.index("fault")] = 0
+    rows[:, SIGNALS.index("fault")] = rows[:, SIGNALS.index("retuning")] = 0
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "hour.rrd"
         start = time.perf_counter()

@@ -230,7 +230,7 @@ def _subjects(
     others = _others({field_of(column): those for column, those in left.items()}, runs, axis)
     if others:
         tabs.append(rrb.Grid(*others, name=OTHERS))
-    rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)]
+    rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)] if tabs else []
     if has_state(columns):
         paths = [run_paths(runs)[i] for i in shown]
         lanes = [lane(path) for path in paths for lane in (state_path, retuning_path)]

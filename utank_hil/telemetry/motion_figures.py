@@ -4,6 +4,7 @@ In the phase plane a dot is a sample: roll in degrees to the right, its rate in 
 upwards. Spectra are those of the last five minutes.
 """
 
+from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
@@ -11,12 +12,13 @@ import numpy as np
 import rerun as rr
 
 from utank_hil.arrays import FloatArray
+from utank_hil.telemetry.scene import due_rows
 from utank_hil.telemetry.viewer import TIMELINE
 
 NEEDED: Final = ("time_s", "roll_rad", "roll_rate_rad_s")
 STEP_S: Final = 0.2
 """Between two samples of both."""
-SPECTRUM_S: Final = 10.0
+SPECTRUM_S: Final = 20.0
 """Between two spectra."""
 RECORD_S: Final = 300.0
 SEGMENT: Final = 500
@@ -62,17 +64,16 @@ class MotionFigures:
         self._due_s = self._spectrum_due_s = -np.inf
         self._held: list[FloatArray] = []
         self._most_held = batch_s / STEP_S
-        self._record: list[float] = []
+        self._record: deque[float] = deque(maxlen=round(RECORD_S / STEP_S))
         dots = rr.Points2D.from_fields(colors=color, radii=rr.Radius.ui_points(2.0))
         recording.log(phase_path(path), dots, static=True, strict=True)
         _draw_axes(recording)
 
     def write(self, rows: FloatArray) -> None:
         """Append what is due within these rows."""
-        for row in rows[:, self._at]:
-            if row[0] >= self._due_s - 1e-9:
-                self._held.append(row.copy())
-                self._due_s = row[0] + STEP_S
+        needed = rows[:, self._at]
+        due, self._due_s = due_rows(needed[:, 0], self._due_s, STEP_S)
+        self._held += list(needed[due])
         if len(self._held) >= self._most_held:
             self.close()
 
@@ -89,13 +90,13 @@ class MotionFigures:
             rr.Points2D.columns(positions=np.rad2deg(known[:, 1:]) * [1.0, -1.0]),
         )
         for time_s, roll_rad in known[:, :2]:
-            self._record = [*self._record, roll_rad][-round(RECORD_S / STEP_S) :]
+            self._record.append(roll_rad)
             if time_s >= self._spectrum_due_s and len(self._record) >= SEGMENT:
                 self._spectrum_due_s = time_s + SPECTRUM_S
                 self._draw_spectrum(time_s)
 
     def _draw_spectrum(self, time_s: float) -> None:
-        density = spectrum(np.rad2deg(self._record))
+        density = spectrum(np.rad2deg(np.array(self._record)))
         self._recording.set_time(TIMELINE, duration=time_s)
         number, count = self._beside
         wide = np.full(len(density), _BAR_HZ / count)

@@ -31,7 +31,7 @@ from utank_hil.telemetry.rerun_log import (
     write_about,
 )
 from utank_hil.telemetry.scene import scene_size
-from utank_hil.telemetry.units import column_of
+from utank_hil.telemetry.units import column_of, field_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
@@ -76,6 +76,8 @@ def write_recording(
             raise ValueError(f"run {run!r}: {rows.shape} is not (n, {len(columns)}), the columns")
         if len(rows) == 0:
             raise ValueError(f"run {run!r} has no rows")
+    for column in columns:
+        field_of(column)  # refuses what is not in SI units before there is a file
     time_s = np.concatenate([rows[:, time_index(columns)] for rows in runs.values()])
     blueprint = make_blueprint(
         columns_of(columns, about),

@@ -133,6 +133,15 @@ class SceneSize:
         return vectors, [0.0, self.lz_m] - vectors / 2
 
 
+def due_rows(time_s: FloatArray, due_s: float, step_s: float) -> tuple[list[int], float]:
+    """Indices of rows at least a step apart, of rising times, and when the next one is due."""
+    found: list[int] = []
+    while (at := int(np.searchsorted(time_s, due_s - 1e-9))) < len(time_s):
+        found.append(at)
+        due_s = time_s[at] + step_s
+    return found, due_s
+
+
 class Scene:
     """Writes the scene of one run.
 
@@ -188,10 +197,8 @@ class Scene:
 
     def write(self, rows: FloatArray) -> None:
         """Append the pictures and words that are due within these rows."""
-        for row, now_s in zip(rows, rows[:, self._at["time_s"]], strict=True):
-            if now_s >= self._due_s - 1e-9:
-                self._held.append(row.copy())
-                self._due_s = now_s + PERIOD_S
+        due, self._due_s = due_rows(rows[:, self._at["time_s"]], self._due_s, PERIOD_S)
+        self._held += list(rows[due])
         if len(self._held) >= self._most_held:
             self.close()
 
