@@ -4,7 +4,7 @@ The kernels are imported at the first run, so that importing this module imports
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -180,7 +180,6 @@ def simulate_batch(
     step_s: float = 0.02,
     record_every: int | None = None,
     capsize_rad: float = math.pi / 2,
-    progress: Callable[[float], None] | None = None,
 ) -> BatchResult:
     """Simulate many ships on all cores; the result does not depend on the number of cores.
 
@@ -202,8 +201,6 @@ def simulate_batch(
     record_every : int, optional
         Steps between recorded states; nothing is recorded if not given.
     capsize_rad : float
-    progress : callable, optional
-        Called about fifty times with the completed fraction.
 
     Raises
     ------
@@ -237,7 +234,7 @@ def simulate_batch(
     samples = -(-steps // stride) if record_every else 0
     history = np.empty((ships, samples, 4))
     chunk = max(1, round(steps / 50 / (stride * kernels.REFRESH))) * stride * kernels.REFRESH
-    for first in range(0, steps, chunk):
+    for first in range(0, steps, chunk):  # in parts, so that Ctrl-C is heard
         part = slice(first // stride, (first + chunk) // stride)
         count = min(chunk, steps - first)
         kernels.advance_batch(
@@ -259,8 +256,6 @@ def simulate_batch(
             history[:, part],
             stride,
         )
-        if progress is not None:
-            progress((first + count) / steps)
     return BatchResult(
         state,
         summary[:, kernels.CAPSIZED_S].copy(),

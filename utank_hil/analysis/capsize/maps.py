@@ -1,7 +1,6 @@
 """Phase plane of a ship in calm water, its safe basin, and the basin's erosion by waves."""
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +85,6 @@ def capsize_map(
     roll_rad: FloatArray,
     roll_rate_rad_s: FloatArray,
     duration_s: float,
-    *,
-    progress: Callable[[float], None] | None = None,
 ) -> CapsizeMap:
     """Find equilibria, trajectories, safe basins and erosion of one ship.
 
@@ -105,8 +102,6 @@ def capsize_map(
         Grid of starts; the erosion uses every fourth value.
     duration_s : float
         Time that a ship must survive.
-    progress : callable, optional
-        Called with the completed fraction of the erosion, which takes most of the time.
 
     Raises
     ------
@@ -138,7 +133,6 @@ def capsize_map(
             roll_rad[::COARSE],
             roll_rate_rad_s[::COARSE],
             duration_s,
-            progress=progress,
         ),
     )
 

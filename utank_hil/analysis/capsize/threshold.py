@@ -5,7 +5,7 @@ passes a given angle beyond the saddle.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,8 @@ from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
 from utank_hil.dynamics.tank import negligible
 
+CONFIDENCE = 0.95  # of the interval of a probability
+LIMIT_RAD = math.radians(89)  # of the search for equilibria
 BLOCK = 256  # amplitudes tried at once in the search for a threshold
 
 
@@ -63,14 +65,8 @@ def without_tank(model: RollModel) -> RollModel:
     return RollModel(model.ship, negligible(model.tank))
 
 
-def equilibria(model: RollModel, limit_rad: float = math.radians(89)) -> tuple[Equilibrium, ...]:
-    """Equilibria of ship and water without pressure and waves.
-
-    Parameters
-    ----------
-    model : RollModel
-    limit_rad : float
-        Largest heel of the search, to either side; below 90 degrees.
+def equilibria(model: RollModel) -> tuple[Equilibrium, ...]:
+    """Equilibria of ship and water without pressure and waves, up to 89 degrees to either side.
 
     Returns
     -------
@@ -88,7 +84,7 @@ def equilibria(model: RollModel, limit_rad: float = math.radians(89)) -> tuple[E
         state = np.array([roll, 0.0, level(roll), 0.0])
         return float(model.derivative(state, stopped=True)[1])
 
-    grid = np.linspace(-limit_rad, limit_rad, 2001)
+    grid = np.linspace(-LIMIT_RAD, LIMIT_RAD, 2001)
     values = np.array([moment(roll) for roll in grid])
     found = []
     for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
@@ -110,7 +106,6 @@ def capsize_threshold(
     phase_rad: float = 0.0,
     cells: int = 4000,
     tolerance: float = 1e-3,
-    capsize_rad: float = math.pi / 2,
 ) -> Threshold:
     """Smallest amplitude of a regular wave moment that capsizes a ship initially at rest.
 
@@ -132,13 +127,12 @@ def capsize_threshold(
         Steps of the search up to `highest_nm`.
     tolerance : float
         Relative width of the bracket.
-    capsize_rad : float
     """
 
     def first_capsize(amplitude: FloatArray) -> Threshold | None:
         """The first of rising amplitudes that capsizes her, and the one before."""
         wave = WaveMoment(amplitude[1:, None], [[frequency_rad_s]], [[phase_rad]])
-        result = simulate_batch(model, duration_s, wave=wave, capsize_rad=capsize_rad)
+        result = simulate_batch(model, duration_s, wave=wave)
         over = np.flatnonzero(np.isfinite(result.capsized_s))
         return Threshold(*amplitude[over[0] : over[0] + 2].tolist()) if over.size else None
 
@@ -159,7 +153,6 @@ def safe_basin(
     duration_s: float,
     *,
     wave: WaveComponents | None = None,
-    capsize_rad: float = math.pi / 2,
 ) -> npt.NDArray[np.bool_]:
     """Safe basin: the starts that survive, with the water flat and at rest relative to the ship.
 
@@ -171,7 +164,6 @@ def safe_basin(
     duration_s : float
     wave : WaveMoment, optional
         One sea for all starts; by default calm water.
-    capsize_rad : float
 
     Returns
     -------
@@ -186,7 +178,6 @@ def safe_basin(
         duration_s,
         initial,
         wave=WaveMoment([], [], []) if wave is None else wave,
-        capsize_rad=capsize_rad,
     )
     return np.asarray(np.isinf(result.capsized_s).reshape(roll.shape))
 
@@ -198,9 +189,6 @@ def erosion(
     roll_rad: FloatArray,
     roll_rate_rad_s: FloatArray,
     duration_s: float,
-    *,
-    capsize_rad: float = math.pi / 2,
-    progress: Callable[[float], None] | None = None,
 ) -> FloatArray:
     """Area of the safe basin in regular waves, relative to that in calm water.
 
@@ -212,9 +200,6 @@ def erosion(
     roll_rad, roll_rate_rad_s : ndarray
         Grid of starts, as for `safe_basin`.
     duration_s : float
-    capsize_rad : float
-    progress : callable, optional
-        Called with the completed fraction.
 
     Returns
     -------
@@ -226,16 +211,14 @@ def erosion(
         If no start survives even in calm water.
     """
     grid = (roll_rad, roll_rate_rad_s, duration_s)
-    calm = int(np.count_nonzero(safe_basin(model, *grid, capsize_rad=capsize_rad)))
+    calm = int(np.count_nonzero(safe_basin(model, *grid)))
     if not calm:
         raise ValueError("no start of the grid survives in calm water: narrow it")
     area = np.empty(len(amplitude_nm))
     for n, amplitude in enumerate(amplitude_nm):
         wave = WaveMoment([amplitude], [frequency_rad_s], [0.0])
-        basin = safe_basin(model, *grid, wave=wave, capsize_rad=capsize_rad)
+        basin = safe_basin(model, *grid, wave=wave)
         area[n] = np.count_nonzero(basin) / calm
-        if progress is not None:
-            progress((n + 1) / len(amplitude_nm))
     return area
 
 
@@ -243,10 +226,6 @@ def capsize_probability(
     model: RollModel,
     seas: WaveMoment | Iterable[WaveComponents],
     duration_s: float,
-    *,
-    confidence: float = 0.95,
-    capsize_rad: float = math.pi / 2,
-    progress: Callable[[float], None] | None = None,
 ) -> Probability:
     """Probability of capsizing within a time, by Monte Carlo over irregular seas.
 
@@ -257,11 +236,6 @@ def capsize_probability(
         Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
         as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for some seeds.
     duration_s : float
-    confidence : float
-        Confidence level of the interval, between 0 and 1.
-    capsize_rad : float
-    progress : callable, optional
-        Called with the completed fraction.
 
     Raises
     ------
@@ -271,12 +245,10 @@ def capsize_probability(
     from scipy.stats import beta
 
     stack = seas if isinstance(seas, WaveMoment) else stacked_seas(seas)
-    result = simulate_batch(
-        model, duration_s, wave=stack, capsize_rad=capsize_rad, progress=progress
-    )
+    result = simulate_batch(model, duration_s, wave=stack)
     ships = len(result.capsized_s)
     capsized = int(np.count_nonzero(np.isfinite(result.capsized_s)))
-    tail = (1 - confidence) / 2
+    tail = (1 - CONFIDENCE) / 2
     low = float(beta.ppf(tail, capsized, ships - capsized + 1)) if capsized else 0.0
     safe = ships - capsized
     high = float(beta.ppf(1 - tail, capsized + 1, safe)) if safe else 1.0

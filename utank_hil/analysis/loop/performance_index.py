@@ -14,20 +14,19 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model
 
 FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)
+"""The source does not say how far it went."""
 
 
 def performance_index(
     law: LinearLaw,
     plant: DesignPlant,
     measured: tuple[str, ...],
-    frequency_ratio: FloatArray = FREQUENCY_RATIOS,
 ) -> float:
     """Index J in rad/Pa; the more the better.
 
@@ -38,18 +37,11 @@ def performance_index(
         The thesis has a lag of 0 and, since its u(k) is made of y(k-1), a delay of one sample.
     measured : tuple of str
         Names of the outputs that the law sees, in its order.
-    frequency_ratio : ndarray, shape (N,)
-        q, increasing. The source does not say how far it went; 2 by default.
-
-    Raises
-    ------
-    ValueError
-        If a frequency is outside (0, pi / Ts).
     """
-    w = frequency_ratio * ship_ratios(plant.ship, plant.tank)[1]
+    w = FREQUENCY_RATIOS * ship_ratios(plant.ship, plant.tank)[1]
     system = coupled_model(plant.ship, plant.tank)
     row = system.output_labels.index("roll_rad")
     passive, _ = closed_loop_response(None, system, measured, w)
     active, pressure = closed_loop_response(law, system, measured, w, plant.delay_s, plant.lag_s)
     gain = np.abs(np.abs(passive[:, row]) - np.abs(active[:, row])) / np.abs(pressure)
-    return float(np.sum((gain[1:] + gain[:-1]) / 2 * np.diff(frequency_ratio)))
+    return float(np.sum((gain[1:] + gain[:-1]) / 2 * np.diff(FREQUENCY_RATIOS)))

@@ -8,6 +8,9 @@ import numpy as np
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 
+SETTLE_PERIODS = 60  # wave periods before the analysed one
+SAMPLES = 256  # integration steps per wave period
+
 
 class ResponseAmplitude(NamedTuple):
     """First harmonic of the steady oscillation per wave moment.
@@ -26,9 +29,6 @@ def simulated_response(
     model: RollModel,
     frequency_rad_s: FloatArray,
     amplitude_nm: float,
-    *,
-    settle_periods: int = 60,
-    samples_per_period: int = 256,
 ) -> ResponseAmplitude:
     """Simulate each frequency to the steady state, and take the first harmonic.
 
@@ -37,19 +37,15 @@ def simulated_response(
     model : RollModel
     frequency_rad_s : ndarray, shape (n,)
     amplitude_nm : float
-    settle_periods : int
-        Wave periods before the analysed one.
-    samples_per_period : int
-        Integration steps per wave period.
     """
     first = np.empty((2, len(frequency_rad_s)), dtype=np.complex128)
-    angle = math.tau * np.arange(samples_per_period) / samples_per_period
-    weights = np.exp(-1j * angle) * 2 / samples_per_period / amplitude_nm
+    angle = math.tau * np.arange(SAMPLES) / SAMPLES
+    weights = np.exp(-1j * angle) * 2 / SAMPLES / amplitude_nm
     for n, frequency in enumerate(frequency_rad_s):
-        step_s = math.tau / frequency / samples_per_period
+        step_s = math.tau / frequency / SAMPLES
         result = simulate_batch(
             model,
-            (settle_periods + 1) * samples_per_period * step_s,
+            (SETTLE_PERIODS + 1) * SAMPLES * step_s,
             wave=WaveMoment([amplitude_nm], [frequency], [0.0]),
             step_s=step_s,
             record_every=1,
@@ -57,6 +53,6 @@ def simulated_response(
         if np.isfinite(result.capsized_s[0]):
             first[:, n] = np.nan
         else:
-            steady = result.history[0, -samples_per_period:]
+            steady = result.history[0, -SAMPLES:]
             first[:, n] = steady[:, [0, 2]].T @ weights
     return ResponseAmplitude(first[0], first[1])

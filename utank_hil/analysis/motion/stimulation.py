@@ -10,6 +10,7 @@ from utank_hil.dynamics import GRAVITY_M_S2, RollModel, RollRun, RollShip, Tank,
 from utank_hil.dynamics.simulate import whole_steps
 
 STEP_S = 0.02
+DURATION_S = 300.0
 
 
 class StimulatedRoll(NamedTuple):
@@ -55,7 +56,6 @@ def stimulate_on_still_water(
     frequency_rad_s: float,
     *,
     off_s: float = 141.0,
-    duration_s: float = 300.0,
 ) -> StimulatedRoll:
     """Drive the roll with a sinusoidal pressure from rest, stop the pump, and let the roll decay.
 
@@ -67,7 +67,6 @@ def stimulate_on_still_water(
     frequency_rad_s : float
     off_s : float
         Time at which the pump stops.
-    duration_s : float
 
     Raises
     ------
@@ -75,11 +74,11 @@ def stimulate_on_still_water(
         If the pump runs for less than one cycle, or to the end.
     """
     cycle_s = math.tau / frequency_rad_s
-    if not cycle_s < off_s < duration_s:
-        raise ValueError(f"off_s must lie between {cycle_s:.3g} and {duration_s}, got {off_s}")
-    time = STEP_S * np.arange(whole_steps("duration_s", duration_s, STEP_S))
+    if not cycle_s < off_s < DURATION_S:
+        raise ValueError(f"off_s must lie between {cycle_s:.3g} and {DURATION_S}, got {off_s}")
+    time = STEP_S * np.arange(whole_steps("duration_s", DURATION_S, STEP_S))
     pressure = np.where(time < off_s, pressure_pa * np.sin(frequency_rad_s * time), 0.0)
-    run = simulate(model, duration_s, pressure_pa=pressure, step_s=STEP_S)
+    run = simulate(model, DURATION_S, pressure_pa=pressure, step_s=STEP_S)
     size = np.abs(run.state[:, 0])
     last = (run.time_s > off_s - cycle_s) & (run.time_s <= off_s)
     stimulated = float(size[last].max())
