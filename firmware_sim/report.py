@@ -182,17 +182,17 @@ def _bar(result: BenchResult, found: Mapping[str, RunFigures], run: Run, color: 
     mark = mark_of(result, run)
     if mark is not None:
         return BenchBar(run.name, color, None, mark.word, None, "")
-    told = found[run.name]
-    said = _degrees(told.roll)
+    shown = found[run.name]
+    said = _degrees(shown.roll)
     if run.name == PASSIVE:
-        return BenchBar(run.name, color, told.roll.rms_rad, said, None, "")
-    if told.roll_below_passive is not None:
-        below = told.roll_below_passive
+        return BenchBar(run.name, color, shown.roll.rms_rad, said, None, "")
+    if shown.roll_below_passive is not None:
+        below = shown.roll_below_passive
         said += f"   {abs(below):.0%} {'below' if below >= 0 else 'above'} passive"
-    scale, unit = (1e6, "MW") if told.pump.power_peak_w >= 1e6 else (1e3, "kW")
-    mean, most = (each / scale for each in (told.pump.power_mean_w, told.pump.power_peak_w))
+    scale, unit = (1e6, "MW") if shown.pump.power_peak_w >= 1e6 else (1e3, "kW")
+    mean, most = (each / scale for each in (shown.pump.power_mean_w, shown.pump.power_peak_w))
     cost = f"{mean:.2f} {unit}, at most {most:.2f}"
-    return BenchBar(run.name, color, told.roll.rms_rad, said, told.pump.power_mean_w, cost)
+    return BenchBar(run.name, color, shown.roll.rms_rad, said, shown.pump.power_mean_w, cost)
 
 
 def _degrees(roll: RollStatistics) -> str:
@@ -204,10 +204,10 @@ def _legend(result: BenchResult, run: Run, found: dict[str, RunFigures]) -> str:
     mark = mark_of(result, run)
     if mark is not None:
         return f"{run.name}: {mark.word}"
-    told = found[run.name]
-    below = None if run.name == PASSIVE else told.roll_below_passive
+    shown = found[run.name]
+    below = None if run.name == PASSIVE else shown.roll_below_passive
     change = "" if below is None else f" ({-below:+.0%})".replace("-", "−")
-    return f"{run.name}: roll {math.degrees(told.roll.rms_rad):.2f}° RMS{change}"
+    return f"{run.name}: roll {math.degrees(shown.roll.rms_rad):.2f}° RMS{change}"
 
 
 def _record(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:

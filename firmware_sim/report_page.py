@@ -43,36 +43,36 @@ def bench_report(folder: Path, scratch: Path) -> Report:
     OSError, ValueError
         If a file of the bench is missing or is none.
     """
-    told = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+    content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
     says = "Roll and power of each run, and roll, level and pressure over time"
     sections = [
-        ReportSection("What was run", _what_was_run(told)),
+        ReportSection("What was run", _what_was_run(content)),
         ReportSection(
             "Roll and cost",
             pictures=[ReportPicture((folder / PICTURE).read_bytes(), says)],
-            tables=[printed(table) for table in tables(told)],
+            tables=[printed(table) for table in tables(content)],
         ),
-        *_roll_figure(told, read_recording(folder / RECORDING), scratch),
-        _deadlines(told),
-        about_section(told, told["configuration"]),
+        *_roll_figure(content, read_recording(folder / RECORDING), scratch),
+        _deadlines(content),
+        about_section(content, content["configuration"]),
     ]
     below = (
-        f"{told['mode']}, seed {told['seed']}, {told['settle_s']:g} s to {told['end_s']:g} s of "
-        f"the same waves for each run. {told['date']}."
+        f"{content['mode']}, seed {content['seed']}, {content['settle_s']:g} s to "
+        f"{content['end_s']:g} s of the same waves for each run. {content['date']}."
     )
-    return Report(f"{told['scenario']}: bench", below, _verdict(told), sections)
+    return Report(f"{content['scenario']}: bench", below, _verdict(content), sections)
 
 
 BENCH: Final = ReportKind(FIGURES, bench_report)
 
 
-def _roll_figure(told: dict[str, Any], recorded: Recorded, scratch: Path) -> list[ReportSection]:
+def _roll_figure(content: dict[str, Any], recorded: Recorded, scratch: Path) -> list[ReportSection]:
     # a run that is not compared may have ended before the compared time begins
-    compared = [run["name"] for run in told["runs"] if run["compared"]]
+    compared = [run["name"] for run in content["runs"] if run["compared"]]
     rolls = {}
     for name in compared:
         time_s = recorded[name]["time_s"]
-        between = (time_s >= told["settle_s"]) & (time_s <= told["end_s"])
+        between = (time_s >= content["settle_s"]) & (time_s <= content["end_s"])
         rolls[name] = recorded[name]["true_roll_rad"][between]
     if not rolls:
         return []
@@ -80,8 +80,8 @@ def _roll_figure(told: dict[str, Any], recorded: Recorded, scratch: Path) -> lis
     return [roll_figure(rolls, step_s, scratch)]
 
 
-def _verdict(told: dict[str, Any]) -> Verdict:
-    ranked = [run for run in told["runs"] if run["ranked"] and run["name"] != PASSIVE]
+def _verdict(content: dict[str, Any]) -> Verdict:
+    ranked = [run for run in content["runs"] if run["ranked"] and run["name"] != PASSIVE]
     lines = []
     if ranked:
         best = min(ranked, key=lambda run: run["rank"])
@@ -93,7 +93,7 @@ def _verdict(told: dict[str, Any]) -> Verdict:
             line += f" and {_less(bare)} than no tank"
         power = best["pump"]["power_mean_w"]
         lines.append(f"{line}, for {power / 1e3:.3g} kW of shaft power on average.")
-    wrong = [*told["endings"], *told["limits_passed"]]
+    wrong = [*content["endings"], *content["limits_passed"]]
     lines += wrong or ["No run failed, and no limit of the model was passed."]
     return Verdict(lines, good=not wrong)
 
@@ -102,11 +102,11 @@ def _less(share: float) -> str:
     return f"{abs(share):.0%} {'less' if share >= 0 else 'more'}"
 
 
-def _what_was_run(told: dict[str, Any]) -> list[str]:
-    vessel = Vessel.model_validate(told["configuration"]["vessel"])
-    sea = told["configuration"]["sea"]
+def _what_was_run(content: dict[str, Any]) -> list[str]:
+    vessel = Vessel.model_validate(content["configuration"]["vessel"])
+    sea = content["configuration"]["sea"]
     keys = ("kind", "hs_m", "tp_s", "time", "heading_deg")
-    names = [run["name"] for run in told["runs"] if run["name"] != PASSIVE]
+    names = [run["name"] for run in content["runs"] if run["name"] != PASSIVE]
     return [
         f"Ship: {vessel.name}. {ship_line(vessel)}",
         f"Sea: {', '.join(f'{key} {sea[key]}' for key in keys if sea.get(key) is not None)}.",
@@ -114,8 +114,8 @@ def _what_was_run(told: dict[str, Any]) -> list[str]:
     ]
 
 
-def _deadlines(told: dict[str, Any]) -> ReportSection:
-    loops = {run["name"]: run["loop"] for run in told["runs"] if run["loop"]}
+def _deadlines(content: dict[str, Any]) -> ReportSection:
+    loops = {run["name"]: run["loop"] for run in content["runs"] if run["loop"]}
     if not loops:
         return ReportSection("Deadlines", ["Simulated time: there are none."])
     keys = [key for key, value in next(iter(loops.values())).items() if not isinstance(value, dict)]

@@ -17,20 +17,25 @@ _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
 _SHOWN: Final = (1, 3)
 """Of the levels whose exceedance is in the JSON: 5 and 10 degrees."""
 
-Told = Mapping[str, Any]
+Content = Mapping[str, Any]
 """What `firmware_sim.report.as_json` says of a bench, or a part of it."""
 
 
-def tables(told: Told) -> list[RichTable]:
+def tables(content: Content) -> list[RichTable]:
     """All tables of a bench, without empty ones."""
-    found = [motion_table(told), pump_table(told), on_board_table(told), retuning_table(told)]
+    found = [
+        motion_table(content),
+        pump_table(content),
+        on_board_table(content),
+        retuning_table(content),
+    ]
     return [table for table in found if table.rows]
 
 
-def motion_table(told: Told) -> RichTable:
+def motion_table(content: Content) -> RichTable:
     """Table of how much the ship rolled; runs that do not count stand at its end."""
     table = new_table(
-        f"{told['scenario']} · {told['mode']} · seed {told['seed']}",
+        f"{content['scenario']} · {content['mode']} · seed {content['seed']}",
         "roll\nRMS °",
         "signif.\n°",
         "max.\n°",
@@ -40,12 +45,13 @@ def motion_table(told: Told) -> RichTable:
         "water\nstrikes",
     )
     table.caption = (
-        f"{told['settle_s']:g} s to {told['end_s']:g} s of the same waves; strikes of the whole run"
+        f"{content['settle_s']:g} s to {content['end_s']:g} s of the same waves; "
+        "strikes of the whole run"
     )
-    bare, compared = told["no_tank"], _compared(told)
+    bare, compared = content["no_tank"], _compared(content)
     counting = [run for run in compared if run["ranked"]]
     capsized_s = bare["capsized_s"]
-    capsized = capsized_s is not None and capsized_s < told["end_s"]
+    capsized = capsized_s is not None and capsized_s < content["end_s"]
     table.add_row(
         NO_TANK, *_roll_cells(bare), "capsized" if capsized else "", end_section=not counting
     )
@@ -57,11 +63,11 @@ def motion_table(told: Told) -> RichTable:
     return table
 
 
-def _compared(told: Told) -> list[Told]:
-    return [run for run in told["runs"] if run["compared"]]
+def _compared(content: Content) -> list[Content]:
+    return [run for run in content["runs"] if run["compared"]]
 
 
-def _motion_cells(run: Told) -> tuple[str, ...]:
+def _motion_cells(run: Content) -> tuple[str, ...]:
     passive = run["name"] == PASSIVE
     return (
         run["name"],
@@ -73,9 +79,9 @@ def _motion_cells(run: Told) -> tuple[str, ...]:
     )
 
 
-def pump_table(told: Told) -> RichTable:
+def pump_table(content: Content) -> RichTable:
     """Table of what pump and bus did for it."""
-    runs = _compared(told)
+    runs = _compared(content)
     columns = [
         (heading, *in_one_unit([run["pump"][name] for run in runs], unit))
         for heading, name, unit in (
@@ -123,9 +129,9 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
 
 
-def on_board_table(told: Told) -> RichTable:
+def on_board_table(content: Content) -> RichTable:
     """Table of what the roll is like for people at the scenario's place."""
-    judged = told["on_board"]
+    judged = content["on_board"]
     levels, place = judged["levels_rad"], judged["place"]
     table = new_table(
         "On board",
@@ -154,7 +160,7 @@ def on_board_table(told: Told) -> RichTable:
     return table
 
 
-def retuning_table(told: Told) -> RichTable:
+def retuning_table(content: Content) -> RichTable:
     """Table of what retuning found and gained; without rows where nothing retuned."""
     table = new_table(
         "Retuning",
@@ -172,13 +178,13 @@ def retuning_table(told: Told) -> RichTable:
         f"± one standard deviation; before the first retuning, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
-    for run in told["runs"]:
+    for run in content["runs"]:
         if run["retuning"] is not None:
             table.add_row(run["name"], *_retuning_cells(run["retuning"]))
     return table
 
 
-def _retuning_cells(retuning: Told) -> tuple[str, ...]:
+def _retuning_cells(retuning: Content) -> tuple[str, ...]:
     found, true = retuning["found"], retuning["truth"]
     period = ship = tank = ""
     if found is not None:
@@ -204,6 +210,6 @@ def _percent(share: float | None) -> str:
     return "" if share is None else f"{share:.1%}"
 
 
-def _roll_cells(roll: Told) -> tuple[str, ...]:
+def _roll_cells(roll: Content) -> tuple[str, ...]:
     keys = ("rms_rad", "significant_rad", "maximum_rad")
     return tuple("" if roll[key] is None else f"{math.degrees(roll[key]):.2f}" for key in keys)

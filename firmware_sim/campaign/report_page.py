@@ -29,30 +29,30 @@ def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001
     OSError, ValueError
         If a file of the campaign is missing or is none.
     """
-    told = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    groups, failed, study = told["groups"], told["failures"], told["configuration"]
+    content = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    groups, failed, study = content["groups"], content["failures"], content["configuration"]
     picture = ReportPicture((folder / PICTURE).read_bytes(), "Rolls of each run, with intervals")
     tables = [printed(runs_table(groups, "Runs")), printed(pairs_table(groups))]
     sections = [
         ReportSection("Results", pictures=[picture], tables=tables),
-        ReportSection("What it leaves out", [f"{each}." for each in told["leaves_out"]]),
+        ReportSection("What it leaves out", [f"{each}." for each in content["leaves_out"]]),
     ]
     if failed:
         rows = [[reason, str(count)] for reason, count in failed.items()]
         table = ReportTable(["reason", "cases"], rows, text=True)
         sections.append(ReportSection("Cases without a result", tables=[table]))
-    sections.append(about_section(told, study))
-    below = f"{told['cases']} cases, simulation {study['simulation']}. {told['date']}."
+    sections.append(about_section(content, study))
+    below = f"{content['cases']} cases, simulation {study['simulation']}. {content['date']}."
     title = f"{study.get('name') or folder.name}: campaign"
-    return Report(title, below, _verdict(told), sections)
+    return Report(title, below, _verdict(content), sections)
 
 
 CAMPAIGN: Final = ReportKind(SUMMARY, campaign_report)
 
 
-def _verdict(told: dict[str, Any]) -> Verdict:
+def _verdict(content: dict[str, Any]) -> Verdict:
     lines = []
-    for group in told["groups"]:
+    for group in content["groups"]:
         where = ", ".join(f"{key} {value}" for key, value in group["parameters"].items())
         lines += [
             f"{pair['run']}{f' ({where})' if where else ''}: "
@@ -62,8 +62,8 @@ def _verdict(told: dict[str, Any]) -> Verdict:
             if pair["against"] == PASSIVE and pair["share_below"]["cases"]
         ]
     wrong = []
-    if told["interrupted"]:
+    if content["interrupted"]:
         wrong.append("The campaign was interrupted: --resume goes on from there.")
-    if told["failures"]:
-        wrong.append(f"{sum(told['failures'].values())} cases have no result.")
+    if content["failures"]:
+        wrong.append(f"{sum(content['failures'].values())} cases have no result.")
     return Verdict([*lines[:MOST_LINES], *wrong], good=not wrong)

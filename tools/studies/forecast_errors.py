@@ -94,7 +94,7 @@ class Model:
 
 
 def design() -> ConstrainedDesign:
-    """The shipped constrained design: what is measured, and the noise all predictors are told."""
+    """The shipped constrained design: what is measured, and the noise that all assume."""
     found = shipped("constrained_gpc").law
     assert isinstance(found, ConstrainedDesign)
     return found
@@ -126,7 +126,7 @@ def one_a_band() -> Oscillators:
 
 def oscillator_model(name: str, waves: Oscillators) -> Model:
     """Ship and passive tank under oscillators."""
-    vessel, told = shipped("constrained_gpc").vessel, design()
+    vessel, shipped_law = shipped("constrained_gpc").vessel, design()
     a_ship, b_ship = state_matrices(vessel.ship, vessel.tank)
     n, count = len(STATES), len(waves.frequency_rad_s)
     slope_effect = b_ship[:, 1] * vessel.ship.stiffness_nm_rad
@@ -141,40 +141,42 @@ def oscillator_model(name: str, waves: Oscillators) -> Model:
         a[angle, rate] = 1.0
         a[rate, [angle, rate]] = -(w**2), -2 * zeta * w
         noise[rate, i] = math.sqrt(4 * zeta * w**3)
-    noise[:n, count] = b_ship[:, 0] * told.pressure_noise_pa_rt_s
-    noise[:n, count + 1] = slope_effect * told.slope_noise_rad_rt_s
+    noise[:n, count] = b_ship[:, 0] * shipped_law.pressure_noise_pa_rt_s
+    noise[:n, count + 1] = slope_effect * shipped_law.slope_noise_rad_rt_s
     b = np.zeros((len(a), 1))
-    transition, effect = transition_and_step(a, b, told.sample_time_s)
-    plant = LinearModel(transition, effect, np.eye(n, len(a)), np.zeros((n, 1)), told.sample_time_s)
-    return Model(name, plant, noise_covariance(a, noise, told.sample_time_s))
+    transition, effect = transition_and_step(a, b, shipped_law.sample_time_s)
+    plant = LinearModel(
+        transition, effect, np.eye(n, len(a)), np.zeros((n, 1)), shipped_law.sample_time_s
+    )
+    return Model(name, plant, noise_covariance(a, noise, shipped_law.sample_time_s))
 
 
 def factor_model(name: str) -> Model:
     """Ship and passive tank under the factor of the spectrum, no heel."""
-    vessel, told = shipped("constrained_gpc").vessel, design()
+    vessel, shipped_law = shipped("constrained_gpc").vessel, design()
     plant, covariance = sea_plant(
-        told.sea,
+        shipped_law.sea,
         DesignPlant(vessel.ship, vessel.tank, delay_s=0.0, lag_s=0.0),
-        pressure_noise_pa_rt_s=told.pressure_noise_pa_rt_s,
-        slope_noise_rad_rt_s=told.slope_noise_rad_rt_s,
+        pressure_noise_pa_rt_s=shipped_law.pressure_noise_pa_rt_s,
+        slope_noise_rad_rt_s=shipped_law.slope_noise_rad_rt_s,
         heel_std_rad=0.0,
-        heel_time_s=told.heel_time_s,
-        sample_time_s=told.sample_time_s,
+        heel_time_s=shipped_law.heel_time_s,
+        sample_time_s=shipped_law.sample_time_s,
     )
     return Model(name, plant, covariance)
 
 
 def errors(model: Model, motion: FloatArray, seed: int) -> list[float]:
     """RMS of the forecasts' errors as shares of the roll's RMS, one for each of `AHEAD`."""
-    told = design()
-    rows = [STATES.index(name) for name in told.measured]
+    shipped_law = design()
+    rows = [STATES.index(name) for name in shipped_law.measured]
     noise = np.random.default_rng(seed).standard_normal((len(motion), len(rows)))
-    measured = motion[:, rows] + noise * np.array(told.measurement_std)
+    measured = motion[:, rows] + noise * np.array(shipped_law.measurement_std)
     plant = model.plant
     gain, _ = kalman_predictor(
         plant._replace(C=plant.C[rows], D=plant.D[rows]),
         model.covariance,
-        np.diag(np.square(told.measurement_std)),
+        np.diag(np.square(shipped_law.measurement_std)),
     )
     closed = plant.A - gain @ plant.C[rows]
     state, states = np.zeros(len(plant.A)), np.empty((len(motion), len(plant.A)))
@@ -191,15 +193,17 @@ def errors(model: Model, motion: FloatArray, seed: int) -> list[float]:
 
 def motions(arguments: argparse.Namespace) -> list[FloatArray]:
     """Passive motion of the ship, one for each seed."""
-    vessel, told = shipped("constrained_gpc").vessel, design()
+    vessel, shipped_law = shipped("constrained_gpc").vessel, design()
     found = []
     for seed in seeds_of(arguments):
         sea = Sea.irregular(measured_hour(STORM_HOUR), seed)
         moment = sea.roll_moment(
-            vessel.ship.stiffness_nm_rad, EffectiveSlope(told.sea.effective_slope)
+            vessel.ship.stiffness_nm_rad, EffectiveSlope(shipped_law.sea.effective_slope)
         )
-        count = round(arguments.seconds / told.sample_time_s)
-        found.append(passive_motion(vessel.ship, vessel.tank, moment, told.sample_time_s, count))
+        count = round(arguments.seconds / shipped_law.sample_time_s)
+        found.append(
+            passive_motion(vessel.ship, vessel.tank, moment, shipped_law.sample_time_s, count)
+        )
     return found
 
 
