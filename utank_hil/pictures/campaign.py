@@ -106,5 +106,5 @@ def _exceedance(axes: "Axes", run: CampaignRun, color: str) -> None:
     rolls = np.sort([math.degrees(roll) for roll in run.rolls_rad])
     if len(rolls):
         above = 1.0 - np.arange(len(rolls)) / len(rolls)
-        mark = "o" if len(rolls) == 1 else None  # a step has no width then
+        mark = "o" if rolls[0] == rolls[-1] else None  # a step has no width then
         axes.step(rolls, above, where="pre", color=color, label=run.name, marker=mark)
