@@ -124,6 +124,8 @@ def _not_seen(figure: Figure, image: np.ndarray) -> Iterator[str]:
             plain = line.get_linestyle() == "-" and line.get_linewidth() >= LEAST_LINE
             if not within.any() or not plain or line.get_alpha() not in (None, 1.0):
                 continue
+            if np.ptp(x[within]) < 0.005 * (right - left):
+                continue  # an upright stroke may lie below another's, or the axis
             if any(_same(line, other) for other in axes.lines if other is not line):
                 continue  # of two that are equal one lies on the other
             if np.abs(part - to_rgb(line.get_color())).max(axis=-1).min() > COLOR_SLACK:
