@@ -264,7 +264,7 @@ def _lockstep_run(
     )
 
 
-def run_in_one_process(job: Job, watch: Watch) -> Run:
+def run_in_one_process(job: Job, watch: Watch | None = None) -> Run:
     """Run in real time with all nodes in one loop and no bus but the loop itself."""
     _load_kernel(job)
     ship, truth, truth_log = _ship(job)
@@ -434,14 +434,15 @@ def _run_loop(
     nodes: list[Node],
     channel: str | None,
     statistics: LoopStatistics,
-    watch: Watch,
+    watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
 ) -> LoopResult:
     port = None if channel is None else SocketCanPort(channel, heard_by(nodes))
     loop = RealTimeLoop(nodes, port, statistics=statistics)
 
     def stop() -> bool:
-        return watch.stopped((statistics.ticks + statistics.skipped) * TICK_S)
+        done_s = (statistics.ticks + statistics.skipped) * TICK_S
+        return watch is not None and watch.stopped(done_s)
 
     try:
         with real_time_scheduling() as scheduling:

@@ -219,7 +219,7 @@ def test_scenario_is_recognised_and_shown_with_the_margins_of_all_its_controller
     assert result.exit_code == 0
     report = json.loads(result.stdout)
     assert report["kind"] == "scenario"
-    assert set(report["controllers"]) == {"dpc", "gpc"}
+    assert set(report["controllers"]) == {"dpc", "gpc", "self-tuning"}
     for each in report["controllers"].values():
         assert each["accepted"]
         assert 1 < each["robustness"]["nominal"]["peak_sensitivity"] < 2

@@ -67,7 +67,7 @@ def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path
         config, commissioned=True, sink=lambda row: rows.append(row.copy())
     )
     lockstep = Lockstep([*ship.nodes, node])
-    lockstep.run_until(30 * SECOND_NS)
+    lockstep.run_until(20 * SECOND_NS)
     assert node.mode is Mode.ACTIVE
     column, least = ("valve_opening", 0.2) if ship.valve else ("pressure_command_pa", 10.0)
     assert np.ptp(np.array(rows)[:, SIGNALS.index(column)]) > least

@@ -278,7 +278,7 @@ sys.stdin.read()
 
 def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
-    limit = 300_000
+    limit = 400_000  # the layout takes most of it
     module = "utank_hil.telemetry.recorder"
     with RingWriter(SIGNALS) as ring:
         command = ["-m", module, "--ring", ring.name, "--file", str(file)]
@@ -314,7 +314,7 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
         feed(ring, table(100))
         wait_for(lambda: any_recorded(file))
         pid = recorder._process.pid
-        subprocess.run(["prlimit", f"--pid={pid}", "--fsize=330000"], check=True)
+        subprocess.run(["prlimit", f"--pid={pid}", "--fsize=400000"], check=True)
         feed(ring, table(rows)[100:])
     with pytest.raises(RecorderError, match="the recorder failed: ") as caught:
         recorder.stop()
