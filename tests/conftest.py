@@ -1,8 +1,10 @@
 """Settings of all tests."""
 
 import os
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 # what is tested can be patched and is covered
@@ -13,6 +15,7 @@ from hypothesis import settings
 
 import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads
 from utank_hil.pictures import style
+from utank_hil.runtime import process_priority
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,3 +42,17 @@ def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     monkeypatch.setattr(style, "_save", looked_at)
     yield
     assert not found, "\n".join(found)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _threads_of_other_tests_do_not_count() -> Iterator[None]:
+    """Let the loop run in a process where a cluster of other tests has left its threads."""
+    left = set(threading.enumerate()) - {threading.current_thread()}
+
+    def begun_since() -> list[threading.Thread]:
+        return [thread for thread in threading.enumerate() if thread not in left]
+
+    seen = SimpleNamespace(enumerate=begun_since, current_thread=threading.current_thread)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(process_priority, "threading", seen)
+        yield

@@ -1,11 +1,11 @@
 """What the service manager is told, and when it is not."""
 
 import socket
-from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
 from ports import QuietBus
+from typer.testing import CliRunner
 
 from utank_hil.cli import app
 from utank_hil.commands import run as module
@@ -79,22 +79,15 @@ def test_a_socket_that_is_not_there_is_said(tmp_path: Path) -> None:
         ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
 
 
-def run_on_a_quiet_bus() -> None:
-    module.SocketCanPort = QuietBus
-    app(["run", str(GPC), "--bus", "any0", "--duration", "0.5", "--json"])
-
-
 @pytest.mark.slow
 def test_run_tells_that_it_is_ready_alive_and_stopping_in_this_order(
     manager, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
     for name, value in environment(manager).items():
         monkeypatch.setenv(name, value)
-    # in a process of its own: the loop refuses to run beside threads that other tests left
-    process = get_context("spawn").Process(target=run_on_a_quiet_bus)
-    process.start()
-    process.join(60)
-    assert process.exitcode == ExitCode.OK
+    words = ["run", str(GPC), "--bus", "any0", "--duration", "0.5", "--json"]
+    assert CliRunner().invoke(app, words).exit_code == ExitCode.OK
     first, *alive, last = messages(manager)
     assert first == "READY=1\nSTATUS=GPC, roll on any0"
     assert len(alive) >= 2
