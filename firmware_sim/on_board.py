@@ -16,7 +16,7 @@ from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
 from utank_hil.arrays import FloatArray
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
-"""Single amplitudes of roll whose exceedance is told."""
+"""Single amplitudes of roll whose exceedance is stated."""
 _NO_TANK: Final = "no tank"
 
 

@@ -161,7 +161,7 @@ def make_starter(
 
 
 def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
-    """A part of the project; what can't be is told at its key, as ``ship.gm_m``."""
+    """A part of the project; an impossible value is reported at its key, as ``ship.gm_m``."""
     try:
         return model.model_validate(content)
     except ValidationError as error:

@@ -1,8 +1,9 @@
 """The valve of a semi-active tank: takes openings, judges them on its own, and moves.
 
 It goes to its fail position when commands stop, by the timeout that came with the last one, and
-when its power fails; and it stays there: it follows only after it was told the fail position once
-more. So neither a valve that starts anew nor one whose fault was reset follows by itself.
+when its power fails; and it stays there: it follows only after it was commanded to the fail
+position once more. So neither a valve that starts anew nor one whose fault was reset follows by
+itself.
 """
 
 from collections.abc import Iterable

@@ -30,7 +30,7 @@ REACTIONS: Final[dict[Reaction, str]] = {
     "halve": "half the pressure, with an alarm",
     "alarm": "an alarm; control goes on",
     "note": "discarded or counted; control goes on",
-    "none": "not told from a sound ship; control goes on",
+    "none": "not distinguished from a sound ship; control goes on",
     "refuse": "not armed",
     "drive": "the drive or the valve stops by itself",
 }
@@ -121,7 +121,7 @@ class Row(Section):
     hardwired_stop : bool
         No command can take the pressure away: that needs the hard-wired stop, and is not judged.
     counts_from : dict of str to float
-        Times count from when what the controller was told of this is first so far from the truth:
+        Times count from when what the controller received of this is first so far from the truth:
         before, nobody can know. Or from when the pump's pressure is so far from its set-point and
         stays so, or from when the ship first rolls so far (`over_roll_rad`).
     roll_window_s : float, optional

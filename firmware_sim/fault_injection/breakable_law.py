@@ -1,4 +1,4 @@
-"""A control law that fails when it is told to."""
+"""A control law that fails on demand."""
 
 from typing import Any, Final
 

@@ -32,7 +32,7 @@ LOOK_TICKS = 5
 
 
 def shares(monitors: Monitors) -> dict[str, float]:
-    """Each statistic of now over its threshold; NaN where it can't be told."""
+    """Each statistic of now over its threshold; NaN where it is not known."""
     limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
     judged = twin.ship_rms_rad > limits.amplified_roll_rad and twin.rms_rad > 0
     return {

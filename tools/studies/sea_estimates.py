@@ -3,8 +3,8 @@
     python -m tools.studies.sea_estimates --minutes 10 20 --hours 1
 
 Each case is an hour on the bench's full plant, in lockstep, with the shipped GPC or the passive
-tank. The record is cut into parts; each is told as the retuner's process does it. The truth is the
-moment that the bench's waves had in the same part. An hour takes 20 s and a part one or two.
+tank. The record is cut into parts; each is estimated as the retuner's process does it. The truth is
+the moment that the bench's waves had in the same part. An hour takes 20 s and a part one or two.
 """
 
 import math
@@ -44,7 +44,7 @@ DECIBEL = 10 / math.log(10)
 
 @dataclass(frozen=True)
 class Part:
-    """One part of a record, told and true.
+    """One part of a record, estimated and true.
 
     Attributes
     ----------

@@ -3,7 +3,7 @@
     python -m tools.studies.starter_ships
 
 Each ship of the table goes from her dimensions to a bench of `--duration` seconds, as the commands
-would take her; those for which no tank can be are told with the reason.
+would take her; those for which no tank can be are listed with the reason.
 """
 
 import math

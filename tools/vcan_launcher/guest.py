@@ -158,7 +158,7 @@ def _frames(line: int, control: int) -> Iterator[bytes]:
 def _pump_out(source: int, line: int, number: int, unread: set[int]) -> None:
     while (data := _read(source)) and number not in unread:
         _write_all(line, data)
-    os.close(source)  # if the command still writes, it is told so as by any closed pipe
+    os.close(source)  # if the command still writes, it gets an error as from any closed pipe
     termios.tcdrain(line)
 
 

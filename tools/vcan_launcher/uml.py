@@ -203,7 +203,7 @@ class _Machine:
             self._taken.acquire()
 
     def _pump_out(self, line: int, target: int) -> None:
-        """One output of the command, to its end; once nobody reads it the guest is told."""
+        """One output of the command, to its end; once nobody reads it the guest is notified."""
         while data := os.read(line, 65536):
             try:
                 _write_all(target, data)

@@ -1,4 +1,4 @@
-"""What systemd is told of a service of ``Type=notify``: ready, alive, stopping (sd_notify(3))."""
+"""What a service reports to systemd of ``Type=notify``: ready, alive, stopping (sd_notify(3))."""
 
 import contextlib
 import os

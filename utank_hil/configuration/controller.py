@@ -53,7 +53,7 @@ class ControllerConfig(Section):
     retuning: RetuningSettings | None = None
     """How the controller may retune itself; without it, it never does."""
     sea_estimate: EstimateSettings | None = None
-    """How waves and ship are told from the motion; without it, they are not."""
+    """How waves and ship are estimated from the motion; without it, they are not."""
 
     @field_validator("limits", mode="before")
     @classmethod

@@ -77,7 +77,7 @@ def words_for(error: Any, model: type[BaseModel]) -> str:
 
 
 def _one_of(context: Any, key: str) -> str:
-    """The choices of an error, and the one that was meant if it can be told."""
+    """The choices of an error, and the one that was meant if it can be recognized."""
     choices = re.findall(r"'([^' ]*)'", context[key])
     near = nearest(str(context.get("tag", "")).lower(), choices)
     return f"one of {', '.join(choices)}" + (f"; did you mean {near}?" if near else "")
@@ -99,7 +99,7 @@ def _shown(value: Any) -> str:
 
 
 def _remedy(wanted: str, value: Any) -> str:
-    """How to write a value so that it is what it is wanted to be; empty if that can't be told."""
+    """How to write a value so that it is what it is wanted to be; empty if that is not known."""
     if wanted == "text":
         return ": put it in quotes" if isinstance(value, bool | int | float | date) else ""
     if wanted not in (_NUMBER, _WHOLE) or not isinstance(value, str):

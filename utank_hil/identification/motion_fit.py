@@ -20,7 +20,7 @@ so that the law need not be known. This is the direct method of identification i
 
 What it yields depends on the pump. While it works at its limits, or against anything but the
 waves, stiffness and inertia are found to a few per cent. With a passive tank motion and waves can
-hardly be told apart: the stated deviations are then large. They are the curvature of the
+hardly be distinguished: the stated deviations are then large. They are the curvature of the
 likelihood, with priors as in `ship_fit`.
 """
 

@@ -24,7 +24,7 @@ COLORS: Final = (
     "#000000",
 )
 DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
-"""Of the curves with these colours, so that they can be told in print without them."""
+"""Of the curves with these colours, so that they can be distinguished in print without them."""
 DPI: Final = 130
 BELOW: "Final[dict[str, Any]]" = {"loc": "outside lower left", "ncols": 4, "frameon": False}
 """Where a legend covers no data."""

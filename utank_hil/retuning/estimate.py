@@ -77,7 +77,7 @@ class MotionEstimate:
     Attributes
     ----------
     of_sea, of_ship : Verdict
-        Whether waves and ship can be told, and if not, why.
+        Whether the estimate of waves and ship is good, and if not, why.
     ship : ShipFigures or None
         The ship found; where `of_ship` is not good, the known one that the waves rest on. None if
         there is nothing to tell.

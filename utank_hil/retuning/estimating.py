@@ -21,11 +21,11 @@ LEAST_CLEAR: Final = 0.8
 """Least part of the wave moment's energy in bands that stand out from the sensors' noise."""
 STIFFNESS_DEVIATION: Final = 0.03
 PERIOD_DEVIATION: Final = 0.05
-"""Largest relative deviations for the ship to count as told. With less to go by, waves are taken
-for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
+"""Largest relative deviations for the ship to count as identified. With less to go by, waves
+are taken for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
 """
 SEA_DEVIATION: Final = 0.2
-"""Largest relative deviation of the moment's root mean square, for the sea to count as told."""
+"""Largest relative deviation of the moment's root mean square, for the sea to count as known."""
 CONTRADICTED: Final = 20.0
 """Logarithm of likelihood by which another ship may explain the motion better than the known."""
 SAME: Final = 3.0

@@ -41,7 +41,7 @@ class EstimateSettings:
     every_s : float
         Time between two estimates.
     record_s : float
-        Length of the record: so much of the past is told.
+        Length of the record: so much of the past counts.
     effective_slope : float
         Ratio of effective to true wave slope, for the height of the waves.
     renew : bool
@@ -75,7 +75,7 @@ class EstimateFigures:
     Attributes
     ----------
     of_sea, of_ship : Verdict
-        Whether waves and ship can be told now.
+        Whether the estimate of waves and ship is good now.
     hs_m, tp_s : float
         Significant height and peak period of beam waves.
     moment_rms_rad, moment_deviation : float
@@ -83,12 +83,12 @@ class EstimateFigures:
     sea_age_s : float
         Time since the end of the record.
     roll_period_s, roll_period_deviation_s : float
-        Of the last ship that could be told, without tank water.
+        Of the last ship that was identified, without tank water.
     gm_m, gm_deviation_m : float
         Her metacentric height with the tank's water free to move; NaN where the displacement is
         not known.
     ship_age_s : float
-        Time since the end of the record that told her.
+        Time since the end of the record that identified her.
     gm_low : bool
         The interval of `gm_m` reaches below the limit of the stability booklet.
     """
@@ -108,7 +108,7 @@ class EstimateFigures:
     gm_low: bool = False
 
     def words(self) -> tuple[str, ...]:
-        """What can be told, in words."""
+        """The estimate in words."""
         sea = f"sea {self.of_sea.name}"
         if not math.isnan(self.hs_m):
             sea += (
@@ -261,7 +261,7 @@ class Estimator:
         return came
 
     def take_news(self) -> tuple[str, ...]:
-        """What people are to be told since the last call."""
+        """News for people since the last call."""
         news, self._news = tuple(self._news), []
         return news
 

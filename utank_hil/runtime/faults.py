@@ -230,7 +230,7 @@ FAULTS: Final = (
     ),
     _row(
         Fault.VALVE_NOT_FOLLOWING,
-        "The tank's valve is not where it was told to be.",
+        "The tank's valve is not where it was commanded to be.",
         "Look for what blocks the valve; compare its time from shut to open with the ship file.",
         Condition(
             Reaction.STOP,

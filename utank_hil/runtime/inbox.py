@@ -204,7 +204,7 @@ class Inbox:
         self._echo: int | None = None
         self.tank_cycles = self._cycles = self._tank_lost = 0
         self._tank_frame_ns = NEVER_HEARD_NS
-        # a longer gap than the counter bridges is told by the time
+        # a longer gap than the counter bridges is seen by the time
         self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
         self.conflict_ns = self.claimed_twice_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0

@@ -1,4 +1,4 @@
-"""The controller's side of the tank's valve: what it is told, and whether it does that."""
+"""The controller's side of the tank's valve: what is commanded, and whether it follows."""
 
 from typing import Final
 
@@ -27,7 +27,7 @@ _FAULT: Final = ValveState.FAULT
 class ValveCommander:
     """Turns the loss that a law asks for into VALVE_CMD, and watches the valve.
 
-    The valve is told to follow only while the law is in charge; else to go to its fail position.
+    The valve follows only while the law is in charge; else it goes to its fail position.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 MOST_CURVES: Final = 4
-"""Curves of one panel that can still be told apart."""
+"""Curves of one panel that can still be distinguished."""
 
 
 class Verdict(StrEnum):
@@ -145,7 +145,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What is told better by cells than by curves.
+    """What cells show better than curves.
 
     Attributes
     ----------

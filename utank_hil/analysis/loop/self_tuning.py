@@ -72,7 +72,7 @@ _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
 class SlopeDensity(Protocol):
-    """What a law is told of a sea."""
+    """What a law knows of a sea."""
 
     def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
         """One-sided density of the effective wave slope over encounter frequency."""

@@ -210,7 +210,7 @@ class ConstrainedController:
     def applied(self, u: FloatArray) -> None:
         """Tell the mean of the commands that left since the last step, shape (1,).
 
-        Where the last one of them stood is told from it: where the answer would have brought it, at
+        Where the last one of them stood follows from it: where the answer would have brought it, at
         once or at the rate limit, if the mean agrees with that, else straight on from the mean.
         """
         mean = float(u[0])

@@ -108,13 +108,13 @@ def judge_rest(
 
 
 def judge_valve(opening: FloatArray, stroke: ValveStroke, sample_time_s: float) -> list[Check]:
-    """Whether the valve went where it was told to, by its measured opening during the stroke."""
+    """Whether the valve went where it was commanded, by its measured opening during the stroke."""
     there = round(stroke.hold_s / sample_time_s) - 1
     remedy = "Check the valve's drive, and the order of open and shut of its position sensor."
     return [
-        Check("valve_narrow", "valve, told to be narrow", float(opening[there]), stroke.opening,
+        Check("valve_narrow", "valve narrow", float(opening[there]), stroke.opening,
               VALVE_OFF, "1", remedy),
-        Check("valve_open", "valve, told to open", float(opening[-1]), 1.0, VALVE_OFF, "1", remedy),
+        Check("valve_open", "valve open", float(opening[-1]), 1.0, VALVE_OFF, "1", remedy),
     ]  # fmt: skip
 
 

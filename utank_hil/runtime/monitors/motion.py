@@ -4,9 +4,9 @@ Over a step the roll moves by m, and the integrated rate says that it turned by 
 m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it. A gyroscope's
 constant bias is learned over five minutes and taken off.
 
-The sum tells *that* the two disagree. What disagrees is told by the sums over the time in which one
-of them has not moved, and by the sign of sum(m t) / sum(t t) over the last second, which is 1 in
-health and -1 with one sign wrong.
+The sum tells *that* the two disagree. What disagrees is found by the sums over the time in which
+one of them has not moved, and by the sign of sum(m t) / sum(t t) over the last second, which is 1
+in health and -1 with one sign wrong.
 """
 
 import math

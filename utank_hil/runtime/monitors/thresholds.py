@@ -1,7 +1,7 @@
 """The thresholds of the monitors: all of them follow from ship, tank, pump and sensors, here.
 
 Symbols: w0 is the water's natural frequency, T its period, to which the tank was tuned and at which
-the ship rolls; s a sensor's noise. The smallest roll at which each fault can be told is in
+the ship rolls; s a sensor's noise. The smallest roll at which each fault can be detected is in
 `docs/monitors.md`.
 """
 
