@@ -1,13 +1,13 @@
 """``utank-hil run``: the deployed controller alone."""
 
-import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 from rich.console import Console
@@ -27,6 +27,7 @@ from utank_hil.commands.common import (
     lead_on,
     load,
     notes,
+    print_json,
     shown,
 )
 from utank_hil.commands.exit_codes import ExitCode
@@ -38,7 +39,9 @@ from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.control import BuiltLaw
 from utank_hil.provenance import describe
+from utank_hil.retuning import Desk
 from utank_hil.runtime import (
     LoopStatistics,
     Node,
@@ -109,63 +112,21 @@ def run(
         notes.print("[yellow]arming will be refused:[/yellow]", escape(refused), soft_wrap=True)
     statistics = LoopStatistics()
     with ExitStack() as stack:
-        try:
-            manager = stack.enter_context(ServiceManager())
-        except OSError as error:
-            fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}")
-        try:
-            port = SocketCanPort(bus)
-        except OSError as error:
-            fail(error, ExitCode.NO_BUS)
-        stack.callback(port.close)
+        manager = _service_manager(stack)
+        port = _port(stack, bus)
         stop = stack.enter_context(stop_on_signals())
-        retunes, estimates = (work is not None for work in works_of(loaded))
-        announcer = None
-        if retunes or estimates or out is not None:
-            announcer = _announcer(config, loaded, out)
-            stack.callback(announcer.stop)
-            if announcer.error is not None:
-                notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
+        announcer = _announcer(stack, config, loaded, out)
+        commissioned = not refused
         head = None
         if out is not None:
-            head = replay_head(
-                "run",
-                loaded,
-                law,
-                out,
-                options=context.params,
-                retuner=retunes,
-                estimating=estimates,
-                commissioned=not refused,
-            )
-        recording = RunRecording(
-            out,
-            events=None if announcer is None else announcer.ring,
-            about=describe("run", loaded, Path.cwd(), options=context.params)
-            if head is None
-            else head["about"],
-            head=head,
-            keep_bytes=None if keep is None else round(keep * 1e6),
-        )
-        stack.callback(recording.stop)
-        if recording.summary.error is not None:
-            notes.print(
-                f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True
-            )
+            head = _replay_head(loaded, law, out, context.params, commissioned=commissioned)
+        recording = _recording(stack, context, loaded, out, keep, announcer, head)
         if view:
             _show(stack)
-        retuner, estimating = stack.enter_context(retuner_process(loaded))
-        if any(desk is not None and not desk.alive for desk in (retuner, estimating)):
-            notes.print(
-                "[red]the retuner did not start:[/red] nothing will be retuned or estimated"
-            )
-        try:
-            alarms = AlarmLines()
-        except OSError as error:
-            fail(f"no process to print alarms: {error}")
-        stack.callback(alarms.close)
+        retuner, estimating = _desks(stack, loaded)
+        alarms = _alarm_lines(stack)
 
-        def told(event: Event, start_ns: int) -> None:
+        def announce(event: Event, start_ns: int) -> None:
             if isinstance(event, AlarmEvent):
                 alarms.tell(event, start_ns)
             if announcer is not None:
@@ -179,10 +140,9 @@ def run(
             estimating=desks.estimating,
             statistics=statistics,
             sink=recording.write,
-            event_sink=told,
-            commissioned=not refused,
+            event_sink=announce,
+            commissioned=commissioned,
         )
-
         on_bus: Node = node
         if recording.keeps_records:
             on_bus = NodeTap(node, recording.write_records, desks.taps)
@@ -204,23 +164,134 @@ def run(
         manager.stopping()
     if announcer is not None and announcer.error is not None:
         notes.print(f"[red]events were not logged:[/red] {escape(announcer.error)}", soft_wrap=True)
-    code = _code(node)
+    kept = None if out is None else recording.summary
     if json_:
-        summary = {
-            "exit_code": code,
-            "mode": node.mode.name,
-            "fault": node.fault.name,
-            "not_commissioned": refused,
-            "law_error": node.law_error,
-            "fallbacks": node.fallbacks,
-            "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
-            "loop": statistics.summary(),
-            "recording": None if out is None else asdict(recording.summary),
-        }
-        sys.stdout.write(json.dumps(summary) + "\n")
+        print_json(_as_json(node, statistics, kept, refused))
     else:
-        _print_summary(loaded.name, node, statistics, None if out is None else recording.summary)
-    raise typer.Exit(code)
+        _print_summary(loaded.name, node, statistics, kept)
+    raise typer.Exit(_code(node))
+
+
+def _service_manager(stack: ExitStack) -> ServiceManager:
+    try:
+        return stack.enter_context(ServiceManager())
+    except OSError as error:
+        fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}")
+
+
+def _port(stack: ExitStack, bus: str) -> SocketCanPort:
+    try:
+        port = SocketCanPort(bus)
+    except OSError as error:
+        fail(error, ExitCode.NO_BUS)
+    stack.callback(port.close)
+    return port
+
+
+def _announcer(
+    stack: ExitStack, config: Path, loaded: ControllerConfig, folder: Path | None
+) -> Announcer | None:
+    """What prints events, and keeps in `folder` their log and the ships that retuning found."""
+    if folder is None and all(work is None for work in works_of(loaded)):
+        return None
+    log, ships = None, None
+    if folder is not None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (log,) = claimed_files(folder.resolve(), event_log.NAME)
+        except OSError as error:
+            notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
+        ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))
+    announcer = Announcer(ships, log)
+    stack.callback(announcer.stop)
+    if announcer.error is not None:
+        notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
+    return announcer
+
+
+def _replay_head(
+    loaded: ControllerConfig,
+    law: BuiltLaw,
+    folder: Path,
+    options: Mapping[str, object],
+    *,
+    commissioned: bool,
+) -> dict[str, Any]:
+    retunes, estimates = (work is not None for work in works_of(loaded))
+    return replay_head(
+        "run",
+        loaded,
+        law,
+        folder,
+        options=options,
+        retuner=retunes,
+        estimating=estimates,
+        commissioned=commissioned,
+    )
+
+
+def _recording(
+    stack: ExitStack,
+    context: typer.Context,
+    loaded: ControllerConfig,
+    folder: Path | None,
+    keep_mb: float | None,
+    announcer: Announcer | None,
+    head: dict[str, Any] | None,
+) -> RunRecording:
+    """The ring that monitors read, and the recorder that keeps it in `folder`."""
+    if head is None:
+        about = describe("run", loaded, Path.cwd(), options=context.params)
+    else:
+        about = head["about"]
+    recording = RunRecording(
+        folder,
+        events=None if announcer is None else announcer.ring,
+        about=about,
+        head=head,
+        keep_bytes=None if keep_mb is None else round(keep_mb * 1e6),
+    )
+    stack.callback(recording.stop)
+    if recording.summary.error is not None:
+        notes.print(f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True)
+    return recording
+
+
+def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Desk | None]:
+    """The retuner's and the estimator's end in this process, where they are configured."""
+    desks = stack.enter_context(retuner_process(loaded))
+    if any(desk is not None and not desk.alive for desk in desks):
+        notes.print("[red]the retuner did not start:[/red] nothing will be retuned or estimated")
+    return desks
+
+
+def _alarm_lines(stack: ExitStack) -> AlarmLines:
+    try:
+        alarms = AlarmLines()
+    except OSError as error:
+        fail(f"no process to print alarms: {error}")
+    stack.callback(alarms.close)
+    return alarms
+
+
+def _as_json(
+    node: ControllerNode,
+    statistics: LoopStatistics,
+    recording: RecordingSummary | None,
+    refused: str,
+) -> dict[str, Any]:
+    """What became of a run, for scripts."""
+    return {
+        "exit_code": _code(node),
+        "mode": node.mode.name,
+        "fault": node.fault.name,
+        "not_commissioned": refused,
+        "law_error": node.law_error,
+        "fallbacks": node.fallbacks,
+        "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
+        "loop": statistics.summary(),
+        "recording": None if recording is None else asdict(recording),
+    }
 
 
 def _code(node: ControllerNode) -> ExitCode:
@@ -253,19 +324,6 @@ def _print_summary(
         _tell(console, recording)
         if recording.file is not None and recording.error is None:
             lead_on(console, f"report {shown(Path(recording.file))}")
-
-
-def _announcer(config: Path, loaded: ControllerConfig, folder: Path | None) -> Announcer:
-    """What tells of events, and keeps in `folder` their log and the ships that retuning found."""
-    if folder is None:
-        return Announcer()
-    log = None
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (log,) = claimed_files(folder.resolve(), event_log.NAME)
-    except OSError as error:
-        notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
-    return Announcer(IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config)), log)
 
 
 def _show(stack: ExitStack) -> None:
