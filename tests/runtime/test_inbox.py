@@ -19,6 +19,7 @@ from utank_hil.canbus import (
     DriveStatus1,
     DriveStatus2,
     Frame,
+    HardwiredInputs,
     Heartbeat,
     Mode,
     NodeState,
@@ -34,11 +35,15 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
-from utank_hil.configuration import load_config
+from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import LevelObserver
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.inbox import MEASURED, Inbox
+from utank_hil.runtime.monitors.spikes import SpikeGates
+from utank_hil.runtime.monitors.thresholds import SensorFigures, thresholds_of
+from utank_hil.runtime.motion_sensors import MotionSensors
 from utank_hil.runtime.orders import NEVER_HEARD_NS
+from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.tick import TICK_NS
 
 NAN = math.nan
@@ -507,3 +512,141 @@ def test_only_what_the_catalogue_does_not_know_is_foreign() -> None:
     for number in (1, 2, 3):
         line.hear(Frame(0x1ABCDEF0, bytes(8)))
         assert (line.inbox.frames, line.inbox.foreign) == (1 + number, number)
+
+
+THRESHOLDS = thresholds_of(
+    load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig).plant, 0.6, SensorFigures()
+)
+BOTH = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
+
+
+class RedundantLine(Line):
+    """Two motion sensors and hard-wired inputs beside the rest."""
+
+    def __init__(self, gates: SpikeGates | None = None) -> None:
+        super().__init__()
+        self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M, gates=gates, redundancy=BOTH)
+        self.second = CATALOGUE.transmitter(SensorMotion, Address.SENSORS_2)
+        self.hardwired = CATALOGUE.transmitter(HardwiredInputs)
+
+    def motions(self) -> MotionSensors:
+        assert self.inbox.motions is not None
+        return self.inbox.motions
+
+    def say_2(self, motion: SensorMotion) -> None:
+        self.hear(self.second.frame(motion))
+
+    def shown(self) -> tuple[float, float, int]:
+        inbox = self.inbox
+        return inbox.roll_rad, inbox.roll_rate_rad_s, inbox.motion_ns
+
+
+def test_of_two_motion_sensors_the_one_in_use_is_shown_and_both_are_kept() -> None:
+    line = RedundantLine()
+    inbox, motions = line.inbox, line.motions()
+    assert motions.used is motions.first
+    line.say(SensorMotion(0.1, -0.05, Quality.GOOD))
+    first_ns, first = line.now_ns, line.shown()
+    assert first == (pytest.approx(0.1), pytest.approx(-0.05), first_ns)
+    line.say_2(SensorMotion(0.2, 0.025, Quality.DEGRADED))
+    second_ns = line.now_ns
+    assert line.shown() == first
+    assert (motions.second.roll_rad, motions.second.heard_ns) == (pytest.approx(0.2), second_ns)
+    inbox.exchange_motion(motions)
+    assert line.shown() == (pytest.approx(0.2), pytest.approx(0.025), second_ns)
+    line.say(SensorMotion(0.3, 0.0, Quality.GOOD))
+    assert line.shown()[2] == second_ns
+    assert (motions.first.roll_rad, motions.first.heard_ns) == (pytest.approx(0.3), line.now_ns)
+    line.say_2(SensorMotion(0.4, -0.1, Quality.GOOD))
+    assert line.shown() == (pytest.approx(0.4), pytest.approx(-0.1), line.now_ns)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        SensorMotion(NAN, 0.0, Quality.GOOD),
+        SensorMotion(0.0, NAN, Quality.GOOD),
+        SensorMotion(0.0, 0.0, Quality.BAD),
+        SensorMotion(0.0, 0.0, None),
+        SensorMotion(0.6, 0.0, Quality.GOOD),  # a spike
+    ],
+)
+@pytest.mark.parametrize("second", [False, True])
+def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(
+    wrong: SensorMotion, second: bool
+) -> None:
+    line = RedundantLine(SpikeGates(THRESHOLDS))
+    say, sensor = (line.say, line.motions().first)
+    if second:
+        line.inbox.exchange_motion(line.motions())
+        say, sensor = line.say_2, line.motions().second
+    say(SensorMotion(0.1, -0.05, Quality.GOOD))
+    kept = (sensor.roll_rad, sensor.roll_rate_rad_s, sensor.heard_ns)
+    say(wrong)
+    assert (sensor.roll_rad, sensor.roll_rate_rad_s, sensor.heard_ns) == kept == line.shown()
+
+
+def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
+    gates = SpikeGates(THRESHOLDS)
+    line = RedundantLine(gates)
+    for say in (line.say, line.say_2):
+        say(SensorMotion(0.0, 0.0, Quality.GOOD))
+    for times, say in ((1, line.say), (3, line.say_2)):
+        for _ in range(times):
+            say(SensorMotion(0.6, 0.0, Quality.GOOD))
+    assert [gate.discarded for gate in gates.motions] == [1, 3]
+    assert gates.motion.discarded == 0
+
+
+def test_the_stream_of_the_motion_sensor_in_use_counts_for_the_protection() -> None:
+    line = RedundantLine()
+    for message in GOOD.values():
+        line.say(message)
+    line.say_2(SensorMotion(0.0, 0.0, Quality.GOOD))
+    for _ in range(5):
+        frame = line.second.frame(SensorMotion(0.0, 0.0, Quality.GOOD))
+        line.hear(Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,))))
+    assert line.inbox.protection_valid
+    line.inbox.exchange_motion(line.motions())
+    assert not line.inbox.protection_valid
+
+
+def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence() -> None:
+    line = RedundantLine()
+    hardwired = line.inbox.hardwired
+    assert hardwired is not None
+    shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
+    line.hear(line.hardwired.frame(shut))
+    assert (hardwired.heard_ns, hardwired.stop) == (line.now_ns, False)
+    assert hardwired.receiver in line.inbox.watched
+    line.hardwired.counter += 7
+    line.hear(line.hardwired.frame(shut._replace(stop_loop=Switch.ON)))
+    assert hardwired.stop
+
+
+def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing() -> None:
+    line = RedundantLine()
+    for address in (Address.DRIVE, Address.SENSORS):
+        line.beat(address, CATALOGUE.version, VERSION)
+    assert not line.inbox.versions_match
+    line.beat(Address.HARDWIRED, CATALOGUE.version, VERSION)
+    assert line.inbox.versions_match
+    beats = CATALOGUE.transmitter(Heartbeat, Address.SENSORS_2)
+    beat = Heartbeat(
+        NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, CATALOGUE.version, VERSION + 1, NAN, NAN
+    )
+    line.hear(beats.frame(beat))
+    assert not line.inbox.versions_match
+    line.hear(beats.frame(beat._replace(configuration_version=VERSION)))
+    assert line.inbox.versions_match
+    expected = {CATALOGUE.receiver(Heartbeat, address).can_id
+                for address in (Address.HARDWIRED, Address.SENSORS_2)}  # fmt: skip
+    assert expected <= line.inbox.expected
+
+
+@pytest.mark.parametrize("address", [Address.HARDWIRED, Address.SENSORS_2])
+def test_addresses_of_redundant_nodes_are_held_once_too(address: Address) -> None:
+    line, claims = RedundantLine(), CATALOGUE.transmitter(AddressClaim, address)
+    for name, second in ((5, False), (6, True)):
+        line.hear(claims.frame(AddressClaim(name)))
+        assert (line.inbox.claimed_twice_ns == line.now_ns) is second

@@ -139,10 +139,11 @@ class Inbox:
         self.motions: MotionSensors | None = None
         if redundancy.second_motion_sensor:
             second = catalogue.receiver(SensorMotion, Address.SENSORS_2)
-            self.motions = MotionSensors(self._motion, second)
-            for index, sensor in enumerate((self.motions.first, self.motions.second)):
+            self.motions = motions = MotionSensors(self._motion, second)
+            for index, sensor in enumerate((motions.first, motions.second)):
                 gate = None if gates is None else gates.motions[index]
-                self._subscribe(sensor.receiver, partial(self._on_either_motion, sensor, gate))
+                on_motion = partial(self._on_either_motion, motions, sensor, gate)
+                self._subscribe(sensor.receiver, on_motion)
         else:
             self._subscribe(self._motion, self._on_motion)
         self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
@@ -159,23 +160,21 @@ class Inbox:
         self.hardwired: HardwiredHeard | None = None
         if redundancy.hardwired_inputs:
             matched.append(Address.HARDWIRED)
-            hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
-            self._subscribe(hardwired.receiver, hardwired.take)
+            self.hardwired = hardwired = HardwiredHeard(catalogue.receiver(HardwiredInputs))
             self._subscriptions[hardwired.receiver.can_id] = hardwired.accept, hardwired.take
-            self.hardwired = hardwired
+            self.watched.append(hardwired.receiver)
         self.stations = Stations(catalogue)
         for orders in self.stations.orders.values():
             self._subscriptions[orders.can_id] = orders.accept, orders.obey
             self.watched.append(orders.receiver)
+        if self.motions is not None:
+            matched.append(Address.SENSORS_2)
         self._matching: dict[int, bool] = {}
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
-            self._matching[heartbeat.can_id] = False
+            # silent, the second motion sensor is missed but not waited for
+            self._matching[heartbeat.can_id] = address is Address.SENSORS_2
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
-        if self.motions is not None:
-            beats_2 = catalogue.receiver(Heartbeat, Address.SENSORS_2)
-            self._matching[beats_2.can_id] = True  # silent, it is missed but not waited for
-            self._subscribe(beats_2, partial(self._on_heartbeat, beats_2.can_id))
         self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
         self._panels_match = dict.fromkeys(ADDRESSES, False)
         for station, address in ADDRESSES.items():
@@ -259,7 +258,12 @@ class Inbox:
             self.motion_ns = now_ns
 
     def _on_either_motion(
-        self, sensor: MotionSensor, gate: MotionGate | None, motion: SensorMotion, now_ns: int
+        self,
+        motions: MotionSensors,
+        sensor: MotionSensor,
+        gate: MotionGate | None,
+        motion: SensorMotion,
+        now_ns: int,
     ) -> None:
         if motion.quality not in _USABLE:
             return
@@ -268,18 +272,17 @@ class Inbox:
         ):
             sensor.roll_rad, sensor.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
             sensor.heard_ns = now_ns
-            if self.motions is not None and sensor is self.motions.used:
+            if sensor is motions.used:
                 self._show_motion(sensor)
 
     def _show_motion(self, sensor: MotionSensor) -> None:
         self.roll_rad, self.roll_rate_rad_s = sensor.roll_rad, sensor.roll_rate_rad_s
         self.motion_ns = sensor.heard_ns
 
-    def exchange_motion(self) -> None:
-        """Use the other motion sensor from now on."""
-        if self.motions is not None:
-            self.motions.exchange()
-            self._show_motion(self.motions.used)
+    def exchange_motion(self, motions: MotionSensors) -> None:
+        """Use the other of the two motion sensors from now on."""
+        motions.exchange()
+        self._show_motion(motions.used)
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
         self._count_cycles(now_ns)

@@ -27,6 +27,7 @@ from utank_hil.runtime.monitors.spikes import SpikeCount, SpikeGates
 from utank_hil.runtime.monitors.tank_equation import TankEquation
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 from utank_hil.runtime.monitors.volume import Volume
+from utank_hil.runtime.motion_sensors import MotionSensors
 from utank_hil.runtime.observations import MEAN_FRAME_BITS, Observations
 from utank_hil.runtime.passive_twin import PassiveTwin
 from utank_hil.tick import TICK_S
@@ -263,7 +264,7 @@ class Monitors:
         spare_stale = seen.motion_spare_age_ms > STALE_MS
         spare.watch.update(other.roll_rad, other.roll_rate_rad_s, elapsed_s, stale=spare_stale)
         both = not (stale or spare_stale)
-        self._leave_accused(inbox, seen, spare)
+        self._leave_accused(inbox, motions, seen, spare)
         self._of_pair = self._pair.update(
             inbox.roll_rad - other.roll_rad if both else 0.0,
             inbox.roll_rate_rad_s - other.roll_rate_rad_s if both else 0.0,
@@ -271,11 +272,13 @@ class Monitors:
             spare,
         )
 
-    def _leave_accused(self, inbox: Inbox, seen: Observations, spare: SensorEvidence) -> None:
+    def _leave_accused(
+        self, inbox: Inbox, motions: MotionSensors, seen: Observations, spare: SensorEvidence
+    ) -> None:
         """Use the other motion sensor if something speaks against this one alone."""
         heard = seen.motion_spare_age_ms <= SPARE_MS
         if heard and self._used.found and not (spare.found or spare.accused):
-            inbox.exchange_motion()
+            inbox.exchange_motion(motions)
             self._used.accused = True
             self._used, self._spare = spare, self._used
 
@@ -307,7 +310,7 @@ class Monitors:
             spare.restart_water()
         else:
             spare.water = spare.equation.update(motions.spare.roll_rad, level_m, pressure_pa)
-        self._leave_accused(inbox, seen, spare)
+        self._leave_accused(inbox, motions, seen, spare)
 
 
 def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:

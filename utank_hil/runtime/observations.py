@@ -197,7 +197,7 @@ class Observer:
         motions = inbox.motions
         if motions is not None:
             if motions.silent(now_ns):
-                inbox.exchange_motion()
+                inbox.exchange_motion(motions)
             seen.motion_spare_age_ms = (now_ns - motions.spare.heard_ns) / MILLISECOND_NS
         seen.motion_age_ms = (now_ns - inbox.motion_ns) / MILLISECOND_NS
         seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
