@@ -7,6 +7,7 @@ a statement left out, a result that is lost.
 
 import ast
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -64,6 +65,8 @@ class Mutant:
         The line that differs, as Python writes it out.
     code : CodeType
         Of the whole module, changed.
+    twin : int
+        How many before it are of the same words, of the same line elsewhere in `where`.
     """
 
     line: int
@@ -71,18 +74,20 @@ class Mutant:
     before: str
     after: str
     code: CodeType
+    twin: int = 0
 
     @property
     def key(self) -> str:
         """What it is, wherever it stands."""
-        return f"{self.where}: {self.before} -> {self.after}"
+        words = f"{self.where}: {self.before} -> {self.after}"
+        return f"{words} ({self.twin + 1})" if self.twin else words
 
 
 def mutants_of(file: Path) -> tuple[CodeType, list[Mutant]]:
     """The code of a file as it is, and all its mutants."""
     tree = ast.parse(file.read_bytes())
     unchanged = compile(tree, str(file), "exec")
-    found = []
+    found, seen = [], Counter[tuple[str, str, str]]()
     for place in _places(tree, "", None):
         before = ast.unparse(place.statement).splitlines()
         for replacement in place.replacements:
@@ -94,7 +99,9 @@ def mutants_of(file: Path) -> tuple[CodeType, list[Mutant]]:
                 place.put(place.node)
             old, new = (before[0], "") if place.whole else _difference(before, after)
             line = getattr(place.node, "lineno", place.statement.lineno)
-            found.append(Mutant(line, place.where, old, new, code))
+            words = (place.where, old, new)
+            found.append(Mutant(line, *words, code, seen[words]))
+            seen[words] += 1
     return unchanged, found
 
 
@@ -185,8 +192,9 @@ def _instead(node: ast.AST, holder: ast.AST, field: str) -> Iterator[ast.AST]:
             yield operand
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             yield ast.BinOp(left=left, op=OPERATORS[type(op)](), right=right)
-        case ast.Constant(value=bool(value)) if not _is_slots(holder):
-            yield ast.Constant(value=not value)
+        case ast.Constant(value=bool(value)):
+            if not _is_slots(holder):
+                yield ast.Constant(value=not value)
         case ast.Constant(value=int(value)):
             yield ast.Constant(value=value + 1)
         case ast.Constant(value=float(value)):

@@ -3,9 +3,11 @@
     python -m tools.mutation.run                          # all files; hours
     python -m tools.mutation.run --file utank_hil/runtime/supervisor.py
     python -m tools.mutation.run --changed main               # only lines that differ from it
+    python -m tools.mutation.run --not-judged --within 60     # only what no evidence has judged
     python -m tools.mutation.run --json                       # as evidence
 
-With `--within` the time is limited, and what was not tried is counted.
+With `--within` the time is limited: it is shared out by the number of mutants, which are drawn by
+the seed (that of the commit, unless it is given), and what was not tried is counted.
 
 What was killed is kept in .cache/mutation: after Ctrl-C, or with more tests, the same command goes
 on with what lives. Exit code 1: a mutant lives that `targets.py` does not explain.
@@ -17,16 +19,18 @@ import importlib
 import json
 import math
 import os
-import re
-import subprocess
+import random
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import CodeType
+from typing import Any
 
 from tools.evidence.sources import ROOT
+from tools.mutation.changes import blob_of, changed_since, git, not_judged
 from tools.mutation.mutants import Mutant, mutants_of
 from tools.mutation.targets import NO_DIFFERENCE, TARGETS, Target
 
@@ -34,27 +38,8 @@ CACHE = ROOT / ".cache" / "mutation"
 # what the tests import and no mutant changes: not to be imported for each one anew
 PRELOADED = ("numpy", "scipy.linalg", "scipy.signal", "scipy.optimize", "hypothesis.strategies",
              "cantools", "can", "pydantic", "yaml", "typer", "numba", "control")  # fmt: skip
-LIMIT_S = 300.0
-
-
-def changed_lines(base: str, file: str) -> set[int]:
-    """Lines of a file that are not as in the common ancestor with `base`."""
-    ancestor = _git("merge-base", base, "HEAD").strip()
-    hunks = re.findall(
-        r"^@@ .* \+(\d+)(?:,(\d+))? @@", _git("diff", "-U0", ancestor, "--", file), re.M
-    )
-    return {int(first) + i for first, count in hunks for i in range(int(count or 1))}
-
-
-def _is_known(base: str) -> bool:
-    words = ["git", "rev-parse", "--quiet", "--verify", f"{base}^{{commit}}"]
-    return subprocess.run(words, cwd=ROOT, stdout=subprocess.DEVNULL, check=False).returncode == 0
-
-
-def _git(*words: str) -> str:
-    return subprocess.run(
-        ["git", *words], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True
-    ).stdout
+QUICK_SHARE = 0.6
+"""Of limited time: what the quick way may take, before the thorough one."""
 
 
 class Kept:
@@ -70,80 +55,106 @@ class Kept:
         """All that is kept."""
         return set(self._file.read_text(encoding="utf-8").splitlines())
 
-    def add(self, mutant: Mutant, killed: bool = True) -> None:
+    def add(self, mutant: Mutant) -> None:
         """Keep one more, at once."""
-        if killed:
-            with self._file.open("a", encoding="utf-8") as kept:
-                kept.write(f"{mutant.key}\n")
+        with self._file.open("a", encoding="utf-8") as kept:
+            kept.write(f"{mutant.key}\n")
+
+
+def in_child(work: Callable[[], bool]) -> bool:
+    """Whether work in a fork says so; what it prints goes to standard error."""
+    child = os.fork()
+    if child:
+        return os.waitpid(child, 0)[1] == 0
+    said = False
+    try:
+        sys.stdout = sys.stderr
+        os.dup2(2, 1)
+        said = work()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(0 if said else 1)
 
 
 def survivors(
-    target: Target, mutants: list[Mutant], unchanged: CodeType, end_s: float
-) -> Iterator[Mutant | None]:
-    """Those of the mutants that no test kills; None for one that there was no time for."""
+    target: Target, mutants: list[Mutant], unchanged: CodeType, within_s: float
+) -> Iterator[tuple[Mutant, bool]]:
+    """Mutants that no test kills; with False, that there was no time for."""
     from tools.mutation import session
 
-    file, kept = ROOT / target.file, Kept(target)
-    dead = kept.read()
-    waiting = [mutant for mutant in mutants if mutant.key not in dead]
-    if not waiting:
-        return
-    child = os.fork()
-    if not child:
-        passed = False
-        try:
-            sys.stdout = sys.stderr
-            os.dup2(2, 1)
-            passed = session.try_exchanged(file, unchanged, waiting, target.tests, kept.add, end_s)
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            sys.stderr.flush()
-            os._exit(0 if passed else 1)
-    if os.waitpid(child, 0)[1]:
-        raise SystemExit(f"the tests of {target.file} fail on the code as it is")
-    dead = kept.read()
-    waiting = [mutant for mutant in waiting if mutant.key not in dead]
+    begin, file, kept = time.monotonic(), ROOT / target.file, Kept(target)
     tests = (*target.tests, *target.behind)
-    if waiting and session.fail_anew(file, unchanged, tests, LIMIT_S):
-        raise SystemExit(f"the tests of {target.file} fail on the code as it is: {tests}")
-    for mutant in waiting:
-        if time.monotonic() > end_s:
-            yield None
-        elif session.fail_anew(file, mutant.code, tests, LIMIT_S):
+
+    def waiting() -> list[Mutant]:
+        dead = kept.read()
+        return [mutant for mutant in mutants if mutant.key not in dead]
+
+    for way, chosen, share in (
+        (session.QUICK, target.tests, QUICK_SHARE),
+        (session.THOROUGH, tests, 1.0),
+    ):
+        left, end_s = waiting(), begin + share * within_s
+        if not left or time.monotonic() > end_s:
+            continue
+        exchanged = partial(session.try_exchanged, way, file, unchanged, left, chosen)
+        if not in_child(partial(exchanged, kept.add, end_s)):
+            raise SystemExit(f"the tests of {target.file} fail on the code as it is: {chosen}")
+    left, limit_s = waiting(), session.MOST_S
+    if left and time.monotonic() < begin + within_s:
+        since = time.monotonic()
+        if session.fail_anew(file, unchanged, tests, limit_s):
+            raise SystemExit(f"the tests of {target.file} fail on the code as it is: {tests}")
+        limit_s = session.patience_s(time.monotonic() - since)
+    for mutant in left:
+        if time.monotonic() > begin + within_s:
+            yield mutant, False
+        elif session.fail_anew(file, mutant.code, tests, limit_s):
             kept.add(mutant)
         else:
-            yield mutant
+            yield mutant, True
 
 
-def judged(target: Target, base: str | None, end_s: float) -> dict[str, object]:
-    """Try all mutants of a file, or of its changed lines."""
-    unchanged, mutants = mutants_of(ROOT / target.file)
-    if base is not None:
-        lines = changed_lines(base, target.file)
-        mutants = [mutant for mutant in mutants if mutant.line in lines]
+def judged(
+    target: Target, unchanged: CodeType, mutants: list[Mutant], within_s: float
+) -> dict[str, Any]:
+    """Try mutants of a file."""
     reasons = NO_DIFFERENCE.get(target.file, {})
-    living, untried = [], 0
-    explained = [
-        {"change": mutant.key, "why": reasons[mutant.key]}
-        for mutant in mutants
-        if mutant.key in reasons
-    ]
+    living, untried = [], []
     tried = [mutant for mutant in mutants if mutant.key not in reasons]
-    for mutant in survivors(target, tried, unchanged, end_s):
-        if mutant is None:
-            untried += 1
+    for mutant, was_tried in survivors(target, tried, unchanged, within_s):
+        if not was_tried:
+            untried.append(mutant.key)
             continue
         living.append({"line": mutant.line, "change": mutant.key})
         sys.stderr.write(f"{target.file}:{mutant.line}: {mutant.key}\n")
     return {
         "file": target.file,
+        "blob": blob_of(target.file),
         "mutants": len(mutants),
-        "killed": len(tried) - len(living) - untried,
+        "killed": len(tried) - len(living) - len(untried),
         "not_tried": untried,
-        "no_difference": explained,
+        "no_difference": [
+            {"change": mutant.key, "why": reasons[mutant.key]}
+            for mutant in mutants
+            if mutant.key in reasons
+        ],
         "survived": living,
     }
+
+
+def wanted(arguments: argparse.Namespace) -> Iterator[tuple[Target, CodeType, list[Mutant]]]:
+    """Targets with those of their mutants that are asked for."""
+    for target in TARGETS:
+        if arguments.file and target.file not in arguments.file:
+            continue
+        unchanged, mutants = mutants_of(ROOT / target.file)
+        if arguments.changed is not None:
+            mutants = changed_since(arguments.changed, target.file, mutants)
+        elif arguments.not_judged:
+            mutants = not_judged(target.file, mutants)
+        yield target, unchanged, mutants
 
 
 def main() -> int:
@@ -154,35 +165,46 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--file", action="append", choices=[target.file for target in TARGETS])
-    parser.add_argument("--changed", metavar="BASE", help="only lines that differ from this commit")
+    lines = parser.add_mutually_exclusive_group()
+    lines.add_argument("--changed", metavar="BASE", help="only lines that differ from this commit")
+    lines.add_argument(
+        "--not-judged", action="store_true",
+        help="only lines that differ from what docs/evidence/mutation.json judged",
+    )  # fmt: skip
     parser.add_argument("--within", type=float, default=math.inf, help="seconds to try")
+    parser.add_argument("--seed", type=int, help="which are tried first where time is limited")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     os.chdir(ROOT)
     os.environ["UTANK_HIL_COMPILED"] = "0"  # compiled modules have no code to exchange
     end_s = time.monotonic() + arguments.within
-    base = arguments.changed
-    if base is not None and not _is_known(base):
-        sys.stderr.write(f"there is no {base} to compare with: nothing counts as changed\n")
-        return 0
     for name in PRELOADED:
         importlib.import_module(name)
+    tasks = list(wanted(arguments))
+    seed = arguments.seed
+    if seed is None:
+        seed = int(git("rev-parse", "--short=8", "HEAD")[:8] or "0", 16)
+    if math.isfinite(end_s):
+        for _, _, mutants in tasks:
+            random.Random(seed).shuffle(mutants)
     results = []
-    for target in TARGETS:
-        if arguments.file and target.file not in arguments.file:
-            continue
-        if base is not None and not changed_lines(base, target.file):
-            continue
+    for index, (target, unchanged, mutants) in enumerate(tasks):
         begin = time.monotonic()
-        result = judged(target, base, end_s)
+        to_come = sum(len(others) for _, _, others in tasks[index:])
+        share = len(mutants) / max(to_come, 1)
+        result = judged(target, unchanged, mutants, share * (end_s - begin) if share else 0.0)
         results.append(result)
         counts = {
             name: len(value) if isinstance(value, list) else value
             for name, value in result.items()
-            if name != "file"
+            if name not in ("file", "blob")
         }
-        said = ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counts.items())
-        sys.stderr.write(f"{target.file}: {said}; {time.monotonic() - begin:.0f} s\n")
+        if mutants:
+            said = ", ".join(f"{value} {name.replace('_', ' ')}" for name, value in counts.items())
+            sys.stderr.write(f"{target.file}: {said}; {time.monotonic() - begin:.0f} s\n")
+    total = sum(len(mutants) for _, _, mutants in tasks)
+    untried = sum(len(result["not_tried"]) for result in results)
+    sys.stderr.write(f"{total - untried} of {total} mutants tried, {untried} not (seed {seed})\n")
     if arguments.json:
         sys.stdout.write(json.dumps({"files": results}) + "\n")
         return 0

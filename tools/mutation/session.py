@@ -1,8 +1,9 @@
 """Tests against mutants, each in a process of its own that ends with the first failure.
 
-A mutant is tried in two ways. First in a fork of a session that has collected its tests: the code
-of the changed functions is exchanged, which takes no import. What lives through that, or is not in
-a function, is tried in a session that imports the changed file, with every example and test.
+A mutant is tried in forks of a session that has collected its tests: the code of the changed
+functions is exchanged, which takes no import. First with few examples of the tests that mirror the
+file, then with more, and with the tests behind them. What lives through that, or is not in a
+function, is tried in a session that imports the changed file.
 """
 
 import gc
@@ -27,9 +28,13 @@ from _pytest.main import pytest_runtestloop as run_tests
 from tools.evidence.sources import ROOT
 from tools.mutation.mutants import Mutant
 
-DEAD, ALIVE = "killed", "survived"
 FEW, MANY = 12, 60
-"""Variants of each parametrized test, in the first way and in the second."""
+"""Variants of each parametrized test."""
+QUICK = (FEW, "few")
+THOROUGH = (MANY, "same")
+"""How many variants, and the profile of the property tests."""
+MOST_S = 1800.0
+"""What the tests may take on the code as it is."""
 _MEMORY_BYTES = 4 << 30
 _PLACE = struct.Struct("q")
 _OPTIONS = [
@@ -37,6 +42,11 @@ _OPTIONS = [
     "-m", "not socketcan and not evidence",
     "-W", "ignore::pytest.PytestAssertRewriteWarning",  # of what is imported already
 ]  # fmt: skip
+
+
+def patience_s(seconds: float) -> float:
+    """How long tests that took this long may take on a mutant, on a machine that is shared."""
+    return 5 + 5 * seconds
 
 
 def dotted(file: Path) -> str:
@@ -98,7 +108,7 @@ class Exchange:
         Of it.
     mutants : sequence of Mutant
     report : callable
-        Takes a mutant and whether a test failed, as soon as that is known.
+        Takes a mutant as soon as a test fails.
     end_s : float
         Of the monotonic clock: no mutant is tried after it.
     """
@@ -108,7 +118,7 @@ class Exchange:
         file: Path,
         unchanged: CodeType,
         mutants: Sequence[Mutant],
-        report: Callable[[Mutant, bool], None],
+        report: Callable[[Mutant], None],
         end_s: float,
     ) -> None:
         self._file, self._unchanged, self._mutants = file, unchanged, mutants
@@ -129,10 +139,10 @@ class Exchange:
             return not session.testsfailed
 
         begin = time.monotonic()
-        if not in_fork(passes, 600):
+        if not in_fork(passes, MOST_S):
             session.testsfailed = 1
             return True
-        limit_s = 5 + 5 * (time.monotonic() - begin)
+        limit_s = patience_s(time.monotonic() - begin)
         functions = _functions_of(self._file)
         for mutant in self._mutants:
             if time.monotonic() > self._end_s:
@@ -153,7 +163,7 @@ class Exchange:
 
             _PLACE.pack_into(killer, 0, 0)
             if not in_fork(changed_passes, limit_s):
-                self._report(mutant, True)
+                self._report(mutant)
                 # what killed one may well kill the next
                 place = _PLACE.unpack_from(killer)[0]
                 session.items.insert(0, session.items.pop(place))
@@ -183,22 +193,24 @@ def _pairs(old: CodeType, new: CodeType) -> Iterable[tuple[CodeType, CodeType]]:
 
 
 def try_exchanged(
+    way: tuple[int, str],
     file: Path,
     unchanged: CodeType,
     mutants: Sequence[Mutant],
     tests: Sequence[str],
-    report: Callable[[Mutant, bool], None],
+    report: Callable[[Mutant], None],
     end_s: float,
 ) -> bool:
-    """Try mutants the quick way, in this process; reports those that are killed.
+    """Try mutants by exchanging code, in this process; reports those that are killed.
 
     Returns
     -------
     bool
         Whether the tests pass on the code as it is.
     """
-    plugins = [Spread(FEW), Exchange(file, unchanged, mutants, report, end_s)]
-    return not pytest.main([*_OPTIONS, "--hypothesis-profile=few", *tests], plugins=plugins)
+    most, profile = way
+    plugins = [Spread(most), Exchange(file, unchanged, mutants, report, end_s)]
+    return not pytest.main([*_OPTIONS, f"--hypothesis-profile={profile}", *tests], plugins=plugins)
 
 
 class _Changed(importlib.machinery.SourceFileLoader):

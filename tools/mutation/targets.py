@@ -71,8 +71,6 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ),
         "ControllerSettings: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
-        "ControllerSettings: @dataclass(frozen=True, slots=True) -> "
-        "@dataclass(frozen=True, slots=2)": _NOBODY_SETS,
         "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> ": _SET_FIRST,
         "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> "
         "self.start_ns = self.last_ns = 1": _SET_FIRST,
