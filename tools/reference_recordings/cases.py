@@ -174,8 +174,7 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
     Path
         The log.
     """
-    scenario, config = _scenario(case), _config(case)
-    seed = scenario.seed
+    scenario, config = scenario_of(case), config_of(case)
     law = build_law(config)
     retuning, estimating = works_of(config)
     head = replay_head(
@@ -186,7 +185,7 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
         options={},
         retuner=retuning is not None,
         estimating=estimating is not None,
-        seed=seed,
+        seed=scenario.seed,
     )
     # what differs from one machine and day to another is not what is compared
     about = {name: head["about"][name] for name in ("command", "configuration", "data")}
@@ -207,19 +206,26 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
             estimating=desks.estimating,
         )
         node = NodeTap(controller, sink.write, desks.taps)
-        script = tuple(TimedAction(*timed) for timed in case.script)
-        ship = build_ship_side(scenario, seed, script)
-        faulty = {each.name: FaultyNode(each) for each in ship.nodes}
-        bench = Bench(faulty, ship.plant, ship.drive, ship.valve, ship.vessel.version)
-        place_all(_FAULTS.validate_python(case.faults), bench, 0, seed)
-        nodes: list[Node] = [*faulty.values(), LateNode(node, case), *bench.joining]
-        Lockstep(nodes).run_until(round(case.seconds * 1e9))
+        ship, joining = ship_nodes(case, 0)
+        Lockstep([*ship, LateNode(node, case), *joining]).run_until(round(case.seconds * 1e9))
         node.stop(round(case.seconds * 1e9))
         sink.flush()
     return file
 
 
-def _config(case: Case) -> ControllerConfig:
+def ship_nodes(case: Case, start_ns: int) -> tuple[list[Node], list[Node]]:
+    """The nodes of the ship, whose faults count from a time, and those that come with faults."""
+    scenario = scenario_of(case)
+    script = tuple(TimedAction(*timed) for timed in case.script)
+    ship = build_ship_side(scenario, scenario.seed, script)
+    faulty = {each.name: FaultyNode(each) for each in ship.nodes}
+    bench = Bench(faulty, ship.plant, ship.drive, ship.valve, ship.vessel.version)
+    place_all(_FAULTS.validate_python(case.faults), bench, start_ns, scenario.seed)
+    return [*faulty.values()], bench.joining
+
+
+def config_of(case: Case) -> ControllerConfig:
+    """The configuration of a case's controller."""
     config = load_config(CONTROLLERS / f"{case.controller}.yaml", ControllerConfig)
     if not case.retuning:
         return config
@@ -227,7 +233,8 @@ def _config(case: Case) -> ControllerConfig:
     return config.model_copy(update={"retuning": replace(config.retuning, **case.retuning)})
 
 
-def _scenario(case: Case) -> Scenario:
+def scenario_of(case: Case) -> Scenario:
+    """The ship and the sea of a case."""
     scenario = load_config(SCENARIOS / f"{case.scenario}.yaml", Scenario)
     if not case.quiet:
         return scenario
