@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.observer_search import ObserverSearch
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.analysis.loop.scaled_law import NoLawError
@@ -20,15 +21,19 @@ from utank_hil.analysis.loop.self_tuning import (
 )
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
+from utank_hil.tick import TICK_S
 
 CONTROLLERS = Path("configs/controllers")
 SHIPPED = load_config(CONTROLLERS / "constrained_gpc.yaml", ControllerConfig)
 PLANT = SHIPPED.plant
 STORM = jonswap(4.0, 12.5)
 SEA = SeaModel(tuple(STORM.frequency_hz), tuple(STORM.density))
+BOAT_SPECTRUM = jonswap(2.0, 8.7)
+BOAT_SEA = SeaModel(tuple(BOAT_SPECTRUM.frequency_hz), tuple(BOAT_SPECTRUM.density), 0.7)
 
 
 @functools.cache
@@ -92,6 +97,32 @@ def test_another_ship_gets_a_law_with_all_margins_too():
     assert found.design.sample_time_s < SHIPPED.law.sample_time_s  # she rolls faster
     sea = unknown_sea(naval.ship)
     assert found.passive_roll_rad == pytest.approx(passive_roll_rad(naval, sea))
+
+
+@functools.cache
+def patti_b() -> tuple[DesignPlant, SelfTuned]:
+    plant = load_config(CONTROLLERS / "patti_b_constrained_gpc.yaml", ControllerConfig).plant
+    return plant, SelfTunedDesign("self_tuned", BOAT_SEA).tuned(plant)
+
+
+def test_no_oscillation_goes_on_by_itself_after_the_pump_was_at_its_limit(short_search):
+    plant, found = patti_b()
+    waves = Sea.irregular(BOAT_SPECTRUM, 1).roll_moment(
+        plant.ship.stiffness_nm_rad, EffectiveSlope(BOAT_SEA.effective_slope)
+    )
+    motion = passive_motion(plant.ship, plant.tank, waves, TICK_S, 30_001)
+    motion[:10_000] *= 4.0
+    motion[10_000:] *= 0.05
+    law, measured = found.law.controller(), found.design.measured
+    run = simulate_loop(plant, motion, law, measured, pump_gain=0.8)
+    rolls = np.abs(run.motion[:, 0])
+    assert np.abs(run.pressure_pa[:10_000]).max() > 0.79 * plant.limits.pressure_pa
+    assert rolls[15_000:].max() < 0.1 * rolls[:15_000].max()
+
+
+def test_a_heel_is_looked_for_where_the_water_leaves_the_ship_her_stability(short_search):
+    assert tuned().design.heel_std_rad > 0
+    assert patti_b()[1].design.heel_std_rad == 0
 
 
 def test_where_no_observer_has_all_margins_the_law_is_the_one_that_the_search_began_with(

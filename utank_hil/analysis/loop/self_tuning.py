@@ -5,7 +5,12 @@ greatest pressure P and level limit h:
 
 * pressure P all the time costs as much as 0.106 s^2, level h as much as 0.33 s^2;
 * white pressure disturbance 11 P s / sqrt(w), white slope 0.046 s / sqrt(w), heel 0.13 s;
-* sample time 0.1 / w, plans of 12 / w of it, level margin h / 20.
+* sample time 0.1 / w, plans of 6 / w, level margin h / 20.
+
+Where a law with these weights would swing on with the pump at its limit, pressure costs more:
+with the pump giving any smaller part of what is asked for, an oscillation may grow by
+`_MOST_GROWTH` over the length of a plan. A heel is looked for unless the water takes so much of the
+ship's stability that one can't be told from another load (`_LEAST_STIFFNESS`).
 
 What is left to choose is how far the law trusts ship and sea. As little noise of the slope is added
 as makes it stable on all ships that it must stand. From there its observer is searched for
@@ -68,6 +73,12 @@ _OTHER_SHIPS: Final = (5e-3, 5e-2)
 """Weights of the other ships in the search for the observer: the first that gives all margins."""
 _COSTLIER: Final = 3.0
 _MOST_STEPS: Final = 8
+_MOST_GROWTH: Final = 1.5
+"""Of an oscillation over a plan, with the pump at its limit; the plan foresees and prevents it."""
+_PARTS: Final = np.linspace(0.02, 1.0, 50)
+"""Of the pressure asked for that a pump at its limit gives."""
+_LEAST_STIFFNESS: Final = 1 / 3
+"""Of ship and water at her longest roll period over that as known, for a heel to be told."""
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
@@ -147,15 +158,17 @@ def self_tuned(
     """
     search, gentlest_w = _Search(plant, sea, noise, sample_time_s), math.inf
     within: SelfTuned | None = None
+    first = search.least_cost()
     for power in range(_MOST_STEPS + 1):
-        start = search.least_noise(_COSTLIER**power)
+        costlier = first * _COSTLIER**power
+        start = search.least_noise(costlier)
         if start is None:
             continue
         gentlest_w = start.prediction.power_w
         if gentlest_w > mean_power_w:
             continue
         within = within or start
-        found = search.with_better_observer(start, _COSTLIER**power)
+        found = search.with_better_observer(start, costlier)
         if found.prediction.power_w <= mean_power_w:
             return found
     if within is not None:
@@ -265,6 +278,16 @@ class _Search:
             smoothing_rad_s=_short(min(0.028 * w, 1.0)),
         )
         self._hard_cases = list(self._longest_and_shortest_period())
+        self._heel_rad = _short(0.13 * self._roll_rad) if self._tells_heel() else 0.0
+
+    def least_cost(self) -> float:
+        """Factor on the pressure's scaled weight from which the pump's limit is no danger."""
+        costlier = 1.0
+        for _ in range(_MOST_STEPS):
+            if self._growth(costlier) <= _MOST_GROWTH:
+                break
+            costlier *= math.sqrt(_COSTLIER)
+        return costlier
 
     def least_noise(self, costlier: float) -> SelfTuned | None:
         """The law with as little noise of the slope as gives it all margins, or None.
@@ -334,9 +357,27 @@ class _Search:
             pressure_weight_rad2=_short(pressure),
             level_weight_rad2_m2=_short(level),
             level_margin_m=_short(limits.level_m / 20),
-            heel_std_rad=_short(0.13 * roll),
+            heel_std_rad=self._heel_rad,
             sample_time_s=self._step_s,
         )
+
+    def _growth(self, costlier: float) -> float:
+        """Of the fastest growing oscillation over a plan, with the pump at its limit.
+
+        The motion is known, and the pump gives a part of the pressure that the law asks for.
+        """
+        design = self._design(_KNOB[0], costlier)
+        law = design.law(self._plant).unlimited()
+        a, b, gain = law.model.A[:-1, :-1], law.model.B[:-1], law.gain[:, :-1]
+        closed = a - _PARTS[:, None, None] * (b @ gain)
+        return float(np.abs(np.linalg.eigvals(closed)).max()) ** design.horizon
+
+    def _tells_heel(self) -> bool:
+        """Whether the heel under a steady moment hardly depends on how the ship is loaded."""
+        ship = self._plant.ship
+        slower = replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / PERIOD_SCALES[-1] ** 2)
+        least, known = (_steady_stiffness(each, self._plant) for each in (slower, ship))
+        return least > _LEAST_STIFFNESS * known
 
     def _longest_and_shortest_period(self) -> Iterator[tuple[LinearModel, float]]:
         """Where a law mostly fails first: at the longest and the shortest roll period."""
@@ -377,6 +418,12 @@ def _mean_positive_product(first: float, second: float, covariance: float) -> fl
         return 0.0
     r = min(max(covariance / size, -1.0), 1.0)
     return size / (2 * math.pi) * (2 * math.sqrt(1 - r**2) + 2 * r * (math.pi / 2 + math.asin(r)))
+
+
+def _steady_stiffness(ship: RollShip, plant: DesignPlant) -> float:
+    """Steady moment over the heel that it makes, the water free to move, in N m / rad."""
+    a, b = state_matrices(ship, plant.tank)
+    return -1 / float(np.linalg.solve(a, b[:, 1])[0])
 
 
 def sample_time_of(plant: DesignPlant) -> float:
