@@ -561,22 +561,25 @@ def test_of_two_motion_sensors_the_one_in_use_is_shown_and_both_are_kept() -> No
     assert line.shown() == (pytest.approx(0.4), pytest.approx(-0.1), line.now_ns)
 
 
+SPIKE = SensorMotion(0.6, -0.05, Quality.GOOD)
+
+
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "gated"),
     [
-        SensorMotion(NAN, 0.0, Quality.GOOD),
-        SensorMotion(0.0, NAN, Quality.GOOD),
-        SensorMotion(0.0, 0.0, Quality.BAD),
-        SensorMotion(0.0, 0.0, None),
-        SensorMotion(0.6, 0.0, Quality.GOOD),  # a spike
+        (SensorMotion(NAN, -0.05, Quality.GOOD), False),
+        (SensorMotion(0.1, NAN, Quality.GOOD), False),
+        (SensorMotion(0.1, -0.05, Quality.BAD), True),
+        (SensorMotion(0.1, -0.05, None), True),
+        (SPIKE, True),
     ],
 )
 @pytest.mark.parametrize("second", [False, True])
 def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(
-    wrong: SensorMotion, second: bool
+    wrong: SensorMotion, gated: bool, second: bool
 ) -> None:
-    line = RedundantLine(SpikeGates(THRESHOLDS))
-    say, sensor = (line.say, line.motions().first)
+    line = RedundantLine(SpikeGates(THRESHOLDS) if gated else None)
+    say, sensor = line.say, line.motions().first
     if second:
         line.inbox.exchange_motion(line.motions())
         say, sensor = line.say_2, line.motions().second
@@ -590,10 +593,10 @@ def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
     gates = SpikeGates(THRESHOLDS)
     line = RedundantLine(gates)
     for say in (line.say, line.say_2):
-        say(SensorMotion(0.0, 0.0, Quality.GOOD))
+        say(SensorMotion(0.0, -0.05, Quality.GOOD))
     for times, say in ((1, line.say), (3, line.say_2)):
         for _ in range(times):
-            say(SensorMotion(0.6, 0.0, Quality.GOOD))
+            say(SPIKE)
     assert [gate.discarded for gate in gates.motions] == [1, 3]
     assert gates.motion.discarded == 0
 

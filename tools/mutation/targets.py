@@ -15,6 +15,7 @@ _SAME = "the same set-point is no step either way"
 _FALSE = "None is as false as False"
 _ROUNDED = "less than a step of the set-point on the bus"
 _PHASE = "in which tick a status of every second tick comes is the same to all"
+_A_MARGIN = "levels come in millimetres, and the limit has a margin of a tenth"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
@@ -33,6 +34,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "return lambda seen: conditions if True else states": _SHORTCUT,
         "_to_look_at: return lambda seen: conditions if seen.found & mask else states -> "
         "return lambda seen: conditions if seen.found | mask else states": _SHORTCUT,
+    },
+    "utank_hil/runtime/safety_limits.py": {
+        "SafetyLimits: @dataclass(frozen=True, slots=True) -> "
+        "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
     },
     "utank_hil/control/limiter.py": {
         "CommandLimiter.limit: if math.isfinite(desired_pa + level_m + level_rate_m_s): -> "
@@ -64,6 +69,20 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
         "motion.roll_rate_rad_s) and (self._gates is None or "
         "self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
+        "Inbox._on_tank: if abs(port_m - starboard_m) <= 2 * self._most_level_m and "
+        "abs(port_m + starboard_m) <= self._most_sum_m and (self._gates is None or "
+        "self._gates.levels_pass(port_m, starboard_m, now_ns)): -> if abs(port_m - "
+        "starboard_m) < 2 * self._most_level_m and abs(port_m + starboard_m) <= "
+        "self._most_sum_m and (self._gates is None or self._gates.levels_pass(port_m, "
+        "starboard_m, now_ns)):": _A_MARGIN,
+        "Inbox._on_tank: if abs(port_m - starboard_m) <= 2 * self._most_level_m and "
+        "abs(port_m + starboard_m) <= self._most_sum_m and (self._gates is None or "
+        "self._gates.levels_pass(port_m, starboard_m, now_ns)): -> if abs(port_m - "
+        "starboard_m) <= 2 * self._most_level_m and abs(port_m + starboard_m) < "
+        "self._most_sum_m and (self._gates is None or self._gates.levels_pass(port_m, "
+        "starboard_m, now_ns)):": _A_MARGIN,
+        "Inbox._count_cycles: if since_ns > self._tank_gap_ns: -> "
+        "if since_ns >= self._tank_gap_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
         ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
@@ -100,6 +119,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "PumpDrive._permitted: if not abs(pressure_pa) <= limits.pressure_pa + "
         "ROUNDING_PA: -> if not abs(pressure_pa) < limits.pressure_pa + ROUNDING_PA:": _BETWEEN,
         "PumpDrive._permitted: return False -> return None": _FALSE,
+        "PumpDrive._permitted: return False -> return None (2)": _FALSE,
         "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
         "+ 2 * ROUNDING_PA -> return step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA": _ROUNDED,
         "PumpDrive._permitted: return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) "
