@@ -50,8 +50,9 @@ def faults(
     **Example:** utank-hil faults --rows motion,F19 --seeds 10
 
     In lockstep on all cores. Without **--full** the roll is compared over 60 s, and over
-    20 s where the controller stays in charge. Rows that need processes and an interface run with
-    **--bus** only. The exit code says whether a row failed (docs/exit-codes.md).
+    20 s where the controller stays in charge, and rows that take minutes are left out. Rows that
+    need processes and an interface run with **--bus** only. The exit code says whether a row
+    failed (docs/exit-codes.md).
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
@@ -65,12 +66,14 @@ def faults(
     loaded = load(campaign, Campaign)
     names = [name.strip() for name in rows.split(",") if name.strip()]
     chosen, live = loaded.chosen(names)
+    window = Window() if full or seeds >= FULL_SEEDS else Window(60.0, 20.0)
+    too_long = [row for row in chosen if row.long and window != Window() and not names]
+    chosen = [row for row in chosen if row not in too_long]
     if not chosen and not live:
         fail(f"--rows: no row or requirement begins with {' or '.join(names)}")
     if out is not None:
         prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
-    window = Window() if full or seeds >= FULL_SEEDS else Window(60.0, 20.0)
     bar = Progress(
         TextColumn("faults"),
         BarColumn(),
@@ -101,6 +104,7 @@ def faults(
         for each in loaded.shown_elsewhere(names)
     }
     not_run |= {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
+    not_run |= {row.id: f"takes long: --full, --rows or {FULL_SEEDS} seeds" for row in too_long}
     to_run = [row for row in live if row.does]
     if bus is None:
         not_run |= {row.id: "needs a live bus: --bus" for row in to_run}

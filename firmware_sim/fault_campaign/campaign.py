@@ -1,6 +1,7 @@
 """The campaign as a configuration: requirements, and the rows that show that they are met."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -10,6 +11,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
 from utank_hil.parameters import Finite, NotNegative, Positive, refuse
+from utank_hil.retuning import EstimateSettings
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 
@@ -56,29 +58,43 @@ class Setup(Section):
     ----------
     scenario : Scenario
     controller : str
-    wind_moment_nm : float
-        Heels her from the moment of the fault on.
+    actual_ship : dict of str to float
+        What she is from the moment of the fault on, keys as in a scenario.
     redundancy : Redundancy
         What she has beside what the scenario's vessel has.
+    displacement_n, least_gm_m : float, optional
+        Of her, instead of the vessel's.
+    sea_estimate : EstimateSettings, optional
+        Instead of the controller's.
     commissioned : bool
         Whether the controller may be armed.
     """
 
     scenario: Scenario
     controller: str
-    wind_moment_nm: Finite = 0.0
+    actual_ship: Annotated[dict[str, Finite], Field(default_factory=dict)]
     redundancy: Redundancy = NO_REDUNDANCY
+    displacement_n: Positive | None = None
+    least_gm_m: Positive | None = None
+    sea_estimate: EstimateSettings | None = None
     commissioned: bool = True
 
     @property
     def equipped(self) -> Scenario:
         """The scenario with all that the ship has."""
-        scenario = self.scenario
-        if self.redundancy == NO_REDUNDANCY:
-            return scenario
-        vessel = scenario.vessel.model_copy(update={"redundancy": self.redundancy})
+        scenario, own = self.scenario, self.scenario.vessel
+        weight_n = self.displacement_n or own.ship.displacement_n
+        vessel = own.model_copy(
+            update={
+                "redundancy": self.redundancy,
+                "ship": replace(own.ship, displacement_n=weight_n),
+                "least_gm_m": self.least_gm_m or own.least_gm_m,
+            }
+        )
         controllers = {
-            name: config.model_copy(update={"vessel": vessel})
+            name: config.model_copy(
+                update={"vessel": vessel, "sea_estimate": self.sea_estimate or config.sea_estimate}
+            )
             for name, config in scenario.controllers.items()
         }
         return scenario.model_copy(update={"vessel": vessel, "controllers": controllers})
@@ -89,12 +105,13 @@ class Setup(Section):
         return self.equipped.controllers[self.controller]
 
     def scenario_of(self, fault_s: float) -> Scenario:
-        """The scenario with the wind."""
+        """The scenario with what she is from the fault on."""
         scenario = self.equipped
-        if not self.wind_moment_nm:
+        if not self.actual_ship:
             return scenario
-        wind = {"actual_ship": {"wind_moment_nm": self.wind_moment_nm}, "actual_from_s": fault_s}
-        return scenario.model_copy(update=wind)
+        return scenario.model_copy(
+            update={"actual_ship": self.actual_ship, "actual_from_s": fault_s}
+        )
 
     @model_validator(mode="after")
     def _known(self) -> "Setup":
@@ -133,6 +150,8 @@ class Row(Section):
         is in charge.
     followed_s : float
         How long the bus is followed after the fault.
+    long : bool
+        It takes so long that it is run in many seas, or by its name, only.
     """
 
     id: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
@@ -151,6 +170,12 @@ class Row(Section):
     roll_limit: Positive = 1.05
     from_start: bool = False
     followed_s: Positive = 4.0
+    long: bool = False
+
+    @property
+    def on_bus(self) -> bool:
+        """Whether what it does is seen on the bus at once."""
+        return bool(self.faults or self.operator)
 
 
 class LiveRow(Section):

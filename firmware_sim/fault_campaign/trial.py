@@ -21,8 +21,10 @@ from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH
 from utank_hil.arrays import FloatArray
+from utank_hil.assembly import estimator_work
 from utank_hil.canbus import Fault, Mode
 from utank_hil.control import BuiltLaw
+from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.tick import TICK_NS
@@ -168,15 +170,19 @@ class Sea:
 
     def _start(self) -> Underway:
         log, recorder = BusLog(), Recorder()
+        scenario = self._setup.scenario_of(self._campaign.fault_s)
+        config = self._setup.config
+        work = estimator_work(config)
         bench = FaultyBench(
-            self._setup.scenario_of(self._campaign.fault_s),
-            self._setup.config,
+            scenario,
+            config,
             self._law,
             seed=self._seed,
             script=(TimedAction(self._campaign.arm_s, Action.ARM),),
             trace=log,
             sink=recorder if self._recorded else None,
             sink_every=SAMPLE_TICKS,
+            estimating=work and SimulatedRetuner(work[0], scenario.retuner_latency_s),
             commissioned=self._setup.commissioned,
         )
         recorder.bench = bench
@@ -184,7 +190,7 @@ class Sea:
 
     def prepare(self, rows: list[Row]) -> None:
         """Make what the rows are compared with: the bus without a fault, the passive ship."""
-        followed_s = max(row.followed_s for row in rows)
+        followed_s = max((row.followed_s for row in rows if row.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
         log = self._underway.log
         log.frames += in_a_copy(lambda: self._frames_until(end_ns))
@@ -252,8 +258,9 @@ class Sea:
         outcome.roll_variance, outcome.window_s = rolls.variance, window_s
         passive = self._passive[self._pump_enabled(bench)]
         outcome.passive_variance = float(passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS].var())
-        difference = first_difference(self._underway.reference, log.frames, watched_ns)
-        outcome.wire = "" if difference is None else _words(*difference, start_ns)
+        if row.on_bus:
+            difference = first_difference(self._underway.reference, log.frames, watched_ns)
+            outcome.wire = "" if difference is None else _words(*difference, start_ns)
         if self._recorded:
             first_s = (start_ns / SECOND_NS) - RECORDED_S
             outcome.rows = np.array([each for each in underway.recorder.rows if each[0] >= first_s])

@@ -11,6 +11,7 @@ from firmware_sim.fault_injection.place import Bench
 AnyFault = Annotated[
     signals.Stuck
     | signals.Offset
+    | signals.Scale
     | signals.Drift
     | signals.Noise
     | signals.Spikes

@@ -108,6 +108,18 @@ class Offset(SignalFault):
         return lambda values, _: [value + self.by for value in values]
 
 
+class Scale(SignalFault):
+    """The signals are too great or too small by a factor."""
+
+    kind: Literal["scale"]
+    times: Finite
+    """Of each of them."""
+
+    def change(self, seed: int) -> Change:  # noqa: ARG002
+        """As in `SignalFault`."""
+        return lambda values, _: [value * self.times for value in values]
+
+
 class Drift(SignalFault):
     """The signals run away."""
 

@@ -95,6 +95,7 @@ def test_without_faults_the_bench_is_the_plain_one() -> None:
     [
         ({"kind": "stuck"}, lambda k, true, first: first),
         ({"kind": "offset", "by": 0.01}, lambda k, true, first: true + 0.01),
+        ({"kind": "scale", "times": 1.5}, lambda k, true, first: true * 1.5),
         ({"kind": "drift", "by_per_s": 0.1}, lambda k, true, first: true + 0.001 * k),
         ({"kind": "sign"}, lambda k, true, first: -true),
         ({"kind": "spikes", "by": 0.02, "every": 10},
