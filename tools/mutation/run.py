@@ -101,10 +101,10 @@ def survivors(
         exchanged = partial(session.try_exchanged, way, file, unchanged, left, chosen)
         if not in_child(partial(exchanged, kept.add, end_s)):
             raise SystemExit(f"the tests of {target.file} fail on the code as it is: {chosen}")
-    left, limit_s = waiting(), session.MOST_S
-    if left and time.monotonic() < begin + within_s:
-        since = time.monotonic()
-        if session.fail_anew(file, unchanged, tests, limit_s):
+    left, since, limit_s = waiting(), time.monotonic(), session.MOST_S
+    if left and since < begin + within_s:
+        failed = session.fail_anew(file, unchanged, tests, min(limit_s, begin + within_s - since))
+        if failed and time.monotonic() < begin + within_s:
             raise SystemExit(f"the tests of {target.file} fail on the code as it is: {tests}")
         limit_s = session.patience_s(time.monotonic() - since)
     for mutant in left:
