@@ -27,6 +27,7 @@ from utank_hil.retuning import (
     RetuningEvent,
     ShipFigures,
 )
+from utank_hil.retuning.adaptive import AdaptiveController
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.signals import SIGNALS
@@ -136,3 +137,18 @@ def test_a_failure_of_the_estimates_is_an_event_once_and_so_is_its_end() -> None
     assert back.reasons[0] == "there are estimates of sea and ship again"
     assert "3.20 m, 9.1 s" in back.reasons[1]
     assert "3.20 m, 9.1 s" in usual.reasons[0]
+
+
+def test_every_estimate_is_handed_to_who_retunes(monkeypatch: pytest.MonkeyPatch) -> None:
+    handed: list[MotionEstimate] = []
+    monkeypatch.setattr(AdaptiveController, "note", lambda _, estimate: handed.append(estimate))
+    chosen = load_config(STORM.with_name("load_change.yaml"), Scenario)
+    config = chosen.controllers["gpc"]
+    config = config.model_copy(update={"sea_estimate": EstimateSettings(every_s=30.0)})
+    other = replace(FOUND, hs_m=2.0)
+    node = build_controller_node(
+        config, retuner=Desk(alive=False), estimating=Desk(replies=(FOUND, other))
+    )
+    ship_side = build_ship_side(chosen, 1, ())
+    Lockstep([*ship_side.nodes, node]).run_until(64_000_000_000)
+    assert handed == [FOUND, other]
