@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import combinations, pairwise
 
 import numpy as np
+from color_vision import alike
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -21,12 +22,15 @@ from matplotlib.transforms import Bbox
 SLACK_PX = 1.5
 COLOR_SLACK = 0.06
 TINT = 0.4
+A4_IN = 180 / 25.4
+"""Width between margins of 15 mm."""
+LEAST_PRINTED_PT = 6.0
 LEAST_LINE = 1.0
 """Width in points of a line whose colour must be seen: a thinner one is mixed with its ground."""
 
 
 def flaws(figure: Figure) -> list[str]:
-    """Every text that is cut or lies on another, every legend on data, every curve not seen."""
+    """Texts cut, too small, on one another; legends on data; curves not seen or not told apart."""
     image = drawn(figure)
     engine = figure.get_layout_engine()
     figure.set_layout_engine("none")  # what is hidden below must not move the rest
@@ -43,7 +47,14 @@ def flaws(figure: Figure) -> list[str]:
         for one, other in pairwise(_tick_labels(axis))
         if _common(one.get_window_extent(), other.get_window_extent())
     ]
+    printed = min(1.0, A4_IN / figure.get_figwidth())
+    found += [
+        f"too small in print: {text.get_text()!r}"
+        for text in figure.findobj(Text)
+        if text.get_text().strip() and text.get_fontsize() * printed < LEAST_PRINTED_PT
+    ]
     found += [f"not seen: {name}" for name in _not_seen(figure, image)]
+    found += [f"not told apart in grey: {names}" for names in _alike(figure)]
     found += [f"a legend covers {count} pixels of data" for count in _covered(figure) if count]
     figure.set_layout_engine(engine)
     return found
@@ -130,6 +141,22 @@ def _not_seen(figure: Figure, image: np.ndarray) -> Iterator[str]:
                 continue  # of two that are equal one lies on the other
             if np.abs(part - to_rgb(line.get_color())).max(axis=-1).min() > COLOR_SLACK:
                 yield f"{line.get_label()} in {axes.get_title(loc='left') or axes.get_ylabel()}"
+
+
+def _alike(figure: Figure) -> Iterator[str]:
+    """Named curves of one plot that differ in colour alone, and not enough for grey."""
+    for axes in figure.axes:
+        lines = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
+        strokes = [(line.get_color(), (*_dashes(line), line.get_marker())) for line in lines]
+        for i, j in alike(strokes, grey=True):
+            if not _same(lines[i], lines[j]):
+                yield f"{lines[i].get_label()} and {lines[j].get_label()}"
+
+
+def _dashes(line: Line2D) -> tuple[object, ...]:
+    """Strokes and gaps of a line; none of one that has no line."""
+    offset, strokes = line._unscaled_dash_pattern
+    return line.get_linestyle(), offset, *(strokes or ())
 
 
 def _same(one: Line2D, other: Line2D) -> bool:

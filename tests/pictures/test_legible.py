@@ -25,14 +25,18 @@ def test_a_sound_picture_has_none() -> None:
 
 
 def test_each_flaw_is_found() -> None:
-    cut, overlapping, covered, ticks, hidden = (sound() for _ in range(5))
+    cut, overlapping, covered, ticks, hidden, small, grey = (sound() for _ in range(7))
     cut.text(0.98, 0.5, "a long word")
     overlapping.text(0.5, 0.52, "one")
     overlapping.text(0.51, 0.52, "two")
     covered.axes[0].legend(loc="upper center")
     ticks.axes[0].set_xticks(np.linspace(0, 2, 15), [f"a label {n}" for n in range(15)])
     hidden.axes[0].fill_between([0, 2], [-1, -1], [2, 2], color="white", zorder=9)
+    small.text(0.5, 0.6, "tiny", fontsize=5)
+    grey.axes[0].plot([0, 1, 2], [1, 0, 1], color="#009E73", label="b")
     for figure, expected in (
+        (small, "too small in print: 'tiny'"),
+        (grey, "not told apart in grey: a and b"),
         (cut, "cut: 'a long word'"),
         (overlapping, "'one' lies on 'two'"),
         (covered, "a legend covers"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
-from utank_hil.pictures.style import COLORS, DASHES, HIGHLIGHT, WRONG, picture
+from utank_hil.pictures.style import COLORS, DASHES, HIGHLIGHT, WIDEST_IN, WRONG, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,8 +28,8 @@ _LANES: Final[dict[int, tuple[str, float]]] = {
     RetuningState.UNDONE: ("undone", 0.1),
 }
 """Label and opacity of each retuning state."""
-_NAMED_SHARE: Final = 0.07
-"""Shortest labelled section of a lane, relative to the axis."""
+_LETTER: Final = 0.014
+"""Width of a letter in a lane, relative to the axis: a section that is too short has no label."""
 _LABELS: Final = ("Roll (°)", "Tank level (m)", "Pump pressure (kPa)")
 
 
@@ -126,8 +126,8 @@ def draw_bench(
     lane = 0.25 * sum(curve.retuning is not None for curve in curves)
     curves_in = 6.6 + (0.6 + lane if retuning else 0.0)
     bars_in = 0.8 + 0.32 * len(bars) if bars else 0.0
-    lines = [line for each in wrong for line in wrap(each, 130)]
-    size_in = (13.0 if len(spans) > 1 else 9.0, curves_in + bars_in + 0.24 * len(lines))
+    lines = [line for each in wrong for line in wrap(each, 120)]
+    size_in = (WIDEST_IN if len(spans) > 1 else 9.0, curves_in + bars_in + 0.24 * len(lines))
     with picture(path, title, size_in, about) as whole_figure:
         figure: Figure | SubFigure = whole_figure
         if bars:
@@ -292,14 +292,14 @@ def _draw_lanes(axis: "Axes", curves: Sequence[BenchCurve], span_s: tuple[float,
                 alpha=strength,
                 lw=0,
             )
-            if end_s - begin_s > _NAMED_SHARE * (span_s[1] - span_s[0]):
+            if end_s - begin_s > len(name) * _LETTER * (span_s[1] - span_s[0]):
                 axis.text(
                     (begin_s + end_s) / 2 / unit_s,
                     place,
                     name,
                     ha="center",
                     va="center",
-                    fontsize=8,
+                    fontsize=9,
                     color="white" if strength > 0.6 else "black",
                 )
     axis.set_ylim(len(lanes) - 0.4, -0.6)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from utank_hil.pictures.style import BELOW, COLORS, picture
+from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,15 +61,15 @@ def draw_campaign(
     """
     along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
     height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)
-    with picture(path, title, (12.0, max(height, 4.5)), about) as figure:
+    with picture(path, title, (WIDEST_IN, max(height, 4.5)), about) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
         for number, run in enumerate(runs):
-            color = COLORS[number % len(COLORS)]
+            color, dash = COLORS[number % len(COLORS)], DASHES[number % len(COLORS)]
             if along:
-                _curve(left, np.array(groups, dtype=float), run, color)
+                _curve(left, np.array(groups, dtype=float), run, color, dash)
             else:
                 _bars(left, number / max(len(runs), 1), run, color)
-            _exceedance(right, run, color)
+            _exceedance(right, run, color, dash)
         if along:
             left.set_xlabel(axis)
             left.set_ylabel("Roll RMS (°), 95 % interval of the mean")
@@ -85,10 +85,14 @@ def draw_campaign(
     return path
 
 
-def _curve(axes: "Axes", at: "np.ndarray[Any, Any]", run: CampaignRun, color: str) -> None:
+def _curve(
+    axes: "Axes", at: "np.ndarray[Any, Any]", run: CampaignRun, color: str, dash: Any
+) -> None:
     order = np.argsort(at)
     mean, width = (np.degrees(np.array(each))[order] for each in (run.mean_rad, run.half_width_rad))
-    axes.plot(at[order], mean, color=color, marker="o", markersize=4, label=run.name)
+    axes.plot(
+        at[order], mean, color=color, linestyle=dash, marker="o", markersize=4, label=run.name
+    )
     axes.fill_between(at[order], mean - width, mean + width, color=color, alpha=0.12, linewidth=0)
 
 
@@ -102,9 +106,11 @@ def _bars(axes: "Axes", shift: float, run: CampaignRun, color: str) -> None:
     )  # fmt: skip
 
 
-def _exceedance(axes: "Axes", run: CampaignRun, color: str) -> None:
+def _exceedance(axes: "Axes", run: CampaignRun, color: str, dash: Any) -> None:
     rolls = np.sort([math.degrees(roll) for roll in run.rolls_rad])
     if len(rolls):
         above = 1.0 - np.arange(len(rolls)) / len(rolls)
         mark = "o" if rolls[0] == rolls[-1] else None  # a step has no width then
-        axes.step(rolls, above, where="pre", color=color, label=run.name, marker=mark)
+        axes.step(
+            rolls, above, where="pre", color=color, linestyle=dash, label=run.name, marker=mark
+        )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from utank_hil.analysis.capsize.maps import CapsizeMap
-from utank_hil.pictures.style import COLORS, picture
+from utank_hil.pictures.style import COLORS, DASHES, WIDEST_IN, picture
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -36,17 +36,18 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
     """
     if not 1 <= len(maps) <= len(COLORS):
         raise ValueError(f"can draw 1 to {len(COLORS)} maps in one picture, got {len(maps)}")
-    with picture(path, title, (4.6 * (len(maps) + 1), 5.4)) as figure:
+    with picture(path, title, (min(4.6 * (len(maps) + 1), WIDEST_IN), 5.0)) as figure:
         *planes, curves = figure.subplots(1, len(maps) + 1)
         for axes, each in zip(planes, maps, strict=True):
             _draw_plane(axes, each)
         planes[0].set_ylabel("Roll rate (°/s)")
-        figure.legend(handles=_legend_handles(), loc="outside lower left", ncols=5, frameon=False)
-        for color, each in zip(COLORS, maps, strict=False):
+        figure.legend(handles=_legend_handles(), loc="outside lower left", ncols=3, frameon=False)
+        for color, dash, each in zip(COLORS, DASHES, maps, strict=False):
             curves.plot(
                 each.amplitude_nm / 1e3,
                 100 * each.area,
                 color=color,
+                linestyle=dash,
                 linewidth=1.8,
                 label=each.name,
             )
@@ -62,7 +63,9 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
         curves.set_xlabel("Wave moment (kN m)")
         curves.set_ylabel("Area of the safe basin, of that in calm water (%)")
         curves.set_title("Erosion", loc="left", fontsize=10)
-        curves.legend(frameon=False, loc="upper right")
+        curves.legend(
+            frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.06), borderaxespad=0.0
+        )
     return path
 
 

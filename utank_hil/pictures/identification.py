@@ -16,7 +16,7 @@ from utank_hil.identification import (
     hankel_singular_values,
     stabilization,
 )
-from utank_hil.pictures.style import COLORS, picture
+from utank_hil.pictures.style import COLORS, DASHES, WIDEST_IN, picture
 from utank_hil.retuning.record_length import estimation_samples
 from utank_hil.retuning.redesign import Identification, RetuningTask
 
@@ -66,7 +66,7 @@ def draw_identification(
         "ARX model": np.linalg.solve(left, np.einsum("wi,iab->wab", powers, arx.beta)),
         "identified ship": _ship_response(task, found.plant(task), z),
     }
-    with picture(path, title, (12.0, 8.0), about) as figure:
+    with picture(path, title, (WIDEST_IN, 7.5), about) as figure:
         (above, bode), (residuals, modes) = figure.subplots(2, 2)
         above.plot(time_s, np.rad2deg(measured_roll), color=COLORS[0], label="measured")
         above.plot(time_s, np.rad2deg(predicted), color=COLORS[1], lw=1.0, label="predicted")
@@ -83,6 +83,7 @@ def draw_identification(
                 np.arange(1, len(correlation) + 1) * step_s,
                 correlation[:, column],
                 color=COLORS[1 + column],
+                linestyle=DASHES[1 + column],
                 marker=".",
                 label=name,
             )

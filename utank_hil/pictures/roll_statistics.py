@@ -8,7 +8,7 @@ import numpy as np
 
 from utank_hil.analysis.motion.exceedance import exceedance
 from utank_hil.arrays import FloatArray
-from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, picture
+from utank_hil.pictures.style import COLORS, DASHES, NO_TANK, WIDEST_IN, picture
 
 SEGMENT_S: Final = 200.0
 """Of Welch's spectra: 0.03 rad/s apart."""
@@ -36,7 +36,7 @@ def draw_roll_statistics(
 
     colors = [NO_TANK, *COLORS] if "no tank" in rolls else list(COLORS)
     dashes = ["-", *DASHES] if "no tank" in rolls else list(DASHES)
-    with picture(path, title, (13.0, 4.6)) as figure:
+    with picture(path, title, (WIDEST_IN, 4.4)) as figure:
         spectra, shares = figure.subplots(1, 2)
         for (name, roll_rad), color, dash in zip(rolls.items(), colors, dashes, strict=False):
             degrees = np.rad2deg(roll_rad)

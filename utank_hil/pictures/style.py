@@ -23,16 +23,28 @@ COLORS: Final = (
     "#E69F00",
     "#000000",
 )
-DASHES: Final = ("-", "-", (0, (5, 1.5)), (0, (1.5, 1)), (0, (6, 1.5, 1, 1.5)), "-", "-", "-")
+DASHES: Final = (
+    "-",
+    "-",
+    (0, (5, 1.5)),
+    (0, (1.5, 1)),
+    (0, (6, 1.5, 1, 1.5)),
+    "-",
+    (0, (4, 1, 1, 1, 1, 1)),
+    "-",
+)
 """Of the curves with these colours, so that they can be distinguished in print without them."""
 DPI: Final = 130
+TEXT_PT: Final = 10.0
+WIDEST_IN: Final = 10.0
+"""Of a picture: printed on A4, its words are still of seven points."""
 BELOW: "Final[dict[str, Any]]" = {"loc": "outside lower left", "ncols": 4, "frameon": False}
 """Where a legend covers no data."""
 NO_TANK: Final = "#BBBBBB"
 WRONG: Final = "#A40000"
 HIGHLIGHT: Final = "#F0E442"
 STYLE: "Final[dict[RcKeyType, Any]]" = {
-    "font.size": 10.0,
+    "font.size": TEXT_PT,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": "#888888",

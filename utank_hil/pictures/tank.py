@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollCurves, SweepPoint
-from utank_hil.pictures.style import COLORS, picture
+from utank_hil.pictures.style import BELOW, COLORS, DASHES, WIDEST_IN, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ def draw_tank(
     about : mapping, optional
         As in `picture`.
     """
-    with picture(path, title, (12.0, 5.0), about) as figure:
+    with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
         waves.fill_between(
             curves.sea_period_s,
@@ -44,25 +44,25 @@ def draw_tank(
             label="energy of the wave moment",
         )
         rolls = (curves.without_tank, curves.passive, curves.active)
-        for roll, name, color in zip(rolls, _NAMES, COLORS, strict=False):
+        for roll, name, color, dash in zip(rolls, _NAMES, COLORS, DASHES, strict=False):
             if roll is not None:
-                waves.plot(curves.period_s, roll, color=color, label=name)
+                waves.plot(curves.period_s, roll, color=color, linestyle=dash, label=name)
         waves.set_xlabel("Wave period (s)")
         waves.set_ylabel("Roll per effective wave slope")
-        waves.legend(frameon=False)
         scales = [point.period_scale for point in loadings]
         series: tuple[Sequence[float | None], ...] = (
             [point.without_tank_rad for point in loadings],
             [point.passive_rad for point in loadings],
             [point.active_rad for point in loadings],
         )
-        for values, name, color in zip(series, _NAMES, COLORS, strict=False):
+        for values, color, dash in zip(series, COLORS, DASHES, strict=False):
             known = [np.nan if value is None else np.degrees(value) for value in values]
             if not np.isnan(known).all():
-                loading.plot(scales, known, "o-", color=color, label=name)
+                loading.plot(scales, known, marker="o", color=color, linestyle=dash)
         loading.set_ylim(bottom=0)
         loading.set_xlabel("Roll period, times the ship's: tank and law as they are")
         loading.set_ylabel("Roll RMS in the sea (°)")
+        figure.legend(*waves.get_legend_handles_labels(), **BELOW)
     return path
 
 
@@ -83,7 +83,7 @@ def draw_sweep(
     about : mapping, optional
         As in `picture`.
     """
-    with picture(path, title, (12.0, 5.0), about) as figure:
+    with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         passive = figure.add_subplot(1, 2, 1)
         active = figure.add_subplot(1, 2, 2, sharey=passive)
         _draw_shares(passive, points, [p.prediction.passive.roll_rms_rad for p in points])
@@ -98,7 +98,7 @@ def draw_sweep(
         )
         passive.set_ylabel("Roll RMS in the sea (°)")
         passive.set_ylim(bottom=0)
-        passive.legend(frameon=False, title="Stability taken", fontsize=9)
+        figure.legend(*passive.get_legend_handles_labels(), title="Stability taken", **BELOW)
     return path
 
 
@@ -108,8 +108,9 @@ def _draw_shares(axes: "Axes", points: Sequence[SweepPoint], roll_rad: Sequence[
         axes.plot(
             [points[index].frequency_ratio for index in of],
             np.degrees([roll_rad[index] for index in of]),
-            "o-",
+            marker="o",
             color=COLORS[(number + 1) % len(COLORS)],
+            linestyle=DASHES[(number + 1) % len(COLORS)],
             label=f"{share:.0%}",
         )
     axes.set_xlabel("Frequency of the water per roll frequency")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from utank_hil.pictures.style import COLORS, HIGHLIGHT, picture
+from utank_hil.pictures.style import COLORS, HIGHLIGHT, WIDEST_IN, picture
 from utank_hil.thesis.figure import Curve, Figure, Panel
 
 if TYPE_CHECKING:
@@ -16,10 +16,12 @@ _STROKES: Final[tuple[dict[str, Any], ...]] = (
     {"color": COLORS[0], "linestyle": "-", "marker": "o"},
     {"color": COLORS[1], "linestyle": "-", "marker": "s"},
     {"color": COLORS[2], "linestyle": (0, (6, 2)), "marker": "^"},
-    {"color": COLORS[3], "linestyle": (0, (4, 1.5, 1, 1.5)), "marker": "D"},
+    {"color": COLORS[6], "linestyle": (0, (4, 1.5, 1, 1.5)), "marker": "D"},
 )
-"""Told apart in grey too: by their strokes."""
+"""Told apart in grey too: by their strokes, and where all are whole, by their lightness."""
 _COLORS: Final = 48
+_LETTERS: Final = 22
+"""Of the longest names of which a legend has two beside one another, in a half of a picture."""
 _DENSE: Final = 6
 """Swings of a curve from which on its panel has whole strokes."""
 
@@ -37,11 +39,13 @@ def draw_figure(figure: Figure, path: Path, title: str) -> None:
     """
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)
-    size_in = (5.8 * columns, 0.5 + 3.9 * rows) if columns > 1 else (8.0, 0.5 + 3.3 * rows)
+    size_in = (
+        (WIDEST_IN / 2 * columns, 0.5 + 3.9 * rows) if columns > 1 else (8.0, 0.5 + 3.3 * rows)
+    )
     with picture(path, title, size_in) as canvas:
         axes = canvas.subplots(rows, columns, squeeze=False).ravel()
         for axis, panel in zip(axes, figure.panels, strict=False):
-            _draw_panel(axis, panel)
+            _draw_panel(axis, panel, halved=columns > 1)
         for axis in axes[len(figure.panels) :]:
             axis.set_visible(False)
     _shrink(path)
@@ -56,7 +60,7 @@ def _shrink(path: Path) -> None:
     few.save(path, optimize=True)
 
 
-def _draw_panel(axis: "Axes", panel: Panel) -> None:
+def _draw_panel(axis: "Axes", panel: Panel, *, halved: bool) -> None:
     if panel.span is not None:
         axis.axvspan(*panel.span, color=HIGHLIGHT, alpha=0.35, linewidth=0, label=panel.span_label)
     dense = any(_dense(curve) for curve in panel.curves)
@@ -80,7 +84,7 @@ def _draw_panel(axis: "Axes", panel: Panel) -> None:
         loc="lower left",
         bbox_to_anchor=(-0.01, 1.0),
         borderaxespad=0.2,
-        ncols=2,
+        ncols=1 if halved and max(len(curve.label) for curve in panel.curves) > _LETTERS else 2,
         frameon=False,
         title=panel.title,
         alignment="left",

@@ -9,7 +9,7 @@ import numpy as np
 
 from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
 from utank_hil.analysis.loop.trade import Trade, TradePoint
-from utank_hil.pictures.style import BELOW, COLORS, HIGHLIGHT, picture
+from utank_hil.pictures.style import BELOW, COLORS, HIGHLIGHT, WIDEST_IN, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ def draw_trade(
     points = [point for point in trade.points if point.motion is not None]
     if not points:
         raise ValueError("no law of this trade is stable on its own ship: nothing to draw")
-    with picture(path, title, (13.0, 7.5), about) as figure:
+    with picture(path, title, (WIDEST_IN, 7.0), about) as figure:
         axes = figure.subplot_mosaic(
             [["trade", "radius"], ["trade", "pressure"], ["trade", "level"]],
             width_ratios=(1.45, 1),
