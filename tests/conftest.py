@@ -19,6 +19,7 @@ from utank_hil.runtime import process_priority
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from playwright.sync_api import Browser
 
 # machines are shared: an example that takes long says nothing about the code
 settings.register_profile("search", deadline=None, print_blob=True)
@@ -42,6 +43,15 @@ def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     monkeypatch.setattr(style, "_save", looked_at)
     yield
     assert not found, "\n".join(found)
+
+
+@pytest.fixture(scope="module")
+def browser() -> "Iterator[Browser]":
+    """Headless Chromium (`browsing`)."""
+    from browsing import launched
+
+    with launched() as started:
+        yield started
 
 
 @pytest.fixture(autouse=True, scope="module")

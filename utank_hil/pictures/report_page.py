@@ -6,6 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from utank_hil.pictures.style import DPI, TEXT_PT
+
+LEAST_TEXT_PX: Final = 9.0
+TEXT_PX: Final = TEXT_PT / 72 * DPI
+"""Of a picture's words as it was drawn."""
 _TEMPLATE: Final = Path(__file__).with_name("report.html.jinja")
 
 
@@ -47,6 +52,11 @@ class ReportPicture:
     def base64(self) -> str:
         """The content as the page holds it."""
         return base64.b64encode(self.png).decode()
+
+    @property
+    def least_px(self) -> int:
+        """Width below which its words would be too small: a narrow screen scrolls sideways."""
+        return round(int.from_bytes(self.png[16:20]) * LEAST_TEXT_PX / TEXT_PX)
 
 
 @dataclass(frozen=True, slots=True)
