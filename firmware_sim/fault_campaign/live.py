@@ -9,19 +9,24 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import can
+from can.interfaces.socketcan import SocketcanBus
+
 from firmware_sim.fault_campaign.campaign import LiveRow
+from firmware_sim.fault_campaign.live_log import HELD_UP_S, LiveLog, LiveTimes, Stream, times_of
 from utank_hil.canbus import (
     ControllerStatus,
     DriveState,
     DriveStatus1,
+    Frame,
     Mode,
-    PortError,
-    SocketCanPort,
+    PumpCommand,
+    SensorMotion,
     load_catalogue,
 )
 from utank_hil.commands.common import CONFIGS
@@ -32,11 +37,14 @@ START_S: Final = 180.0
 """In an emulated kernel imports take long."""
 STARTS: Final = 3
 """A machine that holds processes up may end the run before there is a fault to be tried."""
+ATTEMPTS: Final = 3
+"""And may spoil what is judged."""
 DRIVEN_PA: Final = 5e3
 WATCHED_S: Final = 3.0
 RESTED_S: Final = 1.0
 _RECENT_S: Final = 0.5
 _LOOK_S: Final = 0.002
+_EXTENDED_MASK: Final = 0x1FFFFFFF
 _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
 """An error frame that says bus-off, as a kernel's driver hands it on."""
 
@@ -65,7 +73,18 @@ class LiveBench:
         catalogue = load_catalogue()
         self._status = catalogue.receiver(ControllerStatus)
         self._drive = catalogue.receiver(DriveStatus1)
-        self._port = SocketCanPort(bus, [self._status.can_id, self._drive.can_id])
+        self.log = LiveLog()
+        self._streams = {
+            catalogue.codec(PumpCommand).can_id: self.log.commands,
+            catalogue.codec(SensorMotion).can_id: self.log.motions,
+        }
+        heard = (self._status.can_id, self._drive.can_id, *self._streams)
+        # not a port of ours, since it does not tell the kernel's time of a frame
+        self._bus = SocketcanBus(
+            bus,
+            can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
+                         for each in heard],
+        )  # fmt: skip
         self.mode: Mode | None = None
         self.fault = ""
         self._status_s = -math.inf
@@ -91,23 +110,32 @@ class LiveBench:
                 process.send_signal(signal.SIGCONT)
                 process.kill()
             process.wait()
-        self._port.close()
+        self._bus.shutdown()
 
     def look(self) -> None:
         """Hear what came."""
         time.sleep(_LOOK_S)
-        try:
-            frames = self._port.receive()
-        except PortError:
-            return
-        for frame in frames:
-            if frame.can_id == self._status.can_id:
+        for message in self._heard():
+            time_s = message.timestamp
+            frame = Frame(message.arbitration_id, bytes(message.data))
+            if frame.can_id in self._streams:
+                self._streams[frame.can_id].append(time_s)
+            elif frame.can_id == self._status.can_id:
                 status = self._status.accept(frame)
                 if status is not None:
-                    self.mode, self._status_s = status.mode, time.monotonic()
+                    self.mode, self._status_s = status.mode, time_s
                     self.fault = "" if status.fault is None else status.fault.name
+                    self.log.modes.append((time_s, status.mode))
             elif (drive := self._drive.accept(frame)) is not None:
                 self.state, self.pressure_pa = drive.state, drive.pressure_pa
+                self.log.states.append((time_s, drive.state))
+
+    def _heard(self) -> Iterator[can.Message]:
+        """Messages since the last call; none while the interface is down."""
+        with suppress(can.CanError, OSError):
+            while (message := self._bus.recv(0)) is not None:
+                if not message.is_error_frame:
+                    yield message
 
     def wait_in_charge(self) -> None:
         """Wait until the pump gives pressure.
@@ -135,23 +163,17 @@ class LiveBench:
     @property
     def in_charge(self) -> bool:
         """Whether the controller says so at present."""
-        return self.mode is Mode.ACTIVE and time.monotonic() - self._status_s < _RECENT_S
+        return self.mode is Mode.ACTIVE and time.time() - self._status_s < _RECENT_S
 
-    def watch(self, later: Later = None) -> tuple[float | None, float | None]:
-        """Look on; ms until the controller faults, and until the drive no longer is enabled."""
+    def watch(self, later: Later = None) -> float:
+        """Look on; the time at the end."""
         began_s = time.monotonic()
-        found: float | None = None
-        zero: float | None = None
         while (since_s := time.monotonic() - began_s) < WATCHED_S:
             self.look()
             if later is not None and since_s >= later[0]:
                 later[1]()
                 later = None
-            if found is None and self.mode is Mode.FAULT:
-                found = round(1e3 * since_s, 1)
-            if zero is None and self.state is not DriveState.OPERATION_ENABLED:
-                zero = round(1e3 * since_s, 1)
-        return found, zero
+        return time.time()
 
 
 def controller_killed(bench: LiveBench) -> Later:
@@ -204,19 +226,17 @@ def bus_off(bench: LiveBench) -> Later:
     return None
 
 
-ACTIONS: Final[dict[str, Callable[[LiveBench], Later]]] = {
-    each.__name__: each
-    for each in (
-        controller_killed,
-        controller_stopped,
-        controller_stopped_for_a_second,
-        controller_hung_up,
-        controller_terminated,
-        ship_killed,
-        ship_stopped_for_a_second,
-        bus_off,
-    )
+ACTIONS: Final[dict[str, tuple[Callable[[LiveBench], Later], Stream | None]]] = {
+    "controller_killed": (controller_killed, "commands"),
+    "controller_stopped": (controller_stopped, "commands"),
+    "controller_stopped_for_a_second": (controller_stopped_for_a_second, "commands"),
+    "controller_hung_up": (controller_hung_up, None),
+    "controller_terminated": (controller_terminated, None),
+    "ship_killed": (ship_killed, "motions"),
+    "ship_stopped_for_a_second": (ship_stopped_for_a_second, "motions"),
+    "bus_off": (bus_off, None),
 }
+"""What is done, and the stream that ends with it."""
 
 
 @contextmanager
@@ -257,37 +277,53 @@ def run_live(row: LiveRow, bus: str, requirement: str) -> dict[str, Any]:
     OSError
         If the interface can't be used.
     """
-    problems = []
-    found: float | None = None
-    zero: float | None = None
-    code = ""
-    mode: Mode | None = None
-    state: DriveState | None = None
-    try:
-        with _in_charge(bus) as bench:
-            found, zero = bench.watch(ACTIONS[row.does](bench))
-            code, mode, state = bench.fault, bench.mode, bench.state
-            if bench.in_charge:
-                problems.append("in charge again in the end")
-    except LiveError as error:
-        problems.append(str(error))
-    judged = found if row.judged == "found" else zero
-    if not problems and judged is None:
-        problems.append("was not found" if row.judged == "found" else "the drive went on")
-    elif judged is not None and row.within_ms is not None and judged > row.within_ms:
-        problems.append(f"after {judged:.0f} ms, {row.within_ms:.0f} allowed")
+    for attempt in range(1, ATTEMPTS + 1):
+        told, held_up_ms = _attempt(row, bus)
+        if not told["problems"] or held_up_ms <= 1e3 * HELD_UP_S:
+            break
+        held_up = f"the machine held processes up for {held_up_ms:.0f} ms, attempt {attempt}"
+        told["problems"].append(held_up)
     return {
         "id": row.id,
         "meets": list(row.meets),
         "requirement": requirement,
         "reaction": row.judged,
-        "found_ms": found,
-        "zero_ms": zero,
         "limit_ms": row.within_ms,
-        "verdict": "fail" if problems else "pass",
+        "verdict": "fail" if told["problems"] else "pass",
+        "roll_ratio": None,
+        "recording": None,
+        **told,
+    }
+
+
+def _attempt(row: LiveRow, bus: str) -> tuple[dict[str, Any], float]:
+    """Do a live row once: what came of it, and the ms for which processes were held up."""
+    problems = []
+    times = LiveTimes(None, None, 0.0)
+    code = ""
+    mode: Mode | None = None
+    state: DriveState | None = None
+    act, silences = ACTIONS[row.does]
+    try:
+        with _in_charge(bus) as bench:
+            fault_s = time.time()
+            end_s = bench.watch(act(bench))
+            times = times_of(bench.log, fault_s, end_s, silences=silences, judged=row.judged)
+            code, mode, state = bench.fault, bench.mode, bench.state
+            if bench.in_charge:
+                problems.append("in charge again in the end")
+    except LiveError as error:
+        problems.append(str(error))
+    judged = times.found_ms if row.judged == "found" else times.zero_ms
+    if not problems and judged is None:
+        problems.append("was not found" if row.judged == "found" else "the drive went on")
+    elif judged is not None and row.within_ms is not None and judged > row.within_ms:
+        problems.append(f"after {judged:.0f} ms, {row.within_ms:.0f} allowed")
+    told = {
+        "found_ms": times.found_ms,
+        "zero_ms": times.zero_ms,
         "problems": problems,
         "codes": [code] if code and code != "NONE" else [],
         "wire": f"at the end {mode!r}, drive {state!r}",
-        "roll_ratio": None,
-        "recording": None,
     }
+    return told, times.held_up_ms

@@ -1,0 +1,106 @@
+"""What follows from the frames of a live bus: from logs made by hand."""
+
+from pathlib import Path
+
+import pytest
+
+from firmware_sim.fault_campaign import live
+from firmware_sim.fault_campaign.campaign import Campaign, LiveRow
+from firmware_sim.fault_campaign.live_log import LiveLog, LiveTimes, times_of
+from utank_hil.canbus import DriveState, Mode
+from utank_hil.configuration import load_config
+
+ROWS = {row.id: row for row in load_config(Path("configs/faults/campaign.yaml"), Campaign).live}
+FAULT_S = 100.0
+OFF = DriveState.FAULT
+
+
+def every(cycle_s: float, begin_s: float, end_s: float) -> list[float]:
+    return [begin_s + index * cycle_s for index in range(round((end_s - begin_s) / cycle_s))]
+
+
+def log_of(
+    commands: list[float] | None = None,
+    motions: list[float] | None = None,
+    off_s: float = 1e9,
+    faulted_s: float = 1e9,
+) -> LiveLog:
+    """A log from 99 s to 103 s."""
+    return LiveLog(
+        every(0.02, 99.0, 103.0) if commands is None else commands,
+        every(0.01, 99.0, 103.0) if motions is None else motions,
+        [(t, Mode.FAULT if t >= faulted_s else Mode.ACTIVE) for t in every(0.1, 99.0, 103.0)],
+        [(t, OFF if t >= off_s else DriveState.OPERATION_ENABLED) for t in every(0.02, 99.0, 103)],
+    )
+
+
+def told(log: LiveLog, **changed: object) -> LiveTimes:
+    chosen = {"silences": "commands", "judged": "zero", **changed}
+    return times_of(log, FAULT_S, 103.0, **chosen)  # type: ignore[arg-type]
+
+
+def test_times_count_from_the_last_frame_of_who_was_silenced() -> None:
+    sent = every(0.02, 99.0, 100.0)
+    log = log_of(sent, off_s=100.071)
+    assert told(log).zero_ms == pytest.approx(100.08e3 - 99.98e3, abs=0.1)
+    late = log_of(
+        [*every(0.02, 99.0, 99.985), 100.002, 101.1], off_s=100.071
+    )  # on its way; SIGCONT
+    assert told(late).zero_ms == pytest.approx(78.0, abs=0.1)
+
+
+def test_times_count_from_the_signal_where_nobody_is_silenced() -> None:
+    times = told(log_of(off_s=100.25, faulted_s=100.1), silences=None)
+    assert times.zero_ms == pytest.approx(260.0, abs=0.1)
+    assert times.found_ms == pytest.approx(100.0, abs=0.1)
+
+
+def test_what_was_off_before_the_fault_does_not_count() -> None:
+    log = log_of()
+    log.states.insert(0, (99.5, OFF))
+    log.modes.insert(0, (99.5, Mode.FAULT))
+    assert told(log) == LiveTimes(None, None, 0.0)
+
+
+@pytest.mark.parametrize("judged", ["found", "zero"])
+def test_a_process_that_was_held_up_shows_in_its_frames(judged: str) -> None:
+    motions = [t for t in every(0.01, 99.0, 103.0) if not 100.02 < t < 100.2]
+    log = log_of(motions=motions, off_s=100.21, faulted_s=100.3)
+    assert told(log, judged=judged).held_up_ms == pytest.approx(170.0, abs=0.2)
+    after = [t for t in every(0.01, 99.0, 103.0) if not 100.5 < t < 100.9]
+    assert told(log_of(motions=after, off_s=100.21, faulted_s=100.3)).held_up_ms < 0.2
+    # the silence that was made is no holding up
+    silent = log_of(motions=every(0.01, 99.0, 100.0), faulted_s=100.15)
+    times = told(silent, silences="motions", judged="found")
+    assert times.held_up_ms < 0.2
+    assert times.found_ms == pytest.approx(210.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("attempts", "verdict", "tried"),
+    [
+        ([([], 500.0)], "pass", 1),
+        ([(["after 130 ms"], 0.0)], "fail", 1),
+        ([(["after 130 ms"], 40.0), ([], 0.0)], "pass", 2),
+        ([(["after 130 ms"], 40.0), (["after 140 ms"], 0.0)], "fail", 2),
+        ([(["after 130 ms"], 40.0)] * 4, "fail", 3),
+    ],
+)
+def test_only_what_the_machine_spoilt_is_tried_again(
+    monkeypatch: pytest.MonkeyPatch,
+    attempts: list[tuple[list[str], float]],
+    verdict: str,
+    tried: int,
+) -> None:
+    waiting = list(attempts)
+
+    def attempt(row: LiveRow, bus: str) -> tuple[dict[str, object], float]:
+        problems, held_up_ms = waiting.pop(0)
+        return {"problems": [*problems]}, held_up_ms
+
+    monkeypatch.setattr(live, "_attempt", attempt)
+    row = live.run_live(ROWS["live-controller-killed"], "vcan0", "")
+    assert row["verdict"] == verdict
+    assert len(attempts) - len(waiting) == tried
+    held_up = any("the machine held processes up for 40 ms" in each for each in row["problems"])
+    assert held_up is (tried == 3)
