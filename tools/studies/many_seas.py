@@ -1,19 +1,26 @@
 """Shares of the possible in many seas: the shipped laws beside the one that designs itself.
 
-    python -m tools.studies.many_seas --seconds 900 --seeds 2
+    python -m tools.studies.many_seas --seconds 900 --seeds 3
 
 The first ship, linear, with the sensors, delay, lag and limiters of the bench, in sixteen seas of
-ordinary weather, storm and formulas, and in twelve more: swell from afar, two systems at once,
-short and steep seas. The self-tuned law is given each sea's spectrum; the last column is the same
-law without it. Share is the part of the way from the passive tank to the clairvoyant bound.
+ordinary weather, storm and formulas, and in more: swell from afar, two systems at once, short and
+steep seas; the storm on other headings at speed, and with the ship loaded for 0.7 to 1.3 of her
+roll period. The self-tuned law is given the waves as they meet the ship, and the ship; "no sea
+known" is the same law without the waves. Share is the part of the way from the passive tank to the
+clairvoyant bound; no law that does not know the waves to come exceeds that of the causal bound.
 """
 
 import math
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from typing import Final
 
 import numpy as np
 
 from tools.printing import show
+from tools.studies.model_errors import of_period
 from tools.studies.trial_setup import (
     STORM_HOUR,
     chosen,
@@ -25,16 +32,59 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
 )
+from utank_hil.analysis.loop.causal_bound import CausalProblem, causal_bound
 from utank_hil.analysis.loop.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.sea import Spectrum, jonswap
+from utank_hil.one_thread import one_thread_each
+from utank_hil.sea import EffectiveSlope, Sea, Spectrum, jonswap
 
 GPC, CONSTRAINED, TUNED, UNTOLD = "GPC, roll", "constrained", "self-tuned", "no sea known"
 LAWS: Final = (GPC, CONSTRAINED, TUNED, UNTOLD)
 HOURS: Final = (
     *("06T08", "06T20", "07T08", "07T20", "08T08", "09T04", "09T12", "09T19"),
 )  # of February 2019, significant heights of 0.65 to 1.4 m
+SIXTEEN: Final = 16
+PERIODS: Final = (0.7, 0.85, 1.15, 1.3)
+"""Of the ship's roll period, by her loading."""
+HEADINGS_DEG: Final = {"nearly following": 20.0, "quartering": 45.0, "bow": 135.0}
+SPEED_M_S: Final = 6.0
+CAUSAL: Final = "causal bound"
+CAUSAL_RECORDS: Final = 6
+CAUSAL_RECORD_S: Final = 600.0
+CAUSAL_SEA: Final = {"order": 24, "floor": 1e-3}
+_STEP_RAD_S: Final = 0.01
+_COMPONENTS: Final = 16384
+"""Of the sea whose waves the law is told as they meet the ship."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sea, and the ship in it."""
+
+    sea: Spectrum
+    ship: TrialShip
+
+    def model(self, **settings: float) -> SeaModel:
+        """The effective slope over encounter frequency."""
+        ship = self.ship
+        if ship.speed_m_s == 0:
+            bands = tuple(self.sea.frequency_hz.tolist()), tuple(self.sea.density.tolist())
+            slope = ship.effective_slope * abs(math.sin(ship.heading_rad))
+            return SeaModel(*bands, effective_slope=slope, **settings)  # type: ignore[arg-type]
+        waves = Sea.irregular(
+            self.sea,
+            1,
+            components=_COMPONENTS,
+            heading_rad=ship.heading_rad,
+            speed_m_s=ship.speed_m_s,
+        ).roll_moment(1.0, EffectiveSlope(ship.effective_slope))
+        edges = _STEP_RAD_S * (
+            0.5 + np.arange(math.ceil(waves.frequency_rad_s.max() / _STEP_RAD_S))
+        )
+        energy, _ = np.histogram(waves.frequency_rad_s, edges, weights=waves.amplitude**2 / 2)
+        return SeaModel.of_slope((edges[1:] + edges[:-1]) / 2, energy / _STEP_RAD_S, **settings)
 
 
 def both(first: Spectrum, second: Spectrum) -> Spectrum:
@@ -64,47 +114,103 @@ def seas() -> dict[str, Spectrum]:
     return found
 
 
-def entrants(sea: Spectrum) -> tuple[Entrant, ...]:
-    """The laws for a sea."""
-    planned = shipped("constrained_gpc")
-    model = SeaModel(tuple(sea.frequency_hz.tolist()), tuple(sea.density.tolist()))
-    designs = {TUNED: SelfTunedDesign("self_tuned", model), UNTOLD: SelfTunedDesign("self_tuned")}
+def cases() -> dict[str, Case]:
+    """All seas abeam, then the storm on other headings and with other loadings."""
+    plant = shipped("gpc").plant
+    found = {name: Case(sea, TrialShip(plant)) for name, sea in seas().items()}
+    storm = measured_hour(STORM_HOUR)
+    for name, heading_deg in HEADINGS_DEG.items():
+        heading_rad = math.radians(heading_deg)
+        ship = TrialShip(plant, heading_rad=heading_rad, speed_m_s=SPEED_M_S)
+        found[f"storm, {name} at {SPEED_M_S:g} m/s"] = Case(storm, ship)
+    for scale in PERIODS:
+        loaded = replace(plant, ship=of_period(plant.ship, scale))
+        found[f"storm, roll period x {scale:g}"] = Case(storm, TrialShip(loaded))
+    return found
+
+
+def entrants(case: Case) -> tuple[Entrant, ...]:
+    """The laws for a case: the shipped ones as they are."""
+    planned, plant = shipped("constrained_gpc"), case.ship.plant
+    loaded = planned.model_copy(
+        update={"vessel": planned.vessel.model_copy(update={"ship": plant.ship})}
+    )
+    designs = {
+        TUNED: SelfTunedDesign("self_tuned", case.model()),
+        UNTOLD: SelfTunedDesign("self_tuned"),
+    }
     return (
         entrant(GPC, shipped("gpc")),
         entrant(CONSTRAINED, planned),
         *(
-            entrant(name, planned.model_copy(update={"law": design}))
+            entrant(name, loaded.model_copy(update={"law": design}))
             for name, design in designs.items()
         ),
     )
 
 
+def causal_share(case: Case) -> Interval:
+    """Share of the clairvoyant bound that no causal law exceeds."""
+    plant = replace(case.ship.plant, limits=shipped("constrained_gpc").limits)
+    problem = CausalProblem(plant, case.model(**CAUSAL_SEA))
+    runs = [problem.run(seed, CAUSAL_RECORD_S) for seed in range(1, 1 + CAUSAL_RECORDS)]
+    return causal_bound(problem, runs).share
+
+
+def causal_shares(wanted: Sequence[Case]) -> list[Interval]:
+    """Of each case, in a process for each core."""
+    with one_thread_each(), ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        return list(pool.map(causal_share, wanted))
+
+
 def main() -> None:
-    """Run all seas and print the shares."""
-    made = parser(__doc__, seeds=2, first_seed=1)
-    made.add_argument("--only", default="", help="run the seas whose names hold this text")
+    """Run all cases and print the shares."""
+    made = parser(__doc__, seeds=3, first_seed=1)
+    made.add_argument("--only", default="", help="run the cases whose names hold this text")
     arguments = parsed(made)
     try:
-        wanted = chosen(seas(), arguments.only)
+        wanted = chosen(cases(), arguments.only)
     except ValueError as error:
         made.error(str(error))
-    vessel, bound, trials = TrialShip(shipped("gpc").plant), shipped("constrained_gpc").limits, {}
-    for name, sea in wanted.items():
-        laws = entrants(sea)
+    bound, trials = shipped("constrained_gpc").limits, {}
+    for name, case in wanted.items():
+        laws = entrants(case)
         trials[name] = [
-            Trial(sea, seed, vessel, laws, arguments.seconds, bound) for seed in seeds_of(arguments)
+            Trial(case.sea, seed, case.ship, laws, arguments.seconds, bound)
+            for seed in seeds_of(arguments)
         ]
-    found: dict[str, dict[str, float]] = {}
+    shares: dict[str, dict[str, Interval]] = {}
+    passive_deg = {}
+    by_seed = []
     for name, runs in run_shown(trials).items():
-        rolls = {
-            each: float(np.mean([run[each].roll_rms_rad for run in runs]))
+        roll = {
+            each: np.array([run[each].roll_rms_rad for run in runs])
             for each in (PASSIVE, CLAIRVOYANT, *LAWS)
         }
-        passive, best = rolls[PASSIVE], rolls[CLAIRVOYANT]
-        found[name] = {"passive_deg": math.degrees(passive)} | {
-            law: (passive - rolls[law]) / (passive - best) for law in LAWS
+        gained = {law: roll[PASSIVE] - roll[law] for law in LAWS}
+        possible = roll[PASSIVE] - roll[CLAIRVOYANT]
+        by_seed.append(np.array([gained[law] / possible for law in LAWS]))
+        passive_deg[name] = math.degrees(roll[PASSIVE].mean())
+        shares[name] = {law: mean_interval(gained[law] / possible) for law in LAWS}
+    for name, share in zip(wanted, causal_shares(list(wanted.values())), strict=True):
+        shares[name][CAUSAL] = share
+    found = {
+        "seconds": arguments.seconds,
+        "seeds": arguments.seeds,
+        "seas": {
+            name: {"passive_deg": passive_deg[name]}
+            | {law: share._asdict() for law, share in each.items()}
+            for name, each in shares.items()
+        },
+    }
+    if len(by_seed) >= SIXTEEN:
+        mean = np.mean(by_seed[:SIXTEEN], axis=0)
+        found["mean of the first sixteen"] = {
+            law: mean_interval(row)._asdict() for law, row in zip(LAWS, mean, strict=True)
         }
-    show({"seconds": arguments.seconds, "seas": found}, arguments)
+        causal = [each[CAUSAL].mean for each in list(shares.values())[:SIXTEEN]]
+        found["mean of the first sixteen"][CAUSAL] = {"mean": float(np.mean(causal))}
+    show(found, arguments)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ they are compared trial by trial (`utank_hil.analysis.motion.confidence`).
 """
 
 import dataclasses
+import math
 import multiprocessing
 import os
 import signal
@@ -75,12 +76,16 @@ class TrialShip:
         As in `simulate_loop`.
     noise : SensorNoise or None
         None for the usual one
+    heading_rad, speed_m_s : float
+        As `Sea.irregular` takes them.
     """
 
     plant: DesignPlant
     effective_slope: float = 0.5
     pump_gain: float = 1.0
     noise: SensorNoise | None = None
+    heading_rad: float = math.pi / 2
+    speed_m_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +147,9 @@ def run_trial(trial: Trial) -> dict[str, TrialFigures]:
         raise ValueError(f"entrants need names of their own, got {', '.join(names)}")
     vessel = trial.vessel
     plant, ship, tank = vessel.plant, vessel.plant.ship, vessel.plant.tank
-    waves = Sea.irregular(trial.sea, trial.seed)
+    waves = Sea.irregular(
+        trial.sea, trial.seed, heading_rad=vessel.heading_rad, speed_m_s=vessel.speed_m_s
+    )
     moment = waves.roll_moment(ship.stiffness_nm_rad, EffectiveSlope(vessel.effective_slope))
     count = round(trial.duration_s / TICK_S) + 1
     passive = passive_motion(ship, tank, moment, TICK_S, count)
