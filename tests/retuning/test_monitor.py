@@ -67,3 +67,19 @@ def test_restart_takes_the_present_ship_for_the_laws_own() -> None:
     assert monitor.change == 1.0
     monitor.watch(estimate)
     assert monitor.change == 1.0
+
+
+EXTREMES = (5e-324, 1e-300, 1e-30, 1e-6, 1.0, 1e30)
+
+
+@pytest.mark.parametrize("inertia_kg_m2", EXTREMES)
+@pytest.mark.parametrize("stiffness_nm_rad", EXTREMES)
+def test_a_ship_that_an_answer_may_carry_costs_no_tick(
+    stiffness_nm_rad: float, inertia_kg_m2: float
+) -> None:
+    try:
+        ship = ShipFigures(stiffness_nm_rad, inertia_kg_m2, 0.0)
+    except ValueError:
+        return  # refused where the answer is read
+    assert 0.0 < ship.roll_period_s < math.inf
+    assert 1.0 < told(ship) < math.inf

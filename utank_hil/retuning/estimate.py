@@ -31,11 +31,12 @@ class ShipFigures:
     Raises
     ------
     ValueError
-        If stiffness or inertia is not positive, or anything is too large.
+        If stiffness or inertia is less than a model's, so that the loop could not compute with
+        it, or anything is too large.
     """
 
-    stiffness_nm_rad: Annotated[float, Range(above=0, most=1e30)]
-    inertia_kg_m2: Annotated[float, Range(above=0, most=1e30)]
+    stiffness_nm_rad: Annotated[float, Range(least=1e-6, most=1e30)]
+    inertia_kg_m2: Annotated[float, Range(least=1e-6, most=1e30)]
     damping_nms_rad: Annotated[float, Range(least=0, most=1e30)]
     stiffness_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
     period_deviation: Annotated[float, Range(least=0, most=1e3)] = 0.0
