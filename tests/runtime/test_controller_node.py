@@ -254,6 +254,20 @@ def test_every_signal_but_the_estimates_is_finite_from_the_first_row(index: int)
     assert math.isfinite(bench.rows[0][index]) != (untold and not verdict)
 
 
+def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms() -> None:
+    bench = ControllerBench()
+    changed_s = []
+    for number in range(40):
+        bench.node.estimated.hs_m = float(number)
+        bench.tick()
+        row = dict(zip(SIGNALS, bench.rows[-1], strict=True))
+        assert row["time_s"] == bench.node.time_s == pytest.approx(number * 0.01)
+        assert 0 <= number - row["significant_height_m"] < 10
+        if row["significant_height_m"] == number:
+            changed_s.append(row["time_s"])
+    np.testing.assert_allclose(np.diff(changed_s), 0.1)
+
+
 def test_heartbeat_tells_the_fault() -> None:
     bench = ControllerBench(START_NS)
     beats = CATALOGUE.receiver(Heartbeat, Address.CONTROLLER)

@@ -53,7 +53,7 @@ def test_rows_of_a_ring_hold_the_same_records(
     entries: list[tuple[Kind, int, int, bytes]],
 ) -> None:
     data = packed(entries)
-    table = np.array(list(ring_rows(data))).reshape(-1, len(ROW))
+    table = np.frombuffer(b"".join(ring_rows(data))).reshape(-1, len(ROW))
     assert records_of(table).tobytes() == data
 
 

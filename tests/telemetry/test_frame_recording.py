@@ -32,7 +32,7 @@ def tick(number: int) -> bytes:
     """A tick with as many frames as can't be in one row."""
     time_ns = number * TICK_NS
     frame = LAYOUT.pack(Kind.RECEIVED, 8, 0, number, time_ns, number.to_bytes(8, "little"))
-    return frame * 10 + LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b"")
+    return frame * 40 + LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b"")
 
 
 def feed(ring: RingWriter, numbers: range) -> bytes:

@@ -111,6 +111,19 @@ def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down() -> N
     ]
 
 
+def test_records_of_several_ticks_are_handed_on_together_and_the_rest_at_the_end() -> None:
+    def written(every: int) -> list[tuple[bytes, int]]:
+        chunks: list[tuple[bytes, int]] = []
+        drive(NodeTap(Node(), lambda data, now_ns: chunks.append((data, now_ns)), (), every))  # type: ignore[arg-type]
+        return chunks
+
+    (_, stopped_ns), *_ = chunks = written(5)
+    assert (len(chunks), stopped_ns) == (1, 4 * TICK)
+    assert [now_ns for _, now_ns in written(2)] == [3 * TICK, 4 * TICK]
+    every_tick = b"".join(data for data, _ in written(1))
+    assert every_tick == chunks[0][0] == b"".join(data for data, _ in written(2))
+
+
 @pytest.mark.parametrize("reply", [None, Refusal(("no", "too short")), CANDIDATE])
 def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply: Answer | None) -> None:
     asked = Retuner(reply)

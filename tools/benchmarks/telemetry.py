@@ -25,7 +25,7 @@ from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Frame
-from utank_hil.commands.recording import RunRecording
+from utank_hil.commands.recording import RECORD_TICKS, RunRecording
 from utank_hil.configuration import load_config
 from utank_hil.provenance import describe
 from utank_hil.runtime import Lockstep
@@ -111,7 +111,9 @@ def _slice(recording: RunRecording | None) -> tuple[Lockstep, _Timed]:
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
     sink = None if recording is None else recording.write
     node = build_controller_node(config, sink=sink, commissioned=True)
-    timed = _Timed(node if recording is None else NodeTap(node, recording.write_records))
+    timed = _Timed(
+        node if recording is None else NodeTap(node, recording.write_records, every=RECORD_TICKS)
+    )
     return Lockstep([*ship.nodes, timed]), timed
 
 

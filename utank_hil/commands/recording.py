@@ -21,6 +21,9 @@ PART_S: Final = 3600.0
 """A recording goes on in another file after so long: 60 MB."""
 RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
 
+RECORD_TICKS: Final = 5
+"""Ticks whose frames go to the recorder together: a controller that is killed loses them."""
+
 
 @dataclass(slots=True)
 class RecordingSummary:
@@ -105,7 +108,7 @@ class RunRecording:
             return
         try:
             if head is not None:
-                self._records = RingWriter(ROW, capacity=RING_ROWS)
+                self._records = RingWriter(ROW, capacity=RING_ROWS // 4)  # a row has five ticks
             self._recorder = RecorderProcess(
                 self._ring.name,
                 files[0],
@@ -141,7 +144,7 @@ class RunRecording:
         return self._records is not None
 
     def write_records(self, records: bytes, time_ns: int) -> None:  # noqa: ARG002
-        """Take the `bus_records` of one tick; never waits."""
+        """Take `bus_records` of ticks; never waits."""
         if self._records is not None:
             for row in ring_rows(records):
                 self._records.write(row)

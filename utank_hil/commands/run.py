@@ -33,7 +33,7 @@ from utank_hil.commands.common import (
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.commands.recording import RecordingSummary, RunRecording
+from utank_hil.commands.recording import RECORD_TICKS, RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
@@ -145,7 +145,7 @@ def run(
         )
         on_bus: Node = node
         if recording.keeps_records:
-            on_bus = NodeTap(node, recording.write_records, desks.taps)
+            on_bus = NodeTap(node, recording.write_records, desks.taps, RECORD_TICKS)
 
         def ended() -> bool:
             manager.progress(statistics.ticks)

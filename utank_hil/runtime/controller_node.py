@@ -37,7 +37,7 @@ from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.redundancy import Redundancy
-from utank_hil.runtime.signals import SIGNALS, values_of
+from utank_hil.runtime.signals import QUICK, SIGNALS, SLOW
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
@@ -232,6 +232,7 @@ class ControllerNode:
         self.seen = self._observer.seen
         self.seen.commissioned = settings.commissioned
         self._row = np.zeros(len(SIGNALS))
+        self._all_due = True
         self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
         self._command_schedule = Schedule(self._commands.cycle_ns)
@@ -476,6 +477,7 @@ class ControllerNode:
             )
             frames += self._command_frames(word, follow=supervisor.demand is _CONTROL)
         if self._status_schedule.due(now_ns):
+            self._all_due = True
             self._update_alarms(now_ns)
             frames.append(self._alarm_frames.frame(self.alarms.next_message(now_ns)))
             frames.append(
@@ -540,6 +542,8 @@ class ControllerNode:
             return
         if self._ticks_to_row == 0:
             self._ticks_to_row = self._sink_every
-            self._row[:] = values_of(self)
+            for values_of, put, at in (QUICK, SLOW) if self._all_due else (QUICK,):
+                put(self._row, at, *values_of(self))
+            self._all_due = False
             self._sink(self._row)
         self._ticks_to_row -= 1

@@ -1,7 +1,9 @@
 """The telemetry signals: what the controller node shows of itself every tick."""
 
+from collections.abc import Callable
 from operator import attrgetter
-from typing import Final
+from struct import Struct
+from typing import Any, Final
 
 _SOURCES: Final = {
     "time_s": "time_s",
@@ -44,5 +46,20 @@ A new signal is one line here. Its unit gives it its plot, see `utank_hil.teleme
 SIGNALS: Final = tuple(_SOURCES)
 """Columns of a telemetry row."""
 
-values_of: Final = attrgetter(*_SOURCES.values())
-"""Values of a node's signals, in the order of `SIGNALS`."""
+_SLOW: Final = SIGNALS.index("roll_rms_rad")
+"""From here on the signals change little within 100 ms, and are looked at no more often."""
+
+Part = tuple[Callable[[Any], tuple[float, ...]], Callable[..., None], int]
+
+
+def _part(columns: slice) -> Part:
+    """A part of a row: what takes its values from a node, what puts them there, and its first byte.
+
+    Put by `struct`: numpy would ask each value for its type first.
+    """
+    sources = list(_SOURCES.values())[columns]
+    return attrgetter(*sources), Struct(f"{len(sources)}d").pack_into, 8 * (columns.start or 0)
+
+
+QUICK: Final = _part(slice(_SLOW))
+SLOW: Final = _part(slice(_SLOW, None))

@@ -6,7 +6,6 @@ of other kinds, and the answers of retuner and estimator.
 """
 
 import struct
-from collections.abc import Iterator
 from enum import IntEnum
 from typing import Final
 
@@ -33,12 +32,13 @@ LAYOUT: Final = struct.Struct("<BBHIq8s")
 Records = npt.NDArray[np.void]
 """Records, shape (n,), of type `RECORD`."""
 
-IN_A_ROW: Final = 8
-"""Records in one row of a ring; a tick has five or so."""
+IN_A_ROW: Final = 32
+"""Records in one row of a ring; five ticks have 25 or so."""
 _WORDS: Final = LAYOUT.size // 8
 _ROW_BYTES: Final = IN_A_ROW * LAYOUT.size
 ROW: Final = ("records", *(f"word_{number}" for number in range(IN_A_ROW * _WORDS)))
 """Columns of such a ring: how many records there are, and their bytes."""
+_COUNTS: Final = [np.float64(count).tobytes() for count in range(IN_A_ROW + 1)]
 
 
 class Kind(IntEnum):
@@ -69,14 +69,13 @@ class Kind(IntEnum):
     """As ALIVE and ANSWER, of the estimator of sea and ship."""
 
 
-def ring_rows(records: bytes) -> Iterator[FloatArray]:
+def ring_rows(records: bytes) -> list[bytes]:
     """Packed records as rows of a ring, `IN_A_ROW` in each."""
-    for start in range(0, len(records), _ROW_BYTES):
-        piece = records[start : start + _ROW_BYTES]
-        row = np.zeros(len(ROW))
-        row[0] = len(piece) // LAYOUT.size
-        row[1:].view(np.uint8)[: len(piece)] = np.frombuffer(piece, dtype=np.uint8)
-        yield row
+    return [
+        _COUNTS[min(len(records) - start, _ROW_BYTES) // LAYOUT.size]
+        + records[start : start + _ROW_BYTES].ljust(_ROW_BYTES, b"\0")
+        for start in range(0, len(records), _ROW_BYTES)
+    ]
 
 
 def records_of(rows: FloatArray) -> Records:

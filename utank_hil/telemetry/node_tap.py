@@ -5,7 +5,9 @@ is changed on the way, so the node does the same with them as without.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Final
+from functools import cache
+from struct import Struct
+from typing import Any, Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Frame
@@ -15,11 +17,18 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind
 
 Sink = Callable[[bytes, int], None]
-"""Takes the records of one tick, packed, and its time; must not wait."""
+"""Takes the records of ticks, packed, and the time of the last; must not wait."""
 
-_PACK: Final = LAYOUT.pack
+_FIELDS: Final = 6
+"""Fields of a record."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
+
+
+@cache
+def _packing(count: int) -> Callable[..., bytes]:
+    """Packs the fields of so many records."""
+    return Struct(f"<{count * LAYOUT.format.lstrip('<')}").pack
 
 
 class NodeTap:
@@ -31,21 +40,28 @@ class NodeTap:
     sink : Sink
     taps : sequence of RetunerTap
         Whose records belong among the node's.
+    every : int
+        Ticks whose records are handed on together; the stop hands on what is left.
     """
 
-    def __init__(self, node: ControllerNode, sink: Sink, taps: "Sequence[RetunerTap]" = ()) -> None:
+    def __init__(
+        self, node: ControllerNode, sink: Sink, taps: "Sequence[RetunerTap]" = (), every: int = 1
+    ) -> None:
         self.name = node.name
         self.period_ns = node.period_ns
         self._node = node
         self._sink = sink
         self._taps = taps
-        self._records: list[bytes] = []
+        self._fields: list[
+            Any
+        ] = []  # of one record after the other: packing all at once is quicker
         self._started = False
+        self._every = self._ticks_left = every
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
         can_id, data = frame
-        self._records.append(_PACK(_RECEIVED, len(data), 0, can_id, now_ns, data))
+        self._fields += (_RECEIVED, len(data), 0, can_id, now_ns, data)
         self._node.receive(frame, now_ns)
 
     def other_frames(self, count: int) -> None:
@@ -65,27 +81,34 @@ class NodeTap:
             self._note(Kind.STARTED, now_ns, bytes([self._node.statistics.real_time]))
         frames = list(self._node.tick(now_ns))
         for tap in self._taps:
-            self._records += tap.take(now_ns)
-        self._records.append(_PACK(_TICK, 0, 0, 0, now_ns, b""))
-        self._hand_on(frames, now_ns)
+            self._fields += tap.take(now_ns)
+        self._fields += (_TICK, 0, 0, 0, now_ns, b"")
+        self._note_sent(frames, now_ns)
+        self._ticks_left -= 1
+        if self._ticks_left == 0:
+            self._ticks_left = self._every
+            self._hand_on(now_ns)
         return frames
 
     def stop(self, now_ns: int) -> Iterable[Frame]:
         """Send the last frames."""
         frames = list(self._node.stop(now_ns))
         self._note(Kind.STOP, now_ns)
-        self._hand_on(frames, now_ns)
+        self._note_sent(frames, now_ns)
+        self._hand_on(now_ns)
         return frames
 
     def _note(self, kind: Kind, now_ns: int, data: bytes = b"", *, number: int = 0) -> None:
-        self._records.append(_PACK(kind, len(data), 0, number, now_ns, data))
+        self._fields += (kind, len(data), 0, number, now_ns, data)
 
-    def _hand_on(self, frames: list[Frame], now_ns: int) -> None:
-        self._records += [
-            _PACK(_SENT, len(data), 0, can_id, now_ns, data) for can_id, data in frames
-        ]
-        self._sink(b"".join(self._records), now_ns)
-        self._records.clear()
+    def _note_sent(self, frames: list[Frame], now_ns: int) -> None:
+        for can_id, data in frames:
+            self._fields += (_SENT, len(data), 0, can_id, now_ns, data)
+
+    def _hand_on(self, now_ns: int) -> None:
+        fields = self._fields
+        self._sink(_packing(len(fields) // _FIELDS)(*fields), now_ns)
+        fields.clear()
 
 
 class RetunerTap:
@@ -123,16 +146,19 @@ class RetunerTap:
             self._answers.append(answer_bytes(answer))
         return answer
 
-    def take(self, now_ns: int) -> list[bytes]:
-        """Records of what was asked and answered since the last call."""
+    def take(self, now_ns: int) -> list[Any]:
+        """Fields of the records of what was asked and answered since the last call."""
         alive_kind, answer_kind = self._kinds
-        records = [_PACK(alive_kind, 1, 0, 0, now_ns, bytes([alive])) for alive in self._alive]
+        fields: list[Any] = []
+        for alive in self._alive:
+            fields += (alive_kind, 1, 0, 0, now_ns, bytes([alive]))
         for data in self._answers:
-            pieces = [data[at : at + PAYLOAD_BYTES] for at in range(0, len(data), PAYLOAD_BYTES)]
-            records += [_PACK(answer_kind, len(p), 0, len(data), now_ns, p) for p in pieces]
+            for at in range(0, len(data), PAYLOAD_BYTES):
+                piece = data[at : at + PAYLOAD_BYTES]
+                fields += (answer_kind, len(piece), 0, len(data), now_ns, piece)
         self._alive.clear()
         self._answers.clear()
-        return records
+        return fields
 
 
 class Tapped:
