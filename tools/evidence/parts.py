@@ -55,8 +55,8 @@ PARTS = (
     Part(
         "constrained_campaign",
         "python -m tools.studies.constrained_campaign --seeds 8 --out docs/pictures --json",
-        "constrained against clipped GPC, sea by sea, with its picture",
-        15,
+        "constrained and self-tuned GPC against the same clipped, sea by sea, with its picture",
+        25,
     ),
     Part(
         "sea_estimates",

@@ -7,11 +7,12 @@ The first ship in measured and formula seas and with weaker pumps, the same real
 * constrained: plans within pressure, rate, level and power; expects the sea there is;
 * clipped: the very same law without its plan, cut by the limiter with its usual level barrier;
 * clipped late: the same, cut by the limiter that stands behind the constrained law;
+* self-tuned, and self-tuned clipped: the same two of the law that designs itself for this sea;
 * GPC_ROLL: the shipped law that sees the roll alone and knows the sea by its peak.
 
 Differences are paired, seed by seed, with the 95 % confidence interval of their mean. "Held back"
 is the share of time in which the limiter gives the clipped law less than it asks for. Takes about
-15 minutes on two cores. With --horizon-s the plans reach further (and hold more knots):
+25 minutes on two cores. With --horizon-s the plans reach further (and hold more knots):
 
     python -m tools.studies.constrained_campaign --only "roll period" --horizon-s 30
 """
@@ -39,16 +40,20 @@ from tools.studies.trial_setup import (
     shipped,
 )
 from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip
+from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ConstrainedDesign, PumpLimits
 from utank_hil.control.constrained.law import ConstrainedLaw
+from utank_hil.control.sea_model import SeaModel
 from utank_hil.pictures.style import COLORS, picture
 from utank_hil.sea import Spectrum, jonswap
 
 CONSTRAINED, CLIPPED, CLIPPED_LATE, GPC = "constrained", "clipped", "clipped late", "GPC_ROLL"
-RIVALS = (CLIPPED, GPC)
+TUNED, TUNED_CLIPPED = "self-tuned", "self-tuned clipped"
+RIVALS = {CLIPPED: CONSTRAINED, GPC: CONSTRAINED, TUNED_CLIPPED: TUNED}
+"""Of which law."""
 KNOT_GROWTH = 0.15  # beyond the shipped knots, the distance between two is this share of the time
 
 
@@ -78,23 +83,28 @@ def cases() -> dict[str, Case]:
 
 
 def entrants(case: Case, horizon_s: float | None) -> tuple[Entrant, ...]:
-    """The four laws, each with the limits that stand behind it."""
+    """The laws, each with the limits that stand behind it."""
 
     def of_pump(limits: PumpLimits) -> PumpLimits:
         return dataclasses.replace(limits, pressure_pa=case.pressure_pa, power_w=case.power_w)
 
     planned, gpc = shipped("constrained_gpc"), shipped("gpc")
     planned = limited(expecting(planned, case.sea), of_pump(planned.limits))
+    sea = SeaModel(tuple(case.sea.frequency_hz.tolist()), tuple(case.sea.density.tolist()))
+    tuned = entrant(TUNED, planned.model_copy(update={"law": SelfTunedDesign("self_tuned", sea)}))
     if horizon_s is not None:
         planned = reaching(planned, horizon_s)
     usual = of_pump(gpc.limits)
     constrained = entrant(CONSTRAINED, planned)
     assert isinstance(constrained.law, ConstrainedLaw)
+    assert isinstance(tuned.law, ConstrainedLaw)
     plain = constrained.law.unlimited()
     return (
         constrained,
         Entrant(CLIPPED, plain, constrained.measured, usual),
         Entrant(CLIPPED_LATE, plain, constrained.measured, constrained.limits),
+        tuned,
+        Entrant(TUNED_CLIPPED, tuned.law.unlimited(), tuned.measured, usual),
         entrant(GPC, limited(gpc, usual)),
     )
 
@@ -122,8 +132,8 @@ def figures(runs: list[dict[str, TrialFigures]], name: str, field: str) -> Float
 
 
 def below(runs: list[dict[str, TrialFigures]], rival: str) -> Interval:
-    """Share by which the constrained law's roll RMS is less than a rival's."""
-    ours, theirs = (figures(runs, name, "roll_rms_rad") for name in (CONSTRAINED, rival))
+    """Share by which a law's roll RMS is less than its rival's."""
+    ours, theirs = (figures(runs, name, "roll_rms_rad") for name in (RIVALS[rival], rival))
     return mean_interval(1 - ours / theirs)
 
 
@@ -149,21 +159,21 @@ def draw(outcomes: list[dict[str, Any]], path: Path) -> None:
     with picture(path, title, (9.0, 1.6 + 0.45 * len(outcomes))) as figure:
         axes = figure.add_subplot()
         places = np.arange(len(outcomes))[::-1]
-        for rival, color, shift in ((CLIPPED, COLORS[1], 0.12), (GPC, COLORS[2], -0.12)):
+        for number, (rival, law) in enumerate(RIVALS.items()):
             intervals = [Interval(**outcome["below"][rival]) for outcome in outcomes]
             axes.errorbar(
                 [100 * one.mean for one in intervals],
-                places + shift,
+                places + 0.2 * (1 - number),
                 xerr=[100 * one.half_width for one in intervals],
                 fmt="o",
-                color=color,
+                color=COLORS[1 + number],
                 capsize=3,
-                label=f"below {rival}",
+                label=f"{law} below {rival}",
             )
         axes.axvline(0.0, color=COLORS[0], linewidth=1.0)
         axes.set_yticks(places, [outcome["name"] for outcome in outcomes])
-        axes.set_xlabel("Roll RMS of the constrained law below its rival's (%), 95 % interval")
-        figure.legend(loc="outside lower left", ncols=2, frameon=False)
+        axes.set_xlabel("Roll RMS below the rival's (%), 95 % interval")
+        figure.legend(loc="outside lower left", ncols=3, frameon=False)
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ import pytest
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.design import ConstrainedDesign
+from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model
@@ -125,6 +126,24 @@ def test_a_plan_that_the_law_follows_is_the_law_whatever_its_length():
         for samples in (2, 25)
     ]
     np.testing.assert_allclose(gains[0], gains[1], rtol=1e-3, atol=1e-3 * np.abs(gains[0]).max())
+
+
+def test_the_margin_that_is_not_given_is_the_error_of_the_forecast_that_draws_have():
+    plant = DesignPlant(SHIP, TANK, limits=LIMITS)
+    law = dataclasses.replace(DESIGN, level_margin_m=None).law(plant)
+    noises = ("pressure_noise_pa_rt_s", "slope_noise_rad_rt_s", "heel_std_rad", "heel_time_s")
+    settings = {name: getattr(DESIGN, name) for name in (*noises, "sample_time_s")}
+    _, covariance = sea_plant(DESIGN.sea, plant, **settings)
+    model, level = law.model, law.level_output
+    rng = np.random.default_rng(1)
+    process = rng.multivariate_normal(np.zeros(len(covariance)), covariance, 20_000)
+    noise = rng.standard_normal((20_000, 3)) * DESIGN.measurement_std
+    error, surprises = np.zeros(len(model.A)), []
+    for push, wrong in zip(process, noise, strict=True):
+        surprise = model.C @ error + wrong
+        error = model.A @ error - law.observer_gain @ surprise + push
+        surprises.append(surprise[level])
+    assert LIMITS.level_m - law.limits.level_m == pytest.approx(np.std(surprises[100:]), rel=0.03)
 
 
 def test_a_margin_that_leaves_no_level_is_refused():

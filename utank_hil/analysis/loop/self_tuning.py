@@ -5,7 +5,7 @@ greatest pressure P and level limit h:
 
 * pressure P all the time costs as much as 0.106 s^2, level h as much as 0.33 s^2;
 * white pressure disturbance 11 P s / sqrt(w), white slope 0.046 s / sqrt(w), heel 0.13 s;
-* sample time 0.1 / w, plans of 6 / w, level margin h / 20.
+* sample time 0.1 / w, plans of 6 / w; the level margin is the forecast's own deviation.
 
 Where a law with these weights would swing on with the pump at its limit, pressure costs more:
 with the pump giving any smaller part of what is asked for, an oscillation may grow by
@@ -356,7 +356,7 @@ class _Search:
             after_horizon="law",
             pressure_weight_rad2=_short(pressure),
             level_weight_rad2_m2=_short(level),
-            level_margin_m=_short(limits.level_m / 20),
+            level_margin_m=None,
             heel_std_rad=self._heel_rad,
             sample_time_s=self._step_s,
         )

@@ -73,8 +73,9 @@ class ConstrainedDesign:
         Greatest pressure throughout costs as much as this square of a roll angle.
     level_weight_rad2_m2 : float
         A level of one metre costs as much as this square of a roll angle.
-    level_margin_m : float
-        Kept from the limit on the level.
+    level_margin_m : float or None
+        Kept from the limit on the level; None for the standard deviation of the level's forecast
+        one sample ahead, as what a plan can't know before the next one is made.
     heel_std_rad, heel_time_s : float
         Standard deviation and time constant of a slowly varying heel.
     heel_share : float
@@ -99,7 +100,7 @@ class ConstrainedDesign:
     after_horizon: Literal["passive", "law"] = "passive"
     pressure_weight_rad2: Positive = 2.6e-4
     level_weight_rad2_m2: NotNegative = 3e-5
-    level_margin_m: NotNegative = 0.2
+    level_margin_m: NotNegative | None = 0.2
     heel_std_rad: NotNegative = 0.01
     heel_time_s: Positive = 50e3
     heel_share: Share = 0.0
@@ -130,12 +131,6 @@ class ConstrainedDesign:
     def law(self, plant: DesignPlant) -> ConstrainedLaw:
         """The law for a plant, planning within its limits."""
         limits = plant.limits
-        if not self.level_margin_m < limits.level_m:
-            reason = (
-                f"{self.level_margin_m} leaves nothing of the level limit {limits.level_m} m: "
-                "lower it, or raise the limit"
-            )
-            refuse("constrained design", [("level_margin_m", reason)])
         whole, covariance = sea_plant(
             self.sea,
             plant,
@@ -147,9 +142,18 @@ class ConstrainedDesign:
         )
         rows = [STATES.index(name) for name in self.measured]
         model = whole._replace(C=whole.C[rows], D=whole.D[rows])
-        observer_gain, _ = kalman_predictor(
+        observer_gain, surprise = kalman_predictor(
             model, covariance, np.diag(np.square(self.measurement_std))
         )
+        level, margin_m = self.measured.index("level_m"), self.level_margin_m
+        if margin_m is None:
+            margin_m = float(np.sqrt(surprise[level, level]))
+        if not margin_m < limits.level_m:
+            reason = (
+                f"{margin_m:g} leaves nothing of the level limit {limits.level_m} m: "
+                "lower it, or raise the limit"
+            )
+            refuse("constrained design", [("level_margin_m", reason)])
         weights = {"roll_rad": 1.0, "level_m": self.level_weight_rad2_m2}
         weight = np.array([weights.get(name, 0.0) for name in self.measured])
         horizon = condense(
@@ -172,10 +176,10 @@ class ConstrainedDesign:
             limits=PumpLimits(
                 limits.pressure_pa,
                 limits.rate_pa_s,
-                limits.level_m - self.level_margin_m,
+                limits.level_m - margin_m,
                 limits.power_w,
             ),
-            level_output=self.measured.index("level_m"),
+            level_output=level,
             level_penalty=_PENALTY_ROLL_RAD**2 * self.horizon,
             reservoir_area_m2=plant.tank.reservoir_area_m2,
             steady_state=steady_state,
