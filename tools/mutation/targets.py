@@ -208,16 +208,18 @@ TARGETS = (
     Target("firmware_sim/drive_states.py", ("tests/firmware_sim/test_drive_states.py",)),
     Target(
         "utank_hil/runtime/controller_node.py",
-        _NODE,
         (
+            "tests/runtime/test_alarms.py",
             "tests/runtime/test_valve_command.py",
             "tests/runtime/test_law_that_starts_anew.py",
+            "tests/runtime/test_estimates_on_the_bus.py",
+            *_NODE,
+        ),
+        (
             "tests/runtime/test_lost_levels.py",
             "tests/runtime/test_monitoring.py",
-            "tests/runtime/test_alarms.py",
             "tests/runtime/test_lockstep.py",
             "tests/runtime/test_invariants.py",
-            "tests/runtime/test_estimates_on_the_bus.py",
             "tests/firmware_sim/test_vessel_without_pump.py",
             "tests/faults/test_retuning_events.py",
         ),
