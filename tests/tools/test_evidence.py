@@ -1,10 +1,12 @@
 """The evidence: what is run, what is kept of it, when it is out of date, the tables made of it."""
 
 import json
+import math
 import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from tools.documents import tables, write
 from tools.evidence import record, sources
 from tools.evidence.__main__ import main
 from tools.evidence.parts import PARTS, Part
+from tools.studies import sea_estimates
 
 TOY = Part("toy", "python -m tools.thesis.derive_tank_forces --json", "nothing", 1)
 
@@ -168,3 +171,37 @@ def test_table_of_a_document_is_made_anew_and_a_stale_one_is_named(
 def test_table_without_its_result_names_the_part_to_run(folder: Path) -> None:
     with pytest.raises(tables.TableError, match="--part linear_law_tables"):
         tables.table("law margins")
+
+
+def test_measured_hours_are_counted_by_their_roll_and_judged_by_their_intervals() -> None:
+    def group(
+        passive_deg: float, below: float, half_width: float, kilowatts: float
+    ) -> dict[str, Any]:
+        law = {
+            "roll_below_passive": {"mean": below, "half_width": half_width},
+            "power_mean_w": {"mean": 1e3 * kilowatts},
+        }
+        passive = {"roll_rms_rad": {"mean": math.radians(passive_deg)}}
+        return {"runs": {"passive": passive, "self-tuning": law}}
+
+    groups = [group(0.2, 0.5, 0.1, 100), group(1.5, -0.2, 0.1, 500), group(1.6, -0.1, 0.2, 700)]
+    heading, *rows = tables.february_hours({"groups": groups})
+    assert [row[0] for row in rows] == ["below 0.25°", "above 1°", "all"]
+    assert rows[1][1:] == ["2", "-15.0%", "-20% ± 10", "1", "600", "1.2"]
+    assert rows[2][1:] == ["3", "6.7%", "-20% ± 10", "1", "433", "1.3"]
+    assert {len(row) for row in rows} == {len(heading)}
+
+
+def test_a_ship_that_is_not_told_is_counted_and_has_no_error() -> None:
+    def part(of_ship: str, stiffness: float, law: str = "gpc") -> sea_estimates.Part:
+        figures = dict.fromkeys(("moment", "height", "peak", "spectrum_db", "stated"), 0.0)
+        return sea_estimates.Part(
+            "storm", law, 8.8, 20.0, "GOOD", of_ship, **figures,
+            stiffness=stiffness, period=0.0, stiffness_deviation=0.01,
+        )  # fmt: skip
+
+    parts = [part("GOOD", -0.06), part("GOOD", 0.04), part("UNCERTAIN", 0.5)]
+    (row,) = sea_estimates.loadings([*parts, part("GOOD", 0.9, "passive")])
+    assert (row["parts"], row["told"], row["within"], row["worst"]) == (3, 2, 1, 0.06)
+    told = tables.stiffness_by_loading({"loadings": [row]})[1]
+    assert told == ["20", "8.8", "3", "2", "1", "6.0%"]

@@ -199,6 +199,85 @@ def thesis_contest(result: dict[str, Any]) -> Rows:
     return [table["headings"], *table["rows"]]
 
 
+def share(value: dict[str, float]) -> str:
+    """A share in per cent with its interval."""
+    half = value.get("half_width")
+    return f"{value['mean']:.0%}" + ("" if half is None else f" ± {100 * half:.0f}")
+
+
+def many_seas(result: dict[str, Any]) -> Rows:
+    """Shares of the possible, a row a sea."""
+    mean = "mean of the first sixteen"
+    rows = dict(result["seas"]) | ({mean: result[mean]} if mean in result else {})
+    laws = [name for name in next(iter(rows.values())) if name != "passive_deg"]
+    return [
+        ["sea", "passive, °", *laws],
+        *(
+            [name, number(row.get("passive_deg"), ".2f"), *(share(row[law]) for law in laws)]
+            for name, row in rows.items()
+        ),
+    ]
+
+
+def voyage_stages(result: dict[str, Any]) -> Rows:
+    """The renewed law beside the one that was given the truth, a row a stage."""
+    return [
+        ["stage", "passive, °", "renewed, °", "knows the truth, °", "share, renewed",
+         "share, knows the truth"],
+        *(
+            [
+                row["stage"],
+                *(f"{row[f'{name}_deg']:.3f}" for name in ("passive", "renewed", "told")),
+                *(f"{row[f'{name}_share']:.1%}" for name in ("renewed", "told")),
+            ]
+            for row in result["stages"]
+        ),
+    ]  # fmt: skip
+
+
+def stiffness_by_loading(result: dict[str, Any]) -> Rows:
+    """How well stiffness, and with it GM, is told, a row a loading."""
+    return [
+        ["record, min", "roll period, s", "records", "told", "within 5 %", "greatest error"],
+        *(
+            [
+                *(f"{row[name]:g}" for name in ("minutes", "period_s")),
+                *(str(row[name]) for name in ("parts", "told", "within")),
+                number(row["worst"], ".1%"),
+            ]
+            for row in result["loadings"]
+        ),
+    ]
+
+
+def february_hours(result: dict[str, Any]) -> Rows:
+    """The measured hours in bands of the passive roll."""
+    law = "self-tuning"
+    bands: dict[str, list[dict[str, Any]]] = {}
+    for group in result["groups"]:
+        passive_deg = math.degrees(group["runs"]["passive"]["roll_rms_rad"]["mean"])
+        edge = next(edge for edge in (0.25, 0.5, 1.0, math.inf) if passive_deg < edge)
+        for name in ("all", f"below {edge:g}°" if edge < math.inf else "above 1°"):
+            bands.setdefault(name, []).append(group["runs"][law])
+    rows = [["passive roll RMS", "hours", "below passive, mean", "in the worst hour",
+             "hours wholly above passive", "shaft power, mean kW", "energy, MWh"]]  # fmt: skip
+    for name in sorted(bands, key=lambda name: (name == "all", name[0] == "a", name)):
+        below = [run["roll_below_passive"] for run in bands[name]]
+        power_kw = [run["power_mean_w"]["mean"] / 1e3 for run in bands[name]]
+        rows.append(
+            [
+                name,
+                str(len(below)),
+                f"{sum(each['mean'] for each in below) / len(below):.1%}",
+                share(min(below, key=lambda each: each["mean"])),
+                str(sum(each["mean"] + each["half_width"] < 0 for each in below)),
+                f"{sum(power_kw) / len(power_kw):.0f}",
+                f"{sum(power_kw) / 1e3:.1f}",
+            ]
+        )
+    return rows
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -206,6 +285,10 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "printed laws": ("linear_law_tables", printed_laws),
     "printed index": ("linear_law_tables", printed_index),
     "step costs": ("cost_controllers", step_costs),
+    "many seas": ("many_seas", many_seas),
+    "voyage stages": ("renewed_voyage", voyage_stages),
+    "stiffness by loading": ("sea_estimates", stiffness_by_loading),
+    "february hours": ("february_hours", february_hours),
     "shipped scenarios": ("shipped_scenarios", scenarios),
     "errata terms": ("thesis_derivation", errata_terms),
     "thesis figures": ("thesis_figures", thesis_figures),

@@ -48,9 +48,9 @@ PARTS = (
     ),
     Part(
         "many_seas",
-        "python -m tools.studies.many_seas --seconds 900 --seeds 2 --json",
-        "shares of the possible in twenty-eight seas, the self-tuned law among them",
-        10,
+        "python -m tools.studies.many_seas --seconds 900 --seeds 3 --json",
+        "shares of the possible in many seas, headings and loadings, beside the causal bound",
+        15,
     ),
     Part(
         "constrained_campaign",
@@ -81,6 +81,12 @@ PARTS = (
         "python -m tools.studies.model_errors --seeds 8 --json",
         "the shipped laws on a ship other than the one they were designed for",
         20,
+    ),
+    Part(
+        "february_hours",
+        "python -m tools.evidence.campaign_part configs/studies/february_hours.yaml",
+        "the self-tuning law in all ninety-nine measured hours, three seeds each: roll and energy",
+        80,
     ),
     Part(
         "storm_seeds",

@@ -32,6 +32,8 @@ from utank_hil.sea import SlopeSpectrum
 
 SETTLED_S = 120.0
 TAPERS = 4
+CLOSE = 0.05
+"""Relative error of the stiffness within which it is counted as right."""
 PERIODS_S = (8.8, 10.8, 12.57, 14.4, 16.3)
 MEASURED = {
     "02:40": "2019-02-10T02:40",
@@ -184,6 +186,29 @@ def errors(parts: list[Part]) -> list[dict[str, Any]]:
     return rows
 
 
+def loadings(parts: list[Part]) -> list[dict[str, Any]]:
+    """Whether stiffness, and with it GM, is told, and how well, by loading and length."""
+    rows = []
+    for minutes, period_s in sorted({(each.minutes, each.period_s) for each in parts}):
+        group = [
+            abs(each.stiffness) if each.of_ship == Verdict.GOOD.name else None
+            for each in parts
+            if (each.minutes, each.period_s) == (minutes, period_s) and each.law != "passive"
+        ]
+        told = [each for each in group if each is not None]
+        rows.append(
+            {
+                "minutes": minutes,
+                "period_s": period_s,
+                "parts": len(group),
+                "told": len(told),
+                "within": sum(each <= CLOSE for each in told),
+                "worst": max(told, default=None),
+            }
+        )
+    return rows
+
+
 def _spread(name: str, parts: list[Part]) -> dict[str, float]:
     values = [getattr(each, name) for each in parts]
     if not values:
@@ -206,7 +231,8 @@ def main(arguments: list[str] | None = None) -> int:
         for period_s in chosen.periods:
             parts += parts_of(sea, period_s, chosen.hours, chosen.minutes)
             print(f"{sea}, {period_s:g} s", file=sys.stderr)
-    show({"errors": errors(parts), "parts": [each.__dict__ for each in parts]}, chosen)
+    found = {"errors": errors(parts), "loadings": loadings(parts)}
+    show(found | {"parts": [each.__dict__ for each in parts]}, chosen)
     return 0
 
 
