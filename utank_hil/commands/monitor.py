@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 LIVE: Final = "rerun+http://"
 """How the address of a live stream begins."""
+LOOKS: Final = "&theme=dark&hide_welcome_screen&notebook=0&persist=0"
+"""Of the viewer in a browser: the colours are for a dark ground, and nothing else is to be seen."""
 _LOOK_S: Final = 0.25
 _NICENESS: Final = 5
 
@@ -63,7 +65,7 @@ def watch(
     from utank_hil.telemetry import open_viewer
 
     with stop_on_signals() as stopped, ExitStack() as stack:
-        viewer = _said(stack.enter_context(open_viewer(source, at_s)))
+        viewer = _said(stack.enter_context(open_viewer(source, at_s)), at_s)
         while not stopped():
             if send is not None and not send():
                 send = None
@@ -79,19 +81,22 @@ def watch(
                 "machine: apt-get install mesa-vulkan-drivers",
                 soft_wrap=True,
             )
-            viewer = _said(stack.enter_context(open_viewer(source, at_s, window=False)))
+            viewer = _said(stack.enter_context(open_viewer(source, at_s, window=False)), at_s)
     notes.print("viewer closed")
 
 
-def _said(viewer: "Viewer") -> "Viewer":
-    """A viewer, after it was said where a browser finds it."""
+def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
+    """A viewer, after it was said where a browser finds it, and where in time to look."""
     if viewer.url is not None:
         tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
         notes.print(
-            f"Open {viewer.url} in a browser; Ctrl-C ends the viewer.\n"
+            f"Open {viewer.url}{LOOKS} in a browser; Ctrl-C ends the viewer.\n"
             f"From another machine first: ssh {tunnel} THIS_MACHINE",
             soft_wrap=True,
         )
+        if at_s is not None:
+            # Rerun 0.41 moves the cursor of a page neither by its address nor by a layout
+            notes.print(f"Something happens at {at_s:.1f} s: type it into the field at the bottom.")
     return viewer
 
 
