@@ -29,3 +29,5 @@ html_theme = "furo"
 html_title = "utank-hil"
 html_show_sphinx = False
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]

@@ -42,11 +42,12 @@ scrolls => {
             for (let e = parent; e && e !== document.body; e = e.parentElement) {
                 const style = getComputedStyle(e), edge = e.getBoundingClientRect();
                 if (style.position === "fixed" || style.clipPath !== "none") hidden = true;
-                const outside = box.right > edge.right + 1 || box.left < edge.left - 1
-                    || box.bottom > edge.bottom + 4 || box.top < edge.top - 4;
-                const kind = style.overflowX;
-                if (kind === "visible" || !outside) continue;
-                if (kind === "auto" || kind === "scroll") reached = scrolls;
+                const beside = box.right > edge.right + 1 || box.left < edge.left - 1;
+                const above = box.bottom > edge.bottom + 4 || box.top < edge.top - 4;
+                const clips = beside && style.overflowX !== "visible"
+                    || above && /hidden|clip/.test(style.overflowY);
+                if (!clips) continue;
+                reached = scrolls && beside && /auto|scroll/.test(style.overflowX);
                 if (!reached) found.add(`${e.tagName}.${e.className}: ${text.data.trim()}`);
                 break;
             }
