@@ -2,6 +2,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,12 +35,13 @@ from utank_hil.canbus import (
     SensorTank,
 )
 from utank_hil.control import DesignPlant
-from utank_hil.retuning import RetuningEvent, RetuningOrder
+from utank_hil.retuning import EstimateFigures, RetuningEvent, RetuningOrder
 from utank_hil.runtime import RealTimeLoop
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.runtime.statistics import LoopStatistics
+from utank_hil.runtime.supervisor import Demand
 from utank_hil.tick import TICK_NS
 
 START_NS = 7_000_000_123
@@ -288,6 +290,7 @@ class NotedUpdates:
 
     def __init__(self) -> None:
         self.fresh: list[bool] = []
+        self.engaged: list[bool] = []
         self.laws = SimpleNamespace(active=SimpleNamespace(found=None))
 
     def take_events(self) -> list[RetuningEvent]:
@@ -303,22 +306,95 @@ class NotedUpdates:
         passive_roll_rad: float,
     ) -> None:
         self.fresh.append(fresh)
+        self.engaged.append(engaged)
+
+
+class NotedSamples:
+    """An estimator that estimates nothing."""
+
+    figures = EstimateFigures()
+
+    def __init__(self) -> None:
+        self.times_ns: list[int] = []
+        self.fresh: list[bool] = []
+
+    def sample(
+        self, now_ns: int, pressure_pa: float, motion: tuple[float, ...], *, fresh: bool
+    ) -> None:
+        self.times_ns.append(now_ns)
+        self.fresh.append(fresh)
+
+    def take_news(self) -> tuple[str, ...]:
+        return ()
 
 
 @pytest.mark.parametrize("kind", [SensorMotion, SensorTank])
 def test_a_sample_is_fresh_only_if_motion_and_levels_are(
     kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", noted)
+    estimator: Any = NotedSamples()
+    bench, updates = ControllerBench(START_NS, estimator=estimator), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", updates)
     bench.run(1000)
-    assert all(noted.fresh[1:])
+    for noted in (updates, estimator):
+        assert all(noted.fresh[1:])
     bench.silent.add(kind)
     bench.run(400)
-    assert not noted.fresh[-1]
+    for noted in (updates, estimator):
+        assert not noted.fresh[-1]
     bench.silent.clear()
     bench.run(400)
-    assert noted.fresh[-1]
+    for noted in (updates, estimator):
+        assert noted.fresh[-1]
+
+
+def test_the_motion_is_sampled_for_its_record_five_times_a_second() -> None:
+    estimator: Any = NotedSamples()
+    ControllerBench(START_NS, estimator=estimator).run(2000)
+    assert np.diff(estimator.times_ns).tolist() == [200 * MS] * 9
+
+
+def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    bench.run(400)
+    assert not any(noted.engaged)
+    bench.drive_at(40e3)
+    assert noted.engaged[-1]
+    bench.law.answer_pa = 0.0
+    monkeypatch.setattr(bench.node._limiter, "ramp_to_zero", lambda: 40e3)
+    bench.order_is(arm=False)
+    bench.run(400)
+    assert bench.node.supervisor.demand is Demand.RAMP
+    assert not noted.engaged[-1]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degraded(
+    sign: int,
+) -> None:
+    bench = ControllerBench(START_NS)
+    bench.arm()
+    bench.law.answer_pa = sign * 1e12
+    bench.run(600)
+    most_pa = max(abs(command.pressure_pa) for _, command in bench.commands)
+    assert most_pa == abs(bench.pressure_pa) == LIMITS.pressure_pa
+    bench.silent.add(SensorPump)
+    bench.run(600)
+    assert bench.node.supervisor.degraded
+    assert bench.pressure_pa == sign * LIMITS.pressure_pa / 2
+
+
+def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    excused: list[bool] = []
+    monkeypatch.setattr(monitors.twin, "excuse", lambda: excused.append(True))
+    ControllerBench(START_NS, monitors=monitors).run(300)
+    assert not excused
 
 
 @pytest.mark.parametrize("state", RetuningState)
@@ -394,6 +470,9 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
     noted.state = RetuningState.TRIAL
     monkeypatch.setattr(bench.node, "_retuning", noted)
     assert bench.node.retuning_state is RetuningState.TRIAL
+    bench.run(200)
+    assert bench.status is not None
+    assert bench.status.retuning is RetuningState.TRIAL
 
 
 def test_without_a_pump_nothing_is_ever_commanded() -> None:

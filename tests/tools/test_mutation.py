@@ -94,6 +94,19 @@ def test_mutants_of_equal_words_are_told_apart(tmp_path: Path) -> None:
     assert {"f: x += 1 -> x -= 1", "f: x += 1 -> x -= 1 (2)"} <= set(keys)
 
 
+def test_what_runs_at_import_is_known(tmp_path: Path) -> None:
+    file = tmp_path / "mutated.py"
+    file.write_text(
+        "def made():\n    return inner() + 1\n"
+        "def inner():\n    return 2\n"
+        "def later():\n    return made() + 3\n"
+        "VALUE = made()\n",
+        encoding="utf-8",
+    )
+    found = {mutant.where: mutant.at_import for mutant in mutants_of(file)[1]}
+    assert found == {"made": True, "inner": True, "later": False}
+
+
 @pytest.fixture
 def judged_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """A repository with a file that evidence judged; its entry in the record."""

@@ -65,6 +65,8 @@ class Mutant:
         The line that differs, as Python writes it out.
     code : CodeType
         Of the whole module, changed.
+    at_import : bool
+        It is of what runs when the module is imported.
     twin : int
         How many before it are of the same words, of the same line elsewhere in `where`.
     """
@@ -74,6 +76,7 @@ class Mutant:
     before: str
     after: str
     code: CodeType
+    at_import: bool
     twin: int = 0
 
     @property
@@ -88,6 +91,7 @@ def mutants_of(file: Path) -> tuple[CodeType, list[Mutant]]:
     tree = ast.parse(file.read_bytes())
     unchanged = compile(tree, str(file), "exec")
     found, seen = [], Counter[tuple[str, str, str]]()
+    at_import = {"", *_called_at_import(tree)}
     for place in _places(tree, "", None):
         before = ast.unparse(place.statement).splitlines()
         for replacement in place.replacements:
@@ -100,9 +104,25 @@ def mutants_of(file: Path) -> tuple[CodeType, list[Mutant]]:
             old, new = (before[0], "") if place.whole else _difference(before, after)
             line = getattr(place.node, "lineno", place.statement.lineno)
             words = (place.where, old, new)
-            found.append(Mutant(line, *words, code, seen[words]))
+            early = place.where.partition(".")[0] in at_import
+            found.append(Mutant(line, *words, code, early, seen[words]))
             seen[words] += 1
     return unchanged, found
+
+
+def _called_at_import(tree: ast.Module) -> set[str]:
+    """Functions of a module that it calls itself, and those that they call in turn."""
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    waiting: list[ast.AST] = [node for node in tree.body
+                              if not isinstance(node, ast.FunctionDef | ast.ClassDef)]  # fmt: skip
+    found: set[str] = set()
+    while waiting:
+        called = {node.func.id for node in ast.walk(waiting.pop())
+                  if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}  # fmt: skip
+        new = called & functions.keys() - found
+        found |= new
+        waiting += [functions[name] for name in new]
+    return found
 
 
 def _difference(before: list[str], after: list[str]) -> tuple[str, str]:

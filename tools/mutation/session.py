@@ -2,8 +2,8 @@
 
 A mutant is tried in forks of a session that has collected its tests: the code of the changed
 functions is exchanged, which takes no import. First with few examples of the tests that mirror the
-file, then with more, and with the tests behind them. What lives through that, or is not in a
-function, is tried in a session that imports the changed file.
+file, then with more, and with the tests behind them. What lives through that, or runs when the file
+is imported, is tried in a session that imports the changed file.
 """
 
 import gc
@@ -152,7 +152,7 @@ class Exchange:
                 for old, new in _pairs(self._unchanged, mutant.code)
                 if old != new and old in functions
             }
-            if not exchanged:
+            if not exchanged or mutant.at_import:
                 continue
 
             def changed_passes(exchanged: dict[CodeType, CodeType] = exchanged) -> bool:

@@ -11,11 +11,15 @@ _NOBODY_SETS = "nobody sets what it holds"
 _A_QUARTER = "a quarter more or less of what is as good as nothing"
 _A_NANOSECOND = "a nanosecond, where ticks are ten milliseconds apart"
 _BETWEEN = "no measurement and no set-point of the bus is exactly there"
+_AT_50_MS = "whether a sample that is exactly 50 ms old is a gap in a record"
 _SAME = "the same set-point is no step either way"
 _FALSE = "None is as false as False"
 _ROUNDED = "less than a step of the set-point on the bus"
 _PHASE = "in which tick a status of every second tick comes is the same to all"
 _A_MARGIN = "levels come in millimetres, and the limit has a margin of a tenth"
+_FIRST = "before the first levels one more update by nothing, and after them a fresh start"
+_AS_MANY = "a law answers as many commands as it names"
+_LOSS = "a pascal at a metre a second: the valve does not move by that"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
@@ -106,6 +110,28 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if not math.isfinite(self._law_pa - self._law_loss):": _SUM,
         "ControllerNode._estimate: if (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s: "
         "-> if (now_ns - inbox.tank_ns) * NANOSECONDS >= level.next_due_s:": _BETWEEN,
+        "ControllerNode.__init__: self._observed_cycles = 0 -> self._observed_cycles = 1": _FIRST,
+        "ControllerNode._look_at_motion: estimate = estimator.sample(now_ns, "
+        "inbox.pressure_pa, (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m), "
+        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS) -> estimate = "
+        "estimator.sample(now_ns, inbox.pressure_pa, (inbox.roll_rad, inbox.roll_rate_rad_s, "
+        "inbox.level_m), fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS)": _AT_50_MS,
+        "ControllerNode._control: self._law_pa = 0.0 -> self._law_pa = 1.0": _ROUNDED,
+        "ControllerNode._answer: self._retuning.update(now_ns, "
+        "self.inbox.stations.take_retuning(), engaged=self.supervisor.demand is "
+        "Demand.CONTROL, fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS, "
+        "passive_roll_rad=self.twin_roll_rad) -> self._retuning.update(now_ns, "
+        "self.inbox.stations.take_retuning(), engaged=self.supervisor.demand is "
+        "Demand.CONTROL, fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
+        "passive_roll_rad=self.twin_roll_rad)": _AT_50_MS,
+        "ControllerNode._answer: answered = dict(zip(self._law_commands, answer, "
+        "strict=False)) -> answered = dict(zip(self._law_commands, answer, strict=True))": _AS_MANY,
+        "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
+        "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 1.0)), "
+        "float(answered.get(VALVE, 0.0)))": _ROUNDED,
+        "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
+        "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 0.0)), "
+        "float(answered.get(VALVE, 1.0)))": _LOSS,
     },
     "firmware_sim/drive.py": {
         ": STOPPED_SHARE = 0.02 -> STOPPED_SHARE = 0.025": _A_QUARTER,
