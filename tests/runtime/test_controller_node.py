@@ -28,11 +28,15 @@ from utank_hil.canbus import (
     Heartbeat,
     Mode,
     NodeState,
+    PassiveTwin,
     Quality,
     RetuningState,
+    SeaEstimate,
     SensorMotion,
     SensorPump,
     SensorTank,
+    ShipEstimate,
+    Switch,
 )
 from utank_hil.control import DesignPlant
 from utank_hil.retuning import EstimateFigures, RetuningEvent, RetuningOrder
@@ -477,7 +481,10 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
 
 def test_without_a_pump_nothing_is_ever_commanded() -> None:
     bench = ControllerBench(START_NS, pump=False)
+    bench.arm()
+    bench.law.answer_pa = 30e3
     bench.run(300)
+    assert bench.node.supervisor.demand is Demand.CONTROL
     assert bench.node.command_pa == 0.0
     assert not bench.commands
 
@@ -493,3 +500,73 @@ def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch: pytest.Monke
     monkeypatch.setattr(bench.node, "_event_sink", lambda event, start_ns: heard.append(event))
     bench.run(300)
     assert event in heard
+
+
+def times_ms(bench: ControllerBench, kind: type, ms: int) -> list[int]:
+    """When the node sends a message, over so many ms."""
+    can_id, times = CATALOGUE.codec(kind).can_id, []
+    for tick in range(ms // 10):
+        bench.sent.clear()
+        bench.tick()
+        times += [10 * tick for frame in bench.sent if frame.can_id == can_id]
+    return times
+
+
+def test_what_is_estimated_is_said_in_its_cycle_and_only_where_it_is_estimated() -> None:
+    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    estimator: Any = NotedSamples()
+    for kind, more in (
+        (SeaEstimate, {"estimator": estimator}),
+        (ShipEstimate, {"estimator": estimator}),
+        (PassiveTwin, {"monitors": monitors}),
+    ):
+        cycle_ms = CATALOGUE.codec(kind).cycle_ns // MS
+        times = times_ms(ControllerBench(START_NS, **more), kind, 3 * cycle_ms)
+        assert len(times) == 3
+        assert np.diff(times).tolist() == [cycle_ms] * 2
+        assert not times_ms(ControllerBench(START_NS), kind, 3 * cycle_ms)
+
+
+def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before() -> None:
+    bench = ControllerBench(START_NS)
+    bench.silent.add(SensorMotion)
+    bench.run(9_900)
+    assert Fault.MOTION_SILENT not in bench.node.alarms.codes
+    bench.run(400)
+    assert Fault.MOTION_SILENT in bench.node.alarms.codes
+    bench = ControllerBench(START_NS)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    bench.silent.add(SensorMotion)
+    bench.run(300)
+    assert bench.node.mode is Mode.INIT
+    assert Fault.MOTION_SILENT in bench.node.alarms.codes
+
+
+def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused: list[Fault] = []
+    bench = ControllerBench(START_NS)
+    bench.arm()
+    monkeypatch.setattr(
+        bench.node.alarms, "reset_refused", lambda code, mode, now_ns: refused.append(code)
+    )
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(300)
+    bench.order_is(arm=False, mode_request=Mode.STANDBY, reset=True)
+    bench.run(1000)
+    assert refused == [Fault.LEVEL_LIMIT]
+    bench.tank = bench.tank._replace(port_high=Switch.OFF)
+    bench.order_is(reset=False)
+    bench.run(100)
+    bench.order_is(reset=True)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    assert refused == [Fault.LEVEL_LIMIT]
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_telemetry_has_a_row_of_so_many_ticks(every: int) -> None:
+    bench = ControllerBench(START_NS, sink_every=every)
+    bench.run(200)
+    assert np.diff(bench.column("time_s")) == pytest.approx([every * 0.01] * (20 // every - 1))

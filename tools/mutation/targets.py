@@ -38,6 +38,12 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "return lambda seen: conditions if True else states": _SHORTCUT,
         "_to_look_at: return lambda seen: conditions if seen.found & mask else states -> "
         "return lambda seen: conditions if seen.found | mask else states": _SHORTCUT,
+        "_first_of.first: return None -> ": "a function that comes to its end returns None",
+        ": _AWAITED: Final = sorted((coded for coded in _ALL if coded[1].awaited is not None), "
+        "key=lambda coded: coded[1].awaited or 0) -> _AWAITED: Final = sorted((coded for coded in "
+        "_ALL if coded[1].awaited is not None), key=lambda coded: coded[1].awaited)": (
+            "for the type checker: it is not None"
+        ),
     },
     "utank_hil/runtime/safety_limits.py": {
         "SafetyLimits: @dataclass(frozen=True, slots=True) -> "
@@ -110,6 +116,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if not math.isfinite(self._law_pa - self._law_loss):": _SUM,
         "ControllerNode._estimate: if (now_ns - inbox.tank_ns) * NANOSECONDS > level.next_due_s: "
         "-> if (now_ns - inbox.tank_ns) * NANOSECONDS >= level.next_due_s:": _BETWEEN,
+        "ControllerNode._update_alarms: self._alarming = self._alarming or mode is not Mode.INIT "
+        "or now_ns - self.start_ns >= QUIET_START_NS -> self._alarming = self._alarming or mode "
+        "is not Mode.INIT or now_ns - self.start_ns > QUIET_START_NS": _A_NANOSECOND,
         "ControllerNode.__init__: self._observed_cycles = 0 -> self._observed_cycles = 1": _FIRST,
         "ControllerNode._look_at_motion: estimate = estimator.sample(now_ns, "
         "inbox.pressure_pa, (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m), "
