@@ -95,7 +95,8 @@ def survivors(
         (session.QUICK, target.tests, QUICK_SHARE),
         (session.THOROUGH, tests, 1.0),
     ):
-        left, end_s = waiting(), begin + share * within_s
+        left = [mutant for mutant in waiting() if not mutant.at_import]
+        end_s = begin + share * within_s
         if not left or time.monotonic() > end_s:
             continue
         exchanged = partial(session.try_exchanged, way, file, unchanged, left, chosen)

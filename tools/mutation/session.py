@@ -152,7 +152,7 @@ class Exchange:
                 for old, new in _pairs(self._unchanged, mutant.code)
                 if old != new and old in functions
             }
-            if not exchanged or mutant.at_import:
+            if not exchanged:
                 continue
 
             def changed_passes(exchanged: dict[CodeType, CodeType] = exchanged) -> bool:

@@ -20,6 +20,7 @@ _A_MARGIN = "levels come in millimetres, and the limit has a margin of a tenth"
 _FIRST = "before the first levels one more update by nothing, and after them a fresh start"
 _AS_MANY = "a law answers as many commands as it names"
 _LOSS = "a pascal at a metre a second: the valve does not move by that"
+_NOT_NONE = "for the type checker: it is not None, and no place is 0"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
@@ -41,9 +42,15 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "_first_of.first: return None -> ": "a function that comes to its end returns None",
         ": _AWAITED: Final = sorted((coded for coded in _ALL if coded[1].awaited is not None), "
         "key=lambda coded: coded[1].awaited or 0) -> _AWAITED: Final = sorted((coded for coded in "
-        "_ALL if coded[1].awaited is not None), key=lambda coded: coded[1].awaited)": (
-            "for the type checker: it is not None"
+        "_ALL if coded[1].awaited is not None), key=lambda coded: coded[1].awaited)": (_NOT_NONE),
+        ": _AWAITED: Final = sorted((coded for coded in _ALL if coded[1].awaited is not None), "
+        "key=lambda coded: coded[1].awaited or 0) -> _AWAITED: Final = sorted((coded for coded in "
+        "_ALL if coded[1].awaited is not None), key=lambda coded: coded[1].awaited or 1)": (
+            _NOT_NONE
         ),
+        ": first_lasting: Final = _first_of(_ENDING + tuple((c for c in _AWAITED if c not in "
+        "_ENDING))) -> first_lasting: Final = _first_of(_ENDING + tuple((c for c in _AWAITED if "
+        "True)))": _SHORTCUT,
     },
     "utank_hil/runtime/safety_limits.py": {
         "SafetyLimits: @dataclass(frozen=True, slots=True) -> "
