@@ -6,7 +6,8 @@ READY := $(VENV)/.ready
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
 ON_VCAN := tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence"
 # these in one kernel, the others in another: both take as long
-LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py test_replay_on_vcan.py)
+LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py test_replay_on_vcan.py \
+	test_valve_on_vcan.py)
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
