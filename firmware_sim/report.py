@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
@@ -25,6 +26,8 @@ from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.telemetry import write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
+LEAST_FREE: Final = 1 << 16
+"""Bytes: with fewer the disk is full, which the writer of recordings does not say."""
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 
 
@@ -140,10 +143,14 @@ def write_report(
         ("figures", FIGURES, write_figures),  # after those that they name
         ("report", PAGE, lambda _result, path, _about: write_page([folder], path)),
     ):
+        if file == PAGE and len(files) < len(REPORT_FILES) - 1:
+            break  # it is made of them
         try:
             write(result, folder / file, about)
         except (OSError, RuntimeError, ValueError) as error:
-            failures.append(f"the {name} could not be written: {error}")
+            full = shutil.disk_usage(folder).free < LEAST_FREE
+            reason = f"no space left in {folder}" if full else error
+            failures.append(f"the {name} could not be written: {reason}")
         else:
             files[name] = folder / file
     return files, failures

@@ -147,6 +147,35 @@ def test_cells_are_escaped(tmp_path: Path) -> None:
     assert 'class="verdict"' in page
 
 
+def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "old.rrd"
+    rows = np.zeros((100, len(SIGNALS)))
+    rows[:, SIGNALS.index("time_s")] = np.arange(100)
+    write_recording(file, SIGNALS, {"run": rows}, about={"configuration": {"name": "a law"}})
+    with pytest.raises(ValueError, match=r"old\.rrd: has no 'machine': it is of another version"):
+        write_page([file], tmp_path / "page.html")
+
+
+def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = CliRunner().invoke(app, ["report", str(recording), "--out", "/dev/full"])
+    assert done.exit_code == 2
+    assert isinstance(done.exception, SystemExit)
+    assert "No space left on device: '/dev/full'" in done.output
+    assert Path("/dev/full").exists()
+
+    def half(path: Path, *_arguments: object, **_more: object) -> None:
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    page = tmp_path / "page.html"
+    monkeypatch.setattr(Path, "write_text", half)
+    with pytest.raises(OSError, match="No space left"):
+        write_page([recording], page)
+    assert not page.exists()
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [("nothing", "is not there"), ("empty", "holds no bench.json"), ("text.rrd", "text.rrd")],

@@ -1,6 +1,7 @@
 """``utank-hil report``: a run as one page that can be sent."""
 
 import tempfile
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -70,19 +71,21 @@ def _report(run: Path) -> "Report":
 
     if not run.exists():
         raise ValueError(f"{run}: is not there")
-    with tempfile.TemporaryDirectory() as scratch:
-        if run.is_file():
-            return recording_report(run, Path(scratch))
+    file = run
+    make: Callable[[Path, Path], Report] = recording_report
+    if not run.is_file():
         kinds: list[ReportKind] = [point.load() for point in entry_points(group=GROUP)]
-        for kind in kinds:
-            if (run / kind.file).exists():
-                try:
-                    return kind.report(run, Path(scratch))
-                except KeyError as error:
-                    reason = f"has no {error}: it is of another version, make it again"
-                    raise ValueError(f"{run / kind.file}: {reason}") from error
-    files = " and no ".join(kind.file for kind in kinds)
-    raise ValueError(
-        f"{run}: holds no {files}: give the folder of a bench or of a campaign, or the .rrd file "
-        "of a run"
-    )
+        kind = next((kind for kind in kinds if (run / kind.file).exists()), None)
+        if kind is None:
+            files = " and no ".join(kind.file for kind in kinds)
+            raise ValueError(
+                f"{run}: holds no {files}: give the folder of a bench or of a campaign, or the "
+                ".rrd file of a run"
+            )
+        file, make = run / kind.file, kind.report
+    try:
+        with tempfile.TemporaryDirectory() as scratch:
+            return make(run, Path(scratch))
+    except KeyError as error:
+        reason = f"has no {error}: it is of another version, make it again"
+        raise ValueError(f"{file}: {reason}") from error

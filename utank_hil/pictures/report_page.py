@@ -117,5 +117,10 @@ def write_report_page(
     page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         title=title, about=about, verdicts=verdicts, sections=sections
     )
-    path.write_text(page, encoding="utf-8")
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        if path.is_file():
+            path.unlink()  # half a page would be taken for a whole one
+        raise OSError(error.errno, error.strerror, str(path)) from error
     return path
