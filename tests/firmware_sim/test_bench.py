@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from firmware_sim import report
-from firmware_sim.bench import BenchOptions, BenchResult, jobs_of, run_bench, window_s
+from firmware_sim.bench import (
+    BenchOptions,
+    BenchResult,
+    jobs_of,
+    run_bench,
+    run_in_turn,
+    window_s,
+)
 from firmware_sim.figures import figures
 from firmware_sim.on_board import on_board
 from firmware_sim.place import Place
@@ -88,8 +95,8 @@ def test_plans_that_were_not_found_in_time_are_told() -> None:
     starved = hurried.model_copy(
         update={"law": dataclasses.replace(hurried.law, iteration_limit=1)}
     )
-    scenario = scenario.model_copy(update={"controllers": {"starved": starved}, "settle_s": 5.0})
-    result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
+    changes = {"controllers": {"starved": starved}, "settle_s": 5.0, "duration_s": 60.0}
+    result = run_in_turn(scenario.model_copy(update=changes), scenario.seed)
     passive, run = result.runs
     assert passive.fallbacks is None
     assert run.fallbacks is not None
@@ -321,9 +328,10 @@ def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
             "controllers": {"none": passive},
             "actual_ship": {"inertia_kg_m2": 1.2e9, "stiffness_nm_rad": 6.7e8},
             "actual_from_s": change_s,
+            "duration_s": 20.0,
         }
     )
-    result = run_bench(changing, BenchOptions(duration_s=20.0), lambda _name, _done: None)
+    result = run_in_turn(changing, STORM.seed)
     bare = result.without_tank_rad
     ship, moment = STORM.vessel.ship, STORM.wave_moment(STORM.seed)
     before = RECORD_S * np.arange(len(bare)) <= change_s
@@ -345,5 +353,6 @@ def test_bare_ship_is_loaded_differently_when_the_ship_is() -> None:
 
 def test_an_interface_that_is_not_there_ends_the_bench_with_its_name() -> None:
     options = BenchOptions(real_time=True, channel="nowhere0", duration_s=60.0)
+    alone = STORM.model_copy(update={"controllers": {}})
     with pytest.raises(OSError, match="nowhere0"):
-        run_bench(STORM, options, lambda _name, _done: None)
+        run_bench(alone, options, lambda _name, _done: None)
