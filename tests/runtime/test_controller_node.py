@@ -352,6 +352,20 @@ def test_a_sample_is_fresh_only_if_motion_and_levels_are(
         assert noted.fresh[-1]
 
 
+@pytest.mark.parametrize("kind", [SensorMotion, SensorTank])
+@pytest.mark.parametrize(("age_ms", "fresh"), [(40, True), (60, False)])
+def test_a_measurement_is_a_gap_in_the_record_from_50_ms_on(
+    kind: type, age_ms: int, fresh: bool
+) -> None:
+    estimator: Any = NotedSamples()
+    bench = ControllerBench(START_NS, estimator=estimator)
+    bench.run(1010 - age_ms)
+    bench.silent.add(kind)
+    bench.run(age_ms)
+    assert estimator.times_ns[-1] == START_NS + 1000 * MS
+    assert estimator.fresh[-1] is fresh
+
+
 def test_the_motion_is_sampled_for_its_record_five_times_a_second() -> None:
     estimator: Any = NotedSamples()
     ControllerBench(START_NS, estimator=estimator).run(2000)
