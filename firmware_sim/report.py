@@ -2,7 +2,6 @@
 
 import json
 import math
-import shutil
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
@@ -24,10 +23,9 @@ from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.telemetry import write_recording
+from utank_hil.whole_file import write_whole
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
-LEAST_FREE: Final = 1 << 16
-"""Bytes: with fewer the disk is full, which the writer of recordings does not say."""
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)
 
 
@@ -135,7 +133,7 @@ def write_report(
 
     def write_figures(result: BenchResult, path: Path, about: Mapping[str, Any]) -> None:
         found = as_json(result, files | {"figures": path}, about)
-        path.write_text(json.dumps(found, indent=2) + "\n")
+        write_whole(path, json.dumps(found, indent=2) + "\n")
 
     for name, file, write in (
         ("picture", PICTURE, _draw),
@@ -147,10 +145,8 @@ def write_report(
             break  # it is made of them
         try:
             write(result, folder / file, about)
-        except (OSError, RuntimeError, ValueError) as error:
-            full = shutil.disk_usage(folder).free < LEAST_FREE
-            reason = f"no space left in {folder}" if full else error
-            failures.append(f"the {name} could not be written: {reason}")
+        except (OSError, ValueError) as error:
+            failures.append(f"the {name} could not be written: {error}")
         else:
             files[name] = folder / file
     return files, failures

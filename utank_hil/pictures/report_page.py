@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from utank_hil.pictures.style import DPI, TEXT_PT
+from utank_hil.whole_file import write_whole
 
 LEAST_TEXT_PX: Final = 9.0
 TEXT_PX: Final = TEXT_PT / 72 * DPI
@@ -117,10 +118,5 @@ def write_report_page(
     page = environment.from_string(_TEMPLATE.read_text(encoding="utf-8")).render(
         title=title, about=about, verdicts=verdicts, sections=sections
     )
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        if path.is_file():
-            path.unlink()  # half a page would be taken for a whole one
-        raise OSError(error.errno, error.strerror, str(path)) from error
+    write_whole(path, page)
     return path

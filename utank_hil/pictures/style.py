@@ -1,5 +1,6 @@
 """Common style and colours of the figures."""
 
+import io
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from utank_hil.provenance import headline
+from utank_hil.whole_file import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,4 +93,6 @@ def picture(
 
 
 def _save(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
-    figure.savefig(path, dpi=DPI, metadata={"Software": headline(), **metadata})
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=DPI, metadata={"Software": headline(), **metadata})
+    write_whole(path, drawn.getvalue())

@@ -33,6 +33,7 @@ from utank_hil.telemetry.rerun_log import (
 from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.units import column_of, field_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
+from utank_hil.whole_file import write_whole
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
@@ -66,8 +67,8 @@ def write_recording(
     ValueError
         If there is no run, a table is empty or does not fit the columns, `time_s` is missing, or a
         column is not in SI units.
-    RuntimeError
-        If the file can't be written.
+    OSError
+        If the file can't be written; then there is none.
     """
     if not runs:
         raise ValueError("a recording needs at least one run")
@@ -87,7 +88,8 @@ def write_recording(
         zero=_zero(columns, runs),
     )
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
-    recording.set_sinks(rr.FileSink(path), default_blueprint=blueprint)
+    memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk
+    recording.send_blueprint(blueprint, make_active=False)
     if about is not None:
         write_about(recording, about)
     for number, (path_of_run, (run, rows)) in enumerate(
@@ -100,8 +102,7 @@ def write_recording(
             log.write(rows[start : start + _BLOCK_ROWS])
         log.write_events((events or {}).get(run, ()))
         log.close()
-    recording.flush()
-    recording.disconnect()
+    write_whole(path, memory.drain_as_bytes())
 
 
 def _zero(columns: Sequence[str], runs: Mapping[str, FloatArray]) -> set[tuple[str, str]]:

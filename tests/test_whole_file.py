@@ -1,0 +1,63 @@
+"""Files are there whole or not at all, on a full disk too."""
+
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from utank_hil.pictures.report_page import write_report_page
+from utank_hil.pictures.style import picture
+from utank_hil.telemetry import write_recording
+from utank_hil.whole_file import write_whole
+
+ROOM = 1024
+
+
+@contextmanager
+def little_room() -> Iterator[None]:
+    """No file can grow beyond `ROOM`, as on a disk that fills up while it is written."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def a_text(path: Path) -> None:
+    write_whole(path, "0123456789" * ROOM)
+
+
+def a_recording(path: Path) -> None:
+    rows = np.random.default_rng(1).standard_normal((2000, 2))
+    write_recording(path, ["time_s", "roll_rad"], {"passive": rows})
+
+
+def a_picture(path: Path) -> None:
+    with picture(path, "Noise", (4.0, 3.0)) as figure:
+        figure.add_subplot().plot(np.random.default_rng(1).standard_normal(500))
+
+
+def a_page(path: Path) -> None:
+    write_report_page(path, "Storm", "seed 1", [], [])
+
+
+@pytest.mark.parametrize("write", [a_text, a_recording, a_picture, a_page])
+def test_what_does_not_fit_is_named_and_not_left_in_half(
+    tmp_path: Path, write: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "file"
+    write(path)
+    assert path.stat().st_size > ROOM
+    with little_room(), pytest.raises(OSError, match=str(path)):
+        write(path)
+    assert not path.exists()
+
+
+def test_a_full_device_stays_and_is_named() -> None:
+    with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
+        write_whole(Path("/dev/full"), "text")
+    assert Path("/dev/full").exists()
