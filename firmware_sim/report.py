@@ -141,8 +141,6 @@ def write_report(
         ("figures", FIGURES, write_figures),  # after those that they name
         ("report", PAGE, lambda _result, path, _about: write_page([folder], path)),
     ):
-        if file == PAGE and len(files) < len(REPORT_FILES) - 1:
-            break  # it is made of them
         try:
             write(result, folder / file, about)
         except (OSError, ValueError) as error:

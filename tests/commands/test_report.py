@@ -166,11 +166,11 @@ def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
     assert Path("/dev/full").exists()
 
     def half(path: Path, *_arguments: object, **_more: object) -> None:
-        path.write_bytes(b"half")
+        path.touch()
         raise OSError(28, "No space left on device")
 
     page = tmp_path / "page.html"
-    monkeypatch.setattr(Path, "write_text", half)
+    monkeypatch.setattr(Path, "write_bytes", half)
     with pytest.raises(OSError, match="No space left"):
         write_page([recording], page)
     assert not page.exists()
