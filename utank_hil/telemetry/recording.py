@@ -89,7 +89,8 @@ def write_recording(
     )
     recording = rr.RecordingStream(APPLICATION, recording_id=path.stem)
     memory = recording.memory_recording()  # Rerun's writer of files waits forever on a full disk
-    recording.send_blueprint(blueprint, make_active=False)
+    # active: a browser begins to show what comes first, which is the recording
+    recording.send_blueprint(blueprint)
     if about is not None:
         write_about(recording, about)
     for number, (path_of_run, (run, rows)) in enumerate(
