@@ -113,6 +113,8 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "ControllerNode.__init__: self._law_pa = self._law_loss = 0.0 -> ": _SET_FIRST,
         "ControllerNode.__init__: self._law_pa = self._law_loss = 0.0 -> "
         "self._law_pa = self._law_loss = 1.0": _SET_FIRST,
+        "ControllerNode.__init__: self._all_due = True -> ": _SET_FIRST,
+        "ControllerNode.__init__: self._all_due = True -> self._all_due = False": _SET_FIRST,
         "ControllerNode.__init__: self._frames_sent = 0 -> self._frames_sent = 1": (
             "a frame more in the first second's load"
         ),
