@@ -110,7 +110,7 @@ class _AnySea(Section):
         return [("sea.heading_deg", reason)]
 
 
-class _IrregularSea(_AnySea, ABC):
+class IrregularSea(_AnySea, ABC):
     """A sea drawn from a spectrum."""
 
     spreading: NotNegative | None = None
@@ -163,19 +163,19 @@ class _IrregularSea(_AnySea, ABC):
         return [(0.0, self)]
 
 
-class JonswapSea(JonswapSpectrum, _IrregularSea):
+class JonswapSea(JonswapSpectrum, IrregularSea):
     """A growing sea."""
 
 
-class IttcSea(IttcSpectrum, _IrregularSea):
+class IttcSea(IttcSpectrum, IrregularSea):
     """A sea of given height and period."""
 
 
-class PiersonMoskowitzSea(PiersonMoskowitzSpectrum, _IrregularSea):
+class PiersonMoskowitzSea(PiersonMoskowitzSpectrum, IrregularSea):
     """A fully developed sea."""
 
 
-class MeasuredSea(MeasuredSpectrum, _IrregularSea):
+class MeasuredSea(MeasuredSpectrum, IrregularSea):
     """One hour of a buoy's record, in one direction or in the directions measured."""
 
     direction_file: Path | None = None

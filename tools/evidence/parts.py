@@ -53,6 +53,12 @@ PARTS = (
         15,
     ),
     Part(
+        "renewed_seas",
+        "python -m tools.studies.renewed_seas --seeds 3 --json",
+        "the law that starts knowing nothing, 20 minutes on, in many seas on the bench's plant",
+        30,
+    ),
+    Part(
         "constrained_campaign",
         "python -m tools.studies.constrained_campaign --seeds 8 --out docs/pictures --json",
         "constrained and self-tuned GPC against the same clipped, sea by sea, with its picture",
