@@ -14,7 +14,7 @@ from tools.documents import tables, write
 from tools.evidence import record, sources
 from tools.evidence.__main__ import main
 from tools.evidence.parts import PARTS, Part
-from tools.studies import sea_estimates
+from tools.studies import many_seas, renewed_seas, sea_estimates
 
 TOY = Part("toy", "python -m tools.thesis.derive_tank_forces --json", "nothing", 1)
 
@@ -190,6 +190,33 @@ def test_measured_hours_are_counted_by_their_roll_and_judged_by_their_intervals(
     assert rows[1][1:] == ["2", "-15.0%", "-20% ± 10", "1", "600", "1.2"]
     assert rows[2][1:] == ["3", "6.7%", "-20% ± 10", "1", "433", "1.3"]
     assert {len(row) for row in rows} == {len(heading)}
+
+
+def test_seas_under_way_are_told_by_share_and_power_and_their_mean_is_last() -> None:
+    def run(share: float) -> dict[str, Any]:
+        law = {"below_passive": share / 2, "share": share, "power_w": 1e5, "active": 1.0}
+        return {"passive_deg": 2.0, "bound_deg": 1.0, **dict.fromkeys(renewed_seas.LAWS, law)}
+
+    calm, storm = (
+        renewed_seas.summary([run(share - 0.1), run(share + 0.1)]) for share in (0.3, 0.7)
+    )
+    mean = dict.fromkeys(renewed_seas.LAWS, storm["renewed"])
+    result = {"seas": {"calm": calm, "storm": storm}, "mean of the first sixteen": mean}
+    heading, *rows = tables.renewed_seas(result)
+    half = round(100 * 0.1 * math.sqrt(2) * 12.706 / math.sqrt(2))  # Student's t, one of freedom
+    assert rows[0][:5] == ["calm", "2.00", *3 * [f"30% ± {half}"]]
+    assert rows[1][5:] == ["35.0%", "100", "100", "100"]
+    assert rows[2][:3] == ["mean of the first sixteen", "", f"70% ± {half}"]
+    assert {len(row) for row in rows} == {len(heading)}
+
+
+def test_a_sea_of_any_spectrum_is_sailed_by_all_laws_and_the_passive_tank() -> None:
+    sea = many_seas.seas()["2 m 14 s and 1.5 m 6 s"]
+    jobs = renewed_seas.jobs(sea, 3)
+    assert [job.name for job in jobs] == ["passive", *renewed_seas.LAWS]
+    drawn = {job.scenario.sea.sea(job.seed).amplitude_m.tobytes() for job in jobs}
+    assert len(drawn) == 1
+    assert jobs[-1].controller.sea_estimate.renew
 
 
 def test_a_ship_that_is_not_told_is_counted_and_has_no_error() -> None:

@@ -219,6 +219,26 @@ def many_seas(result: dict[str, Any]) -> Rows:
     ]
 
 
+def renewed_seas(result: dict[str, Any]) -> Rows:
+    """Share, roll and power of the laws under way, a row a sea."""
+    mean, own = "mean of the first sixteen", "renewed"
+    rows = result["seas"] | ({mean: result[mean]} if mean in result else {})
+    laws = [name for name, law in next(iter(rows.values())).items() if isinstance(law, dict)]
+    return [
+        ["sea", "passive, °", *laws, f"{own}: below passive", *(f"{law}, kW" for law in laws)],
+        *(
+            [
+                name,
+                number(row.get("passive_deg"), ".2f"),
+                *(share(row[law]["share"]) for law in laws),
+                number(row[own]["below_passive"]["mean"], ".1%"),
+                *(f"{row[law]['power_w']['mean'] / 1e3:.0f}" for law in laws),
+            ]
+            for name, row in rows.items()
+        ),
+    ]
+
+
 def voyage_stages(result: dict[str, Any]) -> Rows:
     """The renewed law beside the one that was given the truth, a row a stage."""
     return [
@@ -286,6 +306,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "printed index": ("linear_law_tables", printed_index),
     "step costs": ("cost_controllers", step_costs),
     "many seas": ("many_seas", many_seas),
+    "renewed seas": ("renewed_seas", renewed_seas),
     "voyage stages": ("renewed_voyage", voyage_stages),
     "stiffness by loading": ("sea_estimates", stiffness_by_loading),
     "february hours": ("february_hours", february_hours),
