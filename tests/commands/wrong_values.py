@@ -40,7 +40,7 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
      {"law.knots": "must be 60 at most"}),
     ("constrained_gpc", {"law__horizon": 401, "law__iteration_limit": 201},
      {"law.horizon": "must be 1 to 400", "law.iteration_limit": "must be 1 to 200"}),
-    ("constrained_gpc", {"limits__level_m": 0.1},
+    ("constrained_gpc", {"law__level_margin_m": 4.0},
      {"law.level_margin_m": "leaves nothing of the level limit"}),
     ("constrained_gpc", {"law__sea__effective_slope": 0, "law__sea__order": 800,
                          "law__sea__floor": 200.0, "law__sea__smoothing_rad_s": 5.0,

@@ -21,9 +21,7 @@ PLANT = load_config(Path("configs/controllers/gpc.yaml"), ControllerConfig).plan
 UNIT = PLANT.limits.pressure_pa
 SPECTRUM = jonswap(4.0, 10.0)
 SEA = SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density), order=16, floor=1.3e-4)
-DESIGN = ConstrainedDesign(
-    "constrained_gpc", SEA, after_horizon="law", slope_noise_rad_rt_s=0.01, heel_std_rad=0.003
-)
+DESIGN = ConstrainedDesign("constrained_gpc", SEA, slope_noise_rad_rt_s=0.01, heel_std_rad=0.003)
 LAW = DESIGN.law(PLANT)
 LINEAR = LAW.unlimited()
 WEIGHTS = (1.0, 3e-5, 2.6e-4)

@@ -117,7 +117,6 @@ def test_a_plan_that_the_law_follows_is_the_law_whatever_its_length():
             DESIGN,
             knots=tuple(range(samples)),
             horizon=samples,
-            after_horizon="law",
             heel_std_rad=0.0,
         )
         .law(DesignPlant(SHIP, TANK, limits=LIMITS))
@@ -130,7 +129,7 @@ def test_a_plan_that_the_law_follows_is_the_law_whatever_its_length():
 
 def test_the_margin_that_is_not_given_is_the_error_of_the_forecast_that_draws_have():
     plant = DesignPlant(SHIP, TANK, limits=LIMITS)
-    law = dataclasses.replace(DESIGN, level_margin_m=None).law(plant)
+    law = DESIGN.law(plant)
     noises = ("pressure_noise_pa_rt_s", "slope_noise_rad_rt_s", "heel_std_rad", "heel_time_s")
     settings = {name: getattr(DESIGN, name) for name in (*noises, "sample_time_s")}
     _, covariance = sea_plant(DESIGN.sea, plant, **settings)

@@ -353,10 +353,8 @@ class _Search:
             measurement_std=self._std,
             pressure_noise_pa_rt_s=_short(11.0 * limits.pressure_pa * roll / root),
             slope_noise_rad_rt_s=_short((0.046 + math.sqrt(knob)) * roll / root),
-            after_horizon="law",
             pressure_weight_rad2=_short(pressure),
             level_weight_rad2_m2=_short(level),
-            level_margin_m=None,
             heel_std_rad=self._heel_rad,
             sample_time_s=self._step_s,
         )

@@ -67,8 +67,6 @@ class ConstrainedDesign:
         Samples of the horizon at which the plan holds the command, increasing from 0; 60 at most.
     horizon : int
         Samples N that are planned, 400 at most.
-    after_horizon : {"passive", "law"}
-        What is taken to follow the plan for ever: the passive tank, or the law without limits.
     pressure_weight_rad2 : float
         Greatest pressure throughout costs as much as this square of a roll angle.
     level_weight_rad2_m2 : float
@@ -97,10 +95,9 @@ class ConstrainedDesign:
         *(0, 1, 2, 3, 4, 6, 8, 10, 13, 16, 19, 23, 27, 31, 36, 41, 46, 51, 56),
     )
     horizon: Annotated[int, Range(least=1, most=MOST_HORIZON)] = 60
-    after_horizon: Literal["passive", "law"] = "passive"
-    pressure_weight_rad2: Positive = 2.6e-4
+    pressure_weight_rad2: Positive = 2.1e-4
     level_weight_rad2_m2: NotNegative = 3e-5
-    level_margin_m: NotNegative | None = 0.2
+    level_margin_m: NotNegative | None = None
     heel_std_rad: NotNegative = 0.01
     heel_time_s: Positive = 50e3
     heel_share: Share = 0.0
@@ -162,11 +159,7 @@ class ConstrainedDesign:
             self.horizon,
             weight,
             self.pressure_weight_rad2 / limits.pressure_pa**2,
-            terminal=(
-                _passive_cost(model, weight)
-                if self.after_horizon == "passive"
-                else _cost_of_law(model, weight, self.pressure_weight_rad2, limits.pressure_pa)
-            ),
+            terminal=_cost_of_law(model, weight, self.pressure_weight_rad2, limits.pressure_pa),
         )
         steady_state, steady_command = _steady(whole, self.heel_share)
         return ConstrainedLaw(
@@ -191,13 +184,6 @@ class ConstrainedDesign:
         """Design the law for a plant."""
         law = self.law(plant)
         return BuiltLaw(law.controller, self.measured, law)
-
-
-def _passive_cost(model: LinearModel, weight: FloatArray) -> FloatArray:
-    """L with |L x|^2 the weighed squares of all outputs from the state x on, the pump at zero."""
-    from scipy.linalg import solve_discrete_lyapunov
-
-    return _root(solve_discrete_lyapunov(model.A.T, model.C.T @ (weight[:, None] * model.C)))
 
 
 def _cost_of_law(
