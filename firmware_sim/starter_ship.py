@@ -9,6 +9,8 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import Positive, Problem, Range, range_problems, refuse
 
 _GYRATION_PER_BEAM: Final = (0.1, 1.2)
+_DEPTH_PER_BEAM: Final = (0.01, 1.0)
+"""Of the displaced water on a waterline of length times beam: draught times block coefficient."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +31,8 @@ class StarterShip:
     Raises
     ------
     ValueError
-        If a value is out of its range, neither period nor draught is given, or GM and period are
-        not of one ship.
+        If a value is out of its range, neither period nor draught is given, or displacement and
+        length, or GM and period, are not of one ship.
     """
 
     name: str
@@ -50,7 +52,15 @@ class StarterShip:
         refuse("ship", problems or self._shape_problems())
 
     def _shape_problems(self) -> list[Problem]:
-        """A period and a GM that no ship of that beam has together."""
+        """What no ship of that beam has together: displacement and length, period and GM."""
+        depth_m = self.displacement_t / (self.length_m * self.beam_m)  # of fresh water
+        least, most = _DEPTH_PER_BEAM
+        if not least <= depth_m / self.beam_m <= most:
+            reason = (
+                f"is {depth_m:.3g} m of water on {self.length_m:g} m by {self.beam_m:g} m: the "
+                "displacement is in tonnes, length and beam in metres"
+            )
+            return [("displacement_t", reason)]
         gyration_m = self.period_s / (2 * math.pi) * math.sqrt(GRAVITY_M_S2 * self.gm_m)
         least, most = _GYRATION_PER_BEAM
         if least <= gyration_m / self.beam_m <= most:

@@ -198,6 +198,7 @@ def test_unknown_node_to_leave_out_is_refused_with_those_that_there_are(names: s
         ("bench", "--bus", "vcan0"),
         ("bench", "nowhere.yaml"),
         ("bench", "--duration", "-3"),
+        ("bench", "--duration", "inf"),
         ("check",),
         ("check", "nowhere.yaml"),
         ("conquer",),

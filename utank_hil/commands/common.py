@@ -53,7 +53,9 @@ Version = Annotated[
     ),
 ]
 Duration = Annotated[
-    float | None, typer.Option("--duration", min=0.1, metavar="SECONDS", help="Length of a run.")
+    float | None,
+    # a float without a limit may be infinite
+    typer.Option("--duration", min=0.1, max=1e9, metavar="SECONDS", help="Length of a run."),
 ]
 
 # progress, notes and errors; standard output is for results
