@@ -99,6 +99,9 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.HARDWIRED_SILENT, Reaction.STOP, {"hardwired_age_ms": 160}),
 ]
 
+# where it is enabled: a pump that presses against zero, and a stop that is no message
+DRIVE_OFF = (Fault.SIGN_FLIP, Fault.DRIVE_NOT_FOLLOWING, Fault.HARDWIRED_STOP)
+
 
 def conditions_in(seen: Observations, *reactions: Reaction) -> list[tuple[Fault, Condition]]:
     """Conditions of these reactions that hold."""
@@ -215,6 +218,11 @@ def test_reset_is_refused_with_its_reason_while_any_cause_lasts(
         supervisor = bench.supervisor
         assert (supervisor.mode, supervisor.fault) == (Mode.FAULT, latched)
         assert supervisor.reset_refused_by is fault
+        bench.tick(**sign, reset_edge=True)
+        assert supervisor.reset_refused_by is Fault.NONE  # until this one is refused, too
+        for _ in range(60):
+            bench.tick(**sign)
+        assert supervisor.reset_refused_by is fault
         for _ in range(60):  # the refusal is not taken back when the cause goes
             assert bench.tick().mode is Mode.FAULT
         assert bench.tick(reset_edge=True).mode is Mode.STANDBY
@@ -273,10 +281,13 @@ def passive_bench() -> Bench:
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
-def test_without_pressure_no_fault_is_latched(
+def test_without_pressure_no_fault_is_latched_but_what_must_switch_the_drive_off(
     fault: Fault, reaction: Reaction, sign: dict[str, object]
 ) -> None:
-    assert passive_bench().tick(requested_mode=Mode.PASSIVE, **sign).mode is not Mode.FAULT
+    supervisor = passive_bench().tick(requested_mode=Mode.PASSIVE, **sign)
+    latched = fault in DRIVE_OFF and reaction is Reaction.STOP
+    assert (supervisor.mode is Mode.FAULT) is latched
+    assert not (latched and supervisor.drive_wanted)
     bench = Bench()
     bench.tick()
     # in STANDBY the command is zero whatever the last one was
@@ -287,6 +298,12 @@ def test_a_drive_that_was_out_before_arming_is_no_reason_to_refuse_it() -> None:
     bench = Bench()
     bench.tick()
     assert bench.tick(**ARMING, drive_out_ms=50.0).arming
+
+
+def test_a_disarming_in_the_tick_of_the_arm_edge_is_not_lost() -> None:
+    bench = Bench()
+    bench.tick()
+    assert not bench.tick(**{**ARMING, "armed": False}).arming
 
 
 @pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])

@@ -55,6 +55,8 @@ class Condition:
         it is ready all the same.
     findings : Finding
         Those of the monitors any of which is this condition, if it is one of theirs.
+    ends_passive : bool
+        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled.
     """
 
     reaction: Reaction
@@ -63,6 +65,7 @@ class Condition:
     zero_within_ms: int = 1000
     awaited: int | None = None
     findings: Finding = _NONE
+    ends_passive: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +97,18 @@ def _row(
     return FaultRow(code, happened, remedy, conditions, law_limit)
 
 
-def _found(reaction: Reaction, limit: str, findings: Finding) -> Condition:
+def _found(
+    reaction: Reaction, limit: str, findings: Finding, *, ends_passive: bool = False
+) -> Condition:
     """What the monitors find."""
     mask = int(findings)  # `&` with a member takes thirty times as long in Python 3.11
-    return Condition(reaction, limit, lambda seen, _: seen.found & mask != 0, findings=findings)
+    return Condition(
+        reaction,
+        limit,
+        lambda seen, _: seen.found & mask != 0,
+        findings=findings,
+        ends_passive=ends_passive,
+    )
 
 
 # Of the conditions with the same reaction, the first that holds names the fault.
@@ -110,6 +121,7 @@ FAULTS: Final = (
             Reaction.STOP,
             "the stop loop is open, broken or not available, in any intact frame",
             lambda seen, _: seen.hardwired_stop,
+            ends_passive=True,
         ),
     ),
     _row(
@@ -278,6 +290,7 @@ FAULTS: Final = (
             Reaction.STOP,
             "measured pressure against the command for 200 ms, or against the water's motion",
             Finding.PUMP_SIGN,
+            ends_passive=True,
         ),
     ),
     _row(
@@ -449,7 +462,12 @@ FAULTS: Final = (
         Fault.DRIVE_NOT_FOLLOWING,
         "The pump's pressure does not follow the command.",
         "Check the pump for blockage, the drive for limits, and the pressure sensor.",
-        _found(Reaction.STOP, "15% of the pressure limit off for 500 ms", Finding.DRIVE_LOST),
+        _found(
+            Reaction.STOP,
+            "15% of the pressure limit off for 500 ms",
+            Finding.DRIVE_LOST,
+            ends_passive=True,
+        ),
         _found(Reaction.RAMP, "the same for 300 ms", Finding.DRIVE_LAGS),
     ),
     _row(

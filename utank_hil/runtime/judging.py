@@ -57,6 +57,7 @@ _AWAITED: Final = sorted(
 )
 
 first_stopping: Final = _first_of(_STOPPING)
+first_ending_passive: Final = _first_of(tuple(c for c in _STOPPING if c[1].ends_passive))
 first_ending: Final = _first_of(_ENDING)
 soonest_ramp: Final = _first_of(
     tuple(sorted(_with(Reaction.RAMP), key=lambda coded: coded[1].zero_within_ms))

@@ -103,6 +103,7 @@ class Supervisor:
                 self.drive_wanted = False
         if seen.reset_edge and self.demand is Demand.ZERO:
             self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
+            self.reset_refused_by = Fault.NONE
         if self._reset_until_ns is not None:
             self._continue_reset(seen, now_ns, self._reset_until_ns)
 
@@ -116,15 +117,18 @@ class Supervisor:
             self.reset_refused_by = lasts[0]
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
-        if self.mode is Mode.PASSIVE and seen.command_pa != 0.0:
-            # still ramping down, so what ends ACTIVE ends this
-            self._note_drive(seen, now_ns)
-            found = judging.first_ending(seen, self.limits)
+        if self.mode is Mode.PASSIVE:
+            if seen.command_pa != 0.0:
+                # still ramping down, so what ends ACTIVE ends this
+                self._note_drive(seen, now_ns)
+                found = judging.first_ending(seen, self.limits)
+                if now_ns >= self._zero_at_ns:
+                    self.demand = Demand.ZERO
+            else:
+                found = judging.first_ending_passive(seen, self.limits)
             if found is not None:
                 self._latch(*found, seen, now_ns)
                 return
-            if now_ns >= self._zero_at_ns:
-                self.demand = Demand.ZERO
         missing = judging.first_awaited(seen, self.limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
@@ -136,7 +140,7 @@ class Supervisor:
             self._disarm(Mode.STANDBY)
         if self._arming_since_ns is not None:
             self._continue_arming(seen, now_ns, self._arming_since_ns)
-        elif seen.requested_mode is Mode.ACTIVE and seen.arm_edge:
+        elif seen.requested_mode is Mode.ACTIVE and seen.arm_edge and seen.armed:
             self._begin_arming(seen, now_ns)
         elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
             if seen.command_pa == 0.0:  # the ramp down has come to its end
