@@ -63,11 +63,11 @@ class Instant:
 
 @pytest.mark.slow
 def test_every_row_is_in_a_file_named_by_the_time(tmp_path: Path) -> None:
-    summary = record(tmp_path / "new" / "folder", 30)
+    summary = record(tmp_path / "new" / "folder", 33)
     assert summary.file is not None
     assert re.fullmatch(r"run-\d{8}T\d{6}Z\.rrd", Path(summary.file).name)
-    assert (summary.rows, summary.lost, summary.error) == (30, 0, None)
-    assert len(read_recording(Path(summary.file))["live"]["time_s"]) == 30
+    assert (summary.rows, summary.lost, summary.error) == (33, 0, None)
+    assert len(read_recording(Path(summary.file))["live"]["time_s"]) == 33
 
 
 def test_no_recording_is_overwritten_however_soon_the_next_run_comes(

@@ -14,7 +14,6 @@ from utank_hil.telemetry.bus_records import (
     Records,
     pack,
     records_of,
-    ring_rows,
     unpack,
 )
 
@@ -31,8 +30,7 @@ ENTRIES = st.lists(
 
 def packed(entries: list[tuple[Kind, int, int, bytes]]) -> bytes:
     return b"".join(
-        LAYOUT.pack(kind, len(data), 0, number, time_ns, data)
-        for kind, number, time_ns, data in entries
+        LAYOUT.pack(number, data, kind, time_ns) for kind, number, time_ns, data in entries
     )
 
 
@@ -53,7 +51,7 @@ def test_rows_of_a_ring_hold_the_same_records(
     entries: list[tuple[Kind, int, int, bytes]],
 ) -> None:
     data = packed(entries)
-    table = np.frombuffer(b"".join(ring_rows(data))).reshape(-1, len(ROW))
+    table = np.frombuffer(data).reshape(-1, len(ROW))
     assert records_of(table).tobytes() == data
 
 

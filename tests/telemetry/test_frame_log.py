@@ -21,11 +21,11 @@ def tick(number: int, source: random.Random) -> bytes:
     """What a tick has: some noisy frames, the tick, an answer."""
     time_ns = number * TICK_NS
     frames = [
-        LAYOUT.pack(Kind.RECEIVED, 8, 0, 0x08FF3082 + i, time_ns - i, source.randbytes(8))
+        LAYOUT.pack(0x08FF3082 + i, source.randbytes(8), Kind.RECEIVED, time_ns - i)
         for i in range(3)
     ]
-    sent = LAYOUT.pack(Kind.SENT, 8, 0, 0x08FF1080, time_ns, source.randbytes(8))
-    return b"".join([*frames, LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b""), sent])
+    sent = LAYOUT.pack(0x08FF1080, source.randbytes(8), Kind.SENT, time_ns)
+    return b"".join([*frames, LAYOUT.pack(0, b"", Kind.TICK, time_ns), sent])
 
 
 def write_log(

@@ -12,7 +12,7 @@ import pytest
 
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderProcess, RingWriter
-from utank_hil.telemetry.bus_records import LAYOUT, ROW, Kind, Records, ring_rows
+from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recorder import FrameRecording
 
@@ -29,17 +29,16 @@ _main()
 
 
 def tick(number: int) -> bytes:
-    """A tick with as many frames as can't be in one row."""
+    """A tick with as many frames as can't be in one slot."""
     time_ns = number * TICK_NS
-    frame = LAYOUT.pack(Kind.RECEIVED, 8, 0, number, time_ns, number.to_bytes(8, "little"))
-    return frame * 40 + LAYOUT.pack(Kind.TICK, 0, 0, 0, time_ns, b"")
+    frame = LAYOUT.pack(number, number.to_bytes(8, "little"), Kind.RECEIVED, time_ns)
+    return frame * 40 + LAYOUT.pack(0, b"", Kind.TICK, time_ns)
 
 
 def feed(ring: RingWriter, numbers: range) -> bytes:
     data = b"".join(map(tick, numbers))
     for number in numbers:
-        for row in ring_rows(tick(number)):
-            ring.write(row)
+        ring.write(tick(number))
     return data
 
 
@@ -51,7 +50,7 @@ def read(file: Path) -> Records:
 
 def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
         data = feed(frames, range(50))  # before the recorder is there
         recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
         data += feed(frames, range(50, 200))
@@ -64,7 +63,7 @@ def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> No
 
 def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
         recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
         begin_s, data = time.monotonic(), b""
         for number in count():
@@ -81,23 +80,23 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> Non
 
 
 def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Path) -> None:
-    with RingWriter(ROW, capacity=64) as frames:
+    with RingWriter(ROW, capacity=64, rows=IN_A_SLOT) as frames:
         feed(frames, range(10))
         recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD, None)
         recording.write()
-        feed(frames, range(10, 110))  # two rows each
+        feed(frames, range(10, 110))  # two slots each
         recording.write()
         recording.close()
     records = read(tmp_path / "a.frames")
     (place,) = np.flatnonzero(records["kind"] == Kind.LOST)
-    assert recording.lost == records["number"][place] == 2 * 100 - 64
+    assert recording.lost == records["number"][place] == (2 * 100 - 64) * IN_A_SLOT
     assert records["time_ns"][place - 1] == 9 * TICK_NS
     assert records["time_ns"][place + 1] == (10 + 68) * TICK_NS
 
 
 def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW) as frames:
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
         data = feed(frames, range(20))
         words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--head"]
         process = subprocess.Popen(

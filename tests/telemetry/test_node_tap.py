@@ -91,10 +91,8 @@ def test_the_node_meets_the_same_with_a_tap_and_all_of_it_is_written_down() -> N
     assert tapped.calls == bare.calls
     assert [now_ns for _, now_ns in chunks] == [TICK, 3 * TICK, 4 * TICK]  # one write a tick
     found = [
-        (Kind(kind), number, now_ns, data[:length])
-        for kind, length, _, number, now_ns, data in LAYOUT.iter_unpack(
-            b"".join(data for data, _ in chunks)
-        )
+        (Kind(kind), number, now_ns, data)
+        for number, data, kind, now_ns in LAYOUT.iter_unpack(b"".join(data for data, _ in chunks))
     ]
     assert found == [
         (Kind.RECEIVED, 0x0CFF3182, 5, b"12345678"),
@@ -136,9 +134,9 @@ def test_answers_of_the_retuner_come_back_bit_for_bit_in_their_tick(reply: Answe
     node.tick(2 * TICK)
     again = RecordedRetuner()
     seen = []
-    for kind, length, _, _, _, data in LAYOUT.iter_unpack(b"".join(chunks)):
+    for _, data, kind, _ in LAYOUT.iter_unpack(b"".join(chunks)):
         if kind in (Kind.ALIVE, Kind.ANSWER):
-            again.take(data[:length], alive=kind == Kind.ALIVE)
+            again.take(data, alive=kind == Kind.ALIVE)
         elif kind == Kind.TICK:
             seen.append((again.alive, again.answer(1, 0)))
             assert again.left_over() == again.astray == ""
@@ -172,5 +170,5 @@ def test_frames_before_a_tick_that_raises_are_not_lost() -> None:
     with pytest.raises(ZeroDivisionError):
         tap.tick(TICK)
     tap.stop(TICK)  # which a runner does, however the run ends
-    kinds = [Kind(record[0]) for record in LAYOUT.iter_unpack(b"".join(chunks))]
+    kinds = [Kind(kind) for _, _, kind, _ in LAYOUT.iter_unpack(b"".join(chunks))]
     assert kinds == [Kind.RECEIVED, Kind.STARTED, Kind.STOP, Kind.SENT]

@@ -11,7 +11,7 @@ from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter, Rotation
-from utank_hil.telemetry.bus_records import ROW, ring_rows
+from utank_hil.telemetry.bus_records import IN_A_SLOT, ROW
 from utank_hil.telemetry.frame_log import SUFFIX
 from utank_hil.telemetry.recorder import NEEDS_RERUN
 
@@ -19,10 +19,10 @@ NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
 """A recording goes on in another file after so long: 60 MB."""
-RING_ROWS: Final = 8192  # 82 s: a recorder that sleeps less loses nothing
-
 RECORD_TICKS: Final = 5
-"""Ticks whose frames go to the recorder together: a controller that is killed loses them."""
+"""Ticks whose rows and frames leave together: a controller that is killed loses them."""
+RING_SLOTS: Final = 1640  # 82 s: a recorder that sleeps less loses nothing
+_WAITING_BYTES: Final = RECORD_TICKS * len(SIGNALS) * 8
 
 
 @dataclass(slots=True)
@@ -87,11 +87,12 @@ class RunRecording:
         keep_bytes: int | None = None,
     ) -> None:
         self.summary = RecordingSummary()
+        self._waiting = bytearray()
         self._ring: RingWriter | None = None
         self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
         try:
-            self._ring = RingWriter(SIGNALS, capacity=RING_ROWS, about=about)
+            self._ring = RingWriter(SIGNALS, RING_SLOTS, about=about, rows=RECORD_TICKS)
         except OSError as error:
             self.summary.error = str(error)
             return
@@ -108,7 +109,7 @@ class RunRecording:
             return
         try:
             if head is not None:
-                self._records = RingWriter(ROW, capacity=RING_ROWS // 4)  # a row has five ticks
+                self._records = RingWriter(ROW, RING_SLOTS, rows=IN_A_SLOT)
             self._recorder = RecorderProcess(
                 self._ring.name,
                 files[0],
@@ -129,9 +130,15 @@ class RunRecording:
         self.summary.file, self.summary.frames = (*names, None)[:2]
 
     def write(self, row: FloatArray) -> None:
-        """Take one row of telemetry; never waits, and does nothing without a recorder."""
-        if self._ring is not None:
-            self._ring.write(row)
+        """Take one row of telemetry; never waits."""
+        self._waiting += row.tobytes()
+        if len(self._waiting) == _WAITING_BYTES:
+            self._hand_on()
+
+    def _hand_on(self) -> None:
+        if self._ring is not None and self._waiting:
+            self._ring.write(self._waiting)
+        self._waiting.clear()
 
     @property
     def recorder_pid(self) -> int | None:
@@ -146,14 +153,14 @@ class RunRecording:
     def write_records(self, records: bytes, time_ns: int) -> None:  # noqa: ARG002
         """Take `bus_records` of ticks; never waits."""
         if self._records is not None:
-            for row in ring_rows(records):
-                self._records.write(row)
+            self._records.write(records)
 
     def stop(self) -> None:
         """Have the last rows written and the summary completed; idempotent."""
         records, self._records = self._records, None
         if records is not None:
             records.close()  # before the other, whose end is what ends the recorder
+        self._hand_on()
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()

@@ -37,7 +37,7 @@ from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.redundancy import Redundancy
-from utank_hil.runtime.signals import QUICK, SIGNALS, SLOW
+from utank_hil.runtime.signals import SIGNALS, put_quick, put_slow
 from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
@@ -542,8 +542,9 @@ class ControllerNode:
             return
         if self._ticks_to_row == 0:
             self._ticks_to_row = self._sink_every
-            for values_of, put, at in (QUICK, SLOW) if self._all_due else (QUICK,):
-                put(self._row, at, *values_of(self))
-            self._all_due = False
+            put_quick(self._row, self)
+            if self._all_due:
+                self._all_due = False
+                put_slow(self._row, self)
             self._sink(self._row)
         self._ticks_to_row -= 1

@@ -39,26 +39,23 @@ class Histogram:
     ----------
     counts : ndarray of int64, shape (bins,)
         Durations in each bin.
-    last_ns, max_ns : int
-        Latest and longest duration; 0 if there is none.
+    last_s : float
+        Latest duration; 0 if there is none.
+    max_ns : int
+        Longest duration; 0 if there is none.
     """
 
-    __slots__ = ("counts", "last_ns", "max_ns")
+    __slots__ = ("counts", "last_s", "max_ns")
 
     def __init__(self) -> None:
         self.counts: npt.NDArray[np.int64] = np.zeros(_BINS, dtype=np.int64)
-        self.last_ns = 0
+        self.last_s = 0.0
         self.max_ns = 0
-
-    @property
-    def last_s(self) -> float:
-        """The latest duration in seconds."""
-        return self.last_ns * 1e-9
 
     def add(self, value_ns: int) -> None:
         """Count one duration, 0 ns or more."""
         self.counts[_bin_of(value_ns)] += 1
-        self.last_ns = value_ns
+        self.last_s = value_ns * 1e-9
         if value_ns > self.max_ns:
             self.max_ns = value_ns
 

@@ -17,28 +17,25 @@ from utank_hil.arrays import FloatArray
 PAYLOAD_BYTES: Final = 8
 RECORD: Final = np.dtype(
     [
-        ("kind", "u1"),
-        ("length", "u1"),
-        ("spare", "<u2"),
         ("number", "<u4"),
-        ("time_ns", "<i8"),
+        ("length", "u1"),
         ("data", "u1", (PAYLOAD_BYTES,)),
+        ("kind", "u1"),
+        ("spare", "<u2"),
+        ("time_ns", "<i8"),
     ]
 )
 """`number` is the identifier of a frame, or a count; `time_ns` is the node's time."""
-LAYOUT: Final = struct.Struct("<BBHIq8s")
-"""The same for one record."""
+LAYOUT: Final = struct.Struct("<I9pB2xq")
+"""The same for one record: number, data with its length, kind and time."""
 
 Records = npt.NDArray[np.void]
 """Records, shape (n,), of type `RECORD`."""
 
-IN_A_ROW: Final = 32
-"""Records in one row of a ring; five ticks have 25 or so."""
-_WORDS: Final = LAYOUT.size // 8
-_ROW_BYTES: Final = IN_A_ROW * LAYOUT.size
-ROW: Final = ("records", *(f"word_{number}" for number in range(IN_A_ROW * _WORDS)))
-"""Columns of such a ring: how many records there are, and their bytes."""
-_COUNTS: Final = [np.float64(count).tobytes() for count in range(IN_A_ROW + 1)]
+ROW: Final = tuple(f"word_{number}" for number in range(LAYOUT.size // 8))
+"""Columns of a ring whose rows are the bytes of records."""
+IN_A_SLOT: Final = 32
+"""Records in one slot of such a ring; five ticks have 25 or so."""
 
 
 class Kind(IntEnum):
@@ -69,19 +66,9 @@ class Kind(IntEnum):
     """As ALIVE and ANSWER, of the estimator of sea and ship."""
 
 
-def ring_rows(records: bytes) -> list[bytes]:
-    """Packed records as rows of a ring, `IN_A_ROW` in each."""
-    return [
-        _COUNTS[min(len(records) - start, _ROW_BYTES) // LAYOUT.size]
-        + records[start : start + _ROW_BYTES].ljust(_ROW_BYTES, b"\0")
-        for start in range(0, len(records), _ROW_BYTES)
-    ]
-
-
 def records_of(rows: FloatArray) -> Records:
     """The records in rows of a ring, shape (n, len(ROW)), in order."""
-    records = np.ascontiguousarray(rows[:, 1:]).view(RECORD)
-    return records[np.arange(IN_A_ROW) < rows[:, :1]]
+    return np.frombuffer(rows.tobytes(), dtype=RECORD)
 
 
 def pack(records: Records) -> bytes:

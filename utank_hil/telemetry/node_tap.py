@@ -19,8 +19,8 @@ from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind
 Sink = Callable[[bytes, int], None]
 """Takes the records of ticks, packed, and the time of the last; must not wait."""
 
-_FIELDS: Final = 6
-"""Fields of a record."""
+_FIELDS: Final = 4
+"""Fields of a record, in the order of `LAYOUT`."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
 
@@ -50,6 +50,7 @@ class NodeTap:
         self.name = node.name
         self.period_ns = node.period_ns
         self._node = node
+        self._pass_on = node.receive
         self._sink = sink
         self._taps = taps
         self._fields: list[
@@ -60,9 +61,8 @@ class NodeTap:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
-        can_id, data = frame
-        self._fields += (_RECEIVED, len(data), 0, can_id, now_ns, data)
-        self._node.receive(frame, now_ns)
+        self._fields += frame + (_RECEIVED, now_ns)  # noqa: RUF005 - twice as quick
+        self._pass_on(frame, now_ns)
 
     def other_frames(self, count: int) -> None:
         """Take note of frames of other kinds on the bus."""
@@ -82,7 +82,7 @@ class NodeTap:
         frames = list(self._node.tick(now_ns))
         for tap in self._taps:
             self._fields += tap.take(now_ns)
-        self._fields += (_TICK, 0, 0, 0, now_ns, b"")
+        self._fields += (0, b"", _TICK, now_ns)
         self._note_sent(frames, now_ns)
         self._ticks_left -= 1
         if self._ticks_left == 0:
@@ -99,11 +99,11 @@ class NodeTap:
         return frames
 
     def _note(self, kind: Kind, now_ns: int, data: bytes = b"", *, number: int = 0) -> None:
-        self._fields += (kind, len(data), 0, number, now_ns, data)
+        self._fields += (number, data, kind, now_ns)
 
     def _note_sent(self, frames: list[Frame], now_ns: int) -> None:
-        for can_id, data in frames:
-            self._fields += (_SENT, len(data), 0, can_id, now_ns, data)
+        for frame in frames:
+            self._fields += frame + (_SENT, now_ns)  # noqa: RUF005 - twice as quick
 
     def _hand_on(self, now_ns: int) -> None:
         fields = self._fields
@@ -151,11 +151,10 @@ class RetunerTap:
         alive_kind, answer_kind = self._kinds
         fields: list[Any] = []
         for alive in self._alive:
-            fields += (alive_kind, 1, 0, 0, now_ns, bytes([alive]))
+            fields += (0, bytes([alive]), alive_kind, now_ns)
         for data in self._answers:
             for at in range(0, len(data), PAYLOAD_BYTES):
-                piece = data[at : at + PAYLOAD_BYTES]
-                fields += (answer_kind, len(piece), 0, len(data), now_ns, piece)
+                fields += (len(data), data[at : at + PAYLOAD_BYTES], answer_kind, now_ns)
         self._alive.clear()
         self._answers.clear()
         return fields

@@ -132,10 +132,10 @@ class RecordedRetuner:
 
 
 def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
-    """Records one by one, their data cut to its length."""
+    """Records one by one."""
     for block in blocks:
-        for kind, length, spare, number, time_ns, data in LAYOUT.iter_unpack(block.tobytes()):
-            yield kind, length, spare, number, time_ns, data[:length]
+        for number, data, kind, time_ns in LAYOUT.iter_unpack(block.tobytes()):
+            yield kind, len(data), 0, number, time_ns, data
 
 
 def replay(
