@@ -75,7 +75,10 @@ def watch(
             if not viewer.failed:
                 return
             if viewer.url is not None:
-                fail("the viewer failed; what it says is above")
+                fail(
+                    "the viewer failed; what it says is above; "
+                    "if a port was in use, start it again: it takes another"
+                )
             notes.print(
                 "[yellow]no window:[/yellow] the reason is above; a graphics driver for any "
                 "machine: apt-get install mesa-vulkan-drivers",

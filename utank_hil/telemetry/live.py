@@ -21,6 +21,7 @@ from utank_hil.telemetry.viewer import LOOPBACK, free_tcp_port, live_url
 
 MEMORY: Final = "64MiB"
 """History for a viewer that connects late; bounds the memory of the stream."""
+_START_S: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ class LiveStream(Closing):
     Raises
     ------
     OSError
-        If the run has ended meanwhile.
+        If the run has ended meanwhile, or somebody else took the port.
     """
 
     def __init__(self, run: LiveRun) -> None:
@@ -104,6 +105,11 @@ class LiveStream(Closing):
                 ),
             )
             stack.callback(self._recording.disconnect)
+            try:
+                self._recording.flush(timeout_sec=_START_S)
+            except RuntimeError as error:  # or viewers would show what somebody else sends there
+                again = "start it again: it takes another"
+                raise OSError(f"port {port} of this machine was taken; {again}") from error
             if run.about:
                 write_about(self._recording, run.about)
             self._log = RunLog(self._recording, run_paths([LIVE_RUN])[0], columns, run.about)

@@ -1,0 +1,90 @@
+"""What `utank-hil monitor` says where it can't show: a port in use, no display, no driver."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry import RingWriter, live, viewer, write_recording
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    file = tmp_path / "run.rrd"
+    write_recording(file, SIGNALS, {"run": np.zeros((3, len(SIGNALS)))})
+    return file
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """A port of somebody else."""
+    with socket.create_server((viewer.LOOPBACK, 0)) as other:
+        yield other.getsockname()[1]
+
+
+def monitor(*arguments: str) -> str:
+    """What it says before it ends, refused."""
+    result = CliRunner().invoke(app, ["monitor", *arguments])
+    assert result.exit_code == ExitCode.USAGE
+    assert isinstance(result.exception, SystemExit)  # no traceback
+    return " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["data", "page"])
+def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
+    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: int, which: int
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    free = viewer.free_tcp_port
+    ports = [free(), free()]
+    ports[which] = taken
+    monkeypatch.setattr(viewer, "free_tcp_port", lambda: ports.pop(0))
+    said = monitor(str(recording))
+    assert "the viewer failed" in said
+    assert "if a port was in use, start it again: it takes another" in said
+
+
+def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
+    monkeypatch: pytest.MonkeyPatch, taken: int
+) -> None:
+    monkeypatch.setattr(live, "free_tcp_port", lambda: taken)
+    monkeypatch.setattr(os, "nice", lambda by: by)  # of the tests
+    with RingWriter(SIGNALS):
+        said = monitor(str(os.getpid()))
+    assert f"port {taken} of this machine was taken; start it again: it takes another" in said
+
+
+def test_where_no_window_can_be_the_page_and_the_remedy_are_named(recording: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", "from utank_hil.cli import main; main()", "monitor", str(recording)],
+        env=os.environ | {"DISPLAY": ":none", "VK_DRIVER_FILES": "/none"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    said = ""
+    while "From another machine" not in said:
+        line = process.stderr.readline()
+        assert line, said
+        said += line
+    process.send_signal(signal.SIGINT)
+    said += process.communicate()[1]
+    assert process.returncode == ExitCode.OK
+    assert "no window: the reason is above" in said
+    assert "apt-get install mesa-vulkan-drivers" in said
+    assert "Open http://127.0.0.1:" in said
+    assert "Traceback" not in said
