@@ -476,7 +476,9 @@ FAULTS: Final = (
         "Correct a steady heel by ballast; lower the law's gains if the sea asks for more than the "
         "pump has.",
         _found(
-            Reaction.HALVE, "command or drive at its limit to one side for 10 s", Finding.SATURATED
+            Reaction.HALVE,
+            "command at its limit to one side, or drive at one of its own, for 10 s",
+            Finding.SATURATED,
         ),
     ),
     _row(

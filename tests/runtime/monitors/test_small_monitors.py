@@ -181,4 +181,15 @@ def test_command_that_goes_from_limit_to_limit_is_not_saturated() -> None:
     for k in range(1000):
         side = 1 if k // 60 % 2 else -1
         pressure_pa = side * THRESHOLDS.pressure_limit_pa
-        assert not saturation.update(pressure_pa, drive_limited=True, elapsed_s=0.1)
+        limited = k % 60 > 0  # not while it turns
+        assert not saturation.update(pressure_pa, drive_limited=limited, elapsed_s=0.1)
+
+
+def test_drive_that_says_it_is_limited_for_ten_seconds_is_saturated_whatever_the_command() -> None:
+    saturation = Saturation(THRESHOLDS)
+    held = [
+        saturation.update(math.copysign(1e3, math.sin(k / 20)), drive_limited=True, elapsed_s=0.1)
+        for k in range(110)
+    ]
+    assert held.index(Finding.SATURATED) in range(99, 103)
+    assert not saturation.update(1e3, drive_limited=False, elapsed_s=0.1)

@@ -111,12 +111,16 @@ class DriveFollowing:
 
 
 class Saturation:
-    """How long the command is held at its limit on one side, or the drive at one of its own."""
+    """How long the command is held at its limit on one side, or the drive at one of its own.
+
+    A limit of the drive excuses a pressure that stays behind (`DriveFollowing`), so whatever the
+    command's side, it may not last.
+    """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_pa = thresholds.pressure_limit_pa
         self._side = 0.0
-        self._held_s = 0.0
+        self._held_s = self._limited_s = 0.0
         self._found = False
 
     def update(self, command_pa: float, *, drive_limited: bool, elapsed_s: float) -> int:
@@ -129,5 +133,6 @@ class Saturation:
         else:
             self._held_s = 0.0
         self._side = side
-        self._found = self._held_s > HELD_S
+        self._limited_s = self._limited_s + elapsed_s if drive_limited else 0.0
+        self._found = self._held_s > HELD_S or self._limited_s > HELD_S
         return _SATURATED if self._found else 0
