@@ -84,16 +84,71 @@ def test_what_is_not_new_is_a_gap():
     assert np.isfinite(record[1:140]).all()
 
 
-def test_an_estimate_grows_old_and_is_outdated():
-    motion = Motion(ToyRetuner(GOOD))
+def test_without_another_estimate_nothing_is_known_after_three_intervals_but_its_age():
+    motion = Motion(ToyRetuner(GOOD), least_gm_m=9.0)
     motion.run(61.0)
-    assert motion.estimator.figures.sea_age_s == pytest.approx(0.8, abs=0.3)
+    figures = motion.estimator.figures
+    assert figures.sea_age_s == pytest.approx(0.8, abs=0.3)
+    motion.estimator.take_news()
     motion.desk.alive = False
     motion.run(60.0 * OUTDATED - 5)
-    assert motion.estimator.figures.of_sea is Verdict.GOOD
+    assert (figures.of_sea, figures.gm_low) == (Verdict.GOOD, False)
     motion.run(10.0)
-    assert motion.estimator.figures.of_sea is Verdict.OUTDATED
+    assert (figures.of_sea, figures.of_ship) == (Verdict.OUTDATED, Verdict.OUTDATED)
+    assert np.isnan([*figures.sea_message()[1:5], *figures.ship_message()[1:5]]).all()
+    assert figures.sea_age_s == figures.ship_age_s == pytest.approx(185.8, abs=0.3)
+    assert figures.gm_low  # nobody watches it any more
+    assert "the last estimate is 180 s old" in motion.estimator.take_news()[-1]
+    # whoever works with estimates hears of it once
+    assert [(found.of_sea, found.ship) for _, found in motion.came[1:]] == [
+        (Verdict.OUTDATED, None)
+    ]
+    motion.desk.alive = True
+    motion.run(62.0)
+    assert (figures.of_ship, figures.gm_low) == (Verdict.GOOD, False)
+    assert figures.gm_m == pytest.approx(metacentric_height_m(CONFIGURED, TANK, 1e9))
+
+
+@pytest.mark.parametrize("reply", [None, Refusal(("the retuner failed",))])
+def test_estimates_that_never_come_are_outdated_too(reply: Refusal | None):
+    motion = Motion(ToyRetuner(reply), least_gm_m=9.0)
+    motion.run(60.0 * OUTDATED - 1)
+    assert motion.estimator.figures.of_ship is Verdict.RECORD_SHORT
+    motion.run(2.0)
+    figures = motion.estimator.figures
+    assert (figures.of_sea, figures.of_ship, figures.gm_low) == (*2 * (Verdict.OUTDATED,), True)
+    assert "there was none" in motion.estimator.take_news()[-1]
+
+
+def test_without_a_limit_on_gm_nobody_is_warned_that_it_is_not_known():
+    motion = Motion(ToyRetuner(None))
+    motion.run(60.0 * OUTDATED + 1)
     assert motion.estimator.figures.of_ship is Verdict.OUTDATED
+    assert not motion.estimator.figures.gm_low
+
+
+def test_an_answer_that_comes_when_it_would_be_outdated_is_none():
+    motion = Motion(ToyRetuner(GOOD, looks=round(200 / SAMPLE_TIME_S)))
+    motion.run(260.3)
+    assert motion.desk.looks < 0
+    assert [found.of_sea for _, found in motion.came] == [Verdict.OUTDATED]
+    motion.run(1.0)
+    assert [found.of_sea for _, found in motion.came] == [Verdict.OUTDATED, Verdict.GOOD]
+
+
+def test_a_ship_that_was_not_identified_for_an_hour_is_not_shown_but_a_warning_stays():
+    motion = Motion(ToyRetuner(GOOD), least_gm_m=9.3)
+    motion.run(61.0)
+    figures = motion.estimator.figures
+    motion.desk.reply = replace(GOOD, of_ship=Verdict.UNCERTAIN)
+    motion.run(3590.0)
+    assert figures.gm_m > 9
+    motion.run(20.0)
+    assert (figures.of_sea, figures.of_ship) == (Verdict.GOOD, Verdict.UNCERTAIN)
+    assert np.isnan(figures.ship_message()[1:5]).all()
+    assert figures.ship_age_s == pytest.approx(3610.8, abs=0.5)
+    assert figures.gm_low  # no ship was identified that has more
+    assert any("roll period and GM" in each for each in motion.estimator.take_news())
 
 
 def test_a_failure_changes_nothing_and_is_asked_again():

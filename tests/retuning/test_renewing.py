@@ -285,12 +285,24 @@ def test_an_order_renews_at_once_and_needs_known_waves() -> None:
     rig = Rig(renewed())
     rig.run(300)
     rig.run(2, RetuningOrder(retune=True))
-    assert "waves are not known yet" in rig.reasons
+    assert "waves are not known" in rig.reasons
     rig.controller.note(estimate())
     rig.run(2)
     assert rig.controller.state is REFUSED  # by itself only later
     rig.run(200, RetuningOrder(retune=True))
     assert rig.controller.state is TRYING
+
+
+@pytest.mark.parametrize("verdict", [Verdict.OUTDATED, Verdict.MOTION_SMALL])
+def test_nothing_is_renewed_for_waves_that_are_no_longer_known(verdict: Verdict) -> None:
+    rig = Rig(renewed())
+    rig.controller.note(estimate())
+    rig.controller.note(MotionEstimate(verdict, verdict))
+    rig.run(300)
+    assert rig.states == []
+    rig.run(2, RetuningOrder(retune=True))
+    assert "waves are not known" in rig.reasons
+    assert rig.states == [REFUSED]
 
 
 def test_forbidden_or_not_in_charge_nothing_begins() -> None:

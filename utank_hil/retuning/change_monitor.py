@@ -36,8 +36,13 @@ class ChangeMonitor:
         self.change = 1.0
 
     def watch(self, estimate: MotionEstimate) -> None:
-        """Take a new estimate; one that does not tell the ship changes nothing."""
+        """Take a new estimate; one that does not tell the ship changes nothing.
+
+        When estimates are outdated, no change is known any more.
+        """
         now, before = estimate.ship, self._latest
+        if estimate.of_ship is Verdict.OUTDATED:
+            self._latest, self.change = None, 1.0
         if estimate.of_ship is not Verdict.GOOD or now is None:
             return
         self._latest = now

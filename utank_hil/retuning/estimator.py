@@ -18,7 +18,7 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.retuning.answer import Refusal
-from utank_hil.retuning.estimate import MotionEstimate
+from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.retuner import Retuner
 
@@ -28,6 +28,8 @@ SAMPLE_TIME_S: Final = 0.2
 LONGEST_RECORD_S: Final = 3600.0
 OUTDATED: Final = 3.0
 """An estimate is outdated after so many intervals without another."""
+SHIP_OUTDATED_S: Final = 3600.0
+"""What a ship was identified as is shown for so long, or for three intervals if that is longer."""
 GM_DEVIATIONS: Final = 2.0
 """Standard deviations below the metacentric height at which its interval ends."""
 
@@ -83,14 +85,15 @@ class EstimateFigures:
     sea_age_s : float
         Time since the end of the record.
     roll_period_s, roll_period_deviation_s : float
-        Of the last ship that was identified, without tank water.
+        Of the last ship that was identified, without tank water; NaN when that is too long ago.
     gm_m, gm_deviation_m : float
-        Her metacentric height with the tank's water free to move; NaN where the displacement is
-        not known.
+        Her metacentric height with the tank's water free to move; NaN also where the displacement
+        is not known.
     ship_age_s : float
         Time since the end of the record that identified her.
     gm_low : bool
-        The interval of `gm_m` reaches below the limit of the stability booklet.
+        There is a limit of the stability booklet, and the interval of the last `gm_m` reaches below
+        it, or there are no estimates any more.
     """
 
     of_sea: Verdict = Verdict.RECORD_SHORT
@@ -123,6 +126,10 @@ class EstimateFigures:
             if not math.isnan(self.gm_m):
                 ship += f", GM {self.gm_m:.2f} +- {self.gm_deviation_m:.2f} m"
         return sea, ship
+
+    def forget_ship(self) -> None:
+        """Show no ship."""
+        self.roll_period_s = self.roll_period_deviation_s = self.gm_m = self.gm_deviation_m = nan
 
     def sea_message(self) -> SeaEstimate:
         """For the bus."""
@@ -182,7 +189,6 @@ class Estimator:
 
     Attributes
     ----------
-    latest : MotionEstimate or None
     figures : EstimateFigures
     trouble : str
         Why no estimates come, as it was first known; empty while they do.
@@ -198,9 +204,12 @@ class Estimator:
     ) -> None:
         self._settings = settings
         self._every_ns = round(settings.every_s * 1e9)
+        self._outdated_ns = round(OUTDATED * settings.every_s * 1e9)
+        self._ship_outdated_s = max(SHIP_OUTDATED_S, OUTDATED * settings.every_s)
         self._desk = desk
         self._ship, self._tank = ship, tank
-        self._least_gm_m = -np.inf if least_gm_m is None else least_gm_m
+        self._least_gm_m = least_gm_m
+        self._low = False
         rows, columns = settings.longest_request
         self._history = SampleHistory(rows - 1, columns - 1)
         self._motion = np.zeros(columns - 1)
@@ -210,11 +219,10 @@ class Estimator:
         self._number = 0
         self._due_ns: int | None = None
         self._asked_ns: int | None = None
-        self._sea_ns = self._ship_ns = 0
-        self._heard_ns = 0
+        self._since_ns = 0  # the end of the latest estimate's record; before one, the start
+        self._ship_ns: int | None = None
         self.trouble = ""
         self._news: list[str] = []
-        self.latest: MotionEstimate | None = None
         self.figures = EstimateFigures()
 
     def sample(
@@ -226,6 +234,8 @@ class Estimator:
         fresh: bool,
     ) -> MotionEstimate | None:
         """Take a sample, every `SAMPLE_TIME_S`; return an estimate that has just come.
+
+        One that says OUTDATED, and nothing else, comes when the last one is.
 
         Parameters
         ----------
@@ -241,7 +251,7 @@ class Estimator:
         self._history.add(pressure_pa, self._motion, fresh=fresh)
         if self._due_ns is None:
             self._due_ns = now_ns + self._every_ns
-            self._heard_ns = now_ns
+            self._since_ns = now_ns
         came = None
         if self._asked_ns is not None:
             came = self._look(self._asked_ns, now_ns)
@@ -251,13 +261,10 @@ class Estimator:
             self._asked_ns = now_ns
             record = self._history.record(self._history.capacity)
             self._desk.submit(self._number, np.vstack([self._known, record]), now_ns)
-        silent_ns = now_ns - self._heard_ns
-        if silent_ns > OUTDATED * self._every_ns and not self.trouble:
-            self._fail(
-                f"nothing was heard for {silent_ns * 1e-9:.0f} s of the process that estimates: "
-                "it is dead, hangs or is too busy"
-            )
         self._grow_old(now_ns)
+        outdated = self.figures.of_sea is Verdict.OUTDATED
+        if now_ns - self._since_ns > self._outdated_ns and not outdated:
+            came = self._give_up(now_ns)
         return came
 
     def take_news(self) -> tuple[str, ...]:
@@ -270,49 +277,80 @@ class Estimator:
         answer = self._desk.answer(self._number, now_ns)
         if answer is None:
             return None
-        self._asked_ns, self._heard_ns = None, now_ns
+        self._asked_ns = None
         if not isinstance(answer, MotionEstimate):
             reasons = answer.reasons if isinstance(answer, Refusal) else ("it is no estimate",)
             self._fail("; ".join(reasons))
             return None
+        if now_ns - asked_ns > self._outdated_ns:
+            return None
         if self.trouble:
             self.trouble = ""
             self._news.append("there are estimates of sea and ship again")
-        self.latest, self._sea_ns = answer, asked_ns
-        figures, waves, ship = self.figures, answer.waves, answer.ship
-        figures.of_sea, figures.of_ship = answer.of_sea, answer.of_ship
-        figures.hs_m, figures.tp_s = answer.hs_m, answer.tp_s
-        figures.moment_rms_rad = nan if waves is None else waves.rms_rad
-        figures.moment_deviation = answer.rms_deviation
+        self._since_ns = asked_ns
+        self.figures.sea_age_s = 0.0
+        ship = answer.ship
         if answer.of_ship is Verdict.GOOD and ship is not None:
             self._ship_ns = asked_ns
             self._known[:3] = ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad
-            figures.roll_period_s = ship.roll_period_s
-            figures.roll_period_deviation_s = ship.period_deviation * ship.roll_period_s
-            self._judge_stability(ship.stiffness_nm_rad, ship.stiffness_deviation)
-        self._news += figures.words()
+            self._show_ship(ship)
+        self._show(answer)
+        self.figures.gm_low = self._low
+        self._news += self.figures.words()
         return answer
+
+    def _give_up(self, now_ns: int) -> MotionEstimate:
+        """Say that nothing is known any more of waves and ship."""
+        outdated = MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED)
+        figures, silent_s = self.figures, (now_ns - self._since_ns) * 1e-9
+        if not self.trouble:
+            self._fail(
+                f"nothing was heard for {silent_s:.0f} s of the process that estimates: "
+                "it is dead, hangs or is too busy"
+            )
+        last = f"the last estimate is {silent_s:.0f} s old"
+        if math.isnan(figures.sea_age_s):
+            last = "there was none"
+        self._news.append(f"sea and ship are not known now: {last}")
+        self._show(outdated)
+        figures.forget_ship()
+        figures.gm_low = self._least_gm_m is not None
+        return outdated
+
+    def _show(self, estimate: MotionEstimate) -> None:
+        figures, waves = self.figures, estimate.waves
+        figures.of_sea, figures.of_ship = estimate.of_sea, estimate.of_ship
+        figures.hs_m, figures.tp_s = estimate.hs_m, estimate.tp_s
+        figures.moment_rms_rad = nan if waves is None else waves.rms_rad
+        figures.moment_deviation = estimate.rms_deviation
 
     def _fail(self, reason: str) -> None:
         if not self.trouble:  # said once
             self.trouble = reason
             self._news.append(f"no estimates of sea and ship: {reason}")
 
-    def _judge_stability(self, stiffness_nm_rad: float, deviation: float) -> None:
+    def _show_ship(self, ship: ShipFigures) -> None:
         figures = self.figures
+        figures.roll_period_s = ship.roll_period_s
+        figures.roll_period_deviation_s = ship.period_deviation * ship.roll_period_s
         gm_m, less_m = (
-            metacentric_height_m(self._ship, self._tank, stiffness_nm_rad * factor)
-            for factor in (1.0, 1.0 - deviation)
+            metacentric_height_m(self._ship, self._tank, ship.stiffness_nm_rad * factor)
+            for factor in (1.0, 1.0 - ship.stiffness_deviation)
         )
         figures.gm_m, figures.gm_deviation_m = gm_m, gm_m - less_m
-        figures.gm_low = gm_m - GM_DEVIATIONS * figures.gm_deviation_m < self._least_gm_m
+        least_m = gm_m - GM_DEVIATIONS * figures.gm_deviation_m
+        self._low = self._least_gm_m is not None and least_m < self._least_gm_m
 
     def _grow_old(self, now_ns: int) -> None:
-        if self.latest is None:
-            return
         figures = self.figures
-        figures.sea_age_s = (now_ns - self._sea_ns) * 1e-9
-        if self._ship_ns:
-            figures.ship_age_s = (now_ns - self._ship_ns) * 1e-9
-        if figures.sea_age_s > OUTDATED * self._settings.every_s:
-            figures.of_sea = figures.of_ship = Verdict.OUTDATED
+        if not math.isnan(figures.sea_age_s):
+            figures.sea_age_s = (now_ns - self._since_ns) * 1e-9
+        if self._ship_ns is None:
+            return
+        figures.ship_age_s = (now_ns - self._ship_ns) * 1e-9
+        if figures.ship_age_s > self._ship_outdated_s and not math.isnan(figures.roll_period_s):
+            figures.forget_ship()
+            self._news.append(
+                "roll period and GM are not known any more: "
+                f"she was last identified {figures.ship_age_s / 60:.0f} minutes ago"
+            )

@@ -101,6 +101,7 @@ class RenewingController(LawExchange):
         for law in self.laws.stepped:
             law.monitor.watch(estimate)
         if estimate.waves is None or estimate.ship is None:
+            self._latest, self._due = None, ""  # no law is made for waves that have passed
             return
         if estimate.of_ship is Verdict.GOOD:
             self._ship = estimate.ship
@@ -114,7 +115,7 @@ class RenewingController(LawExchange):
         self._due = ""
         self._asked = self._latest
         if self._asked is None:
-            self._abort(f"{reason}, but the waves are not known yet: try again later")
+            self._abort(f"{reason}, but the waves are not known: try again later")
             return
         self._submit(self._asked.numbers()[None], reason)
 

@@ -509,12 +509,14 @@ FAULTS: Final = (
     ),
     _row(
         Fault.STABILITY_LOW,
-        "The ship's metacentric height may be below the limit of her stability booklet.",
-        "Compare with the loading computer; take on ballast or remove weight from above.",
+        "The ship's metacentric height may be below the limit of her stability booklet, or nothing "
+        "watches it any more: the panel shows no GM then.",
+        "Compare with the loading computer; take on ballast or remove weight from above. Without "
+        "estimates (the log has the reason) start the controller again when that can be done.",
         Condition(
             Reaction.WARN,
             "interval of the estimated GM, two standard deviations, reaches below the vessel's "
-            "least_gm_m",
+            "least_gm_m, or no estimate for three intervals",
             lambda seen, _: seen.gm_low,
         ),
     ),
