@@ -54,9 +54,15 @@ def browser() -> "Iterator[Browser]":
         yield started
 
 
+_MCL_ONFAULT = 0x4
+
+
 @pytest.fixture(autouse=True, scope="module")
-def _threads_of_other_tests_do_not_count() -> Iterator[None]:
-    """Let the loop run in a process where a cluster of other tests has left its threads."""
+def _a_loop_runs_where_other_tests_ran() -> Iterator[None]:
+    """Let the loop run in a process where other tests have left threads and address space.
+
+    It locks the memory that is in use. All that is mapped would stay in memory for good: gigabytes.
+    """
     left = set(threading.enumerate()) - {threading.current_thread()}
 
     def begun_since() -> list[threading.Thread]:
@@ -65,4 +71,5 @@ def _threads_of_other_tests_do_not_count() -> Iterator[None]:
     seen = SimpleNamespace(enumerate=begun_since, current_thread=threading.current_thread)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(process_priority, "threading", seen)
+        patch.setattr(process_priority, "_MCL_FUTURE", process_priority._MCL_FUTURE | _MCL_ONFAULT)
         yield
