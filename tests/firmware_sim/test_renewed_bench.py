@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import Job, run_lockstep
+from firmware_sim.lockstep_run import run_lockstep
+from firmware_sim.run import Job
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.canbus import RetuningState

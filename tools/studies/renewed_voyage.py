@@ -18,7 +18,8 @@ from typing import Any, Final
 import numpy as np
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import RECORD_S, Job, Run, run_lockstep
+from firmware_sim.lockstep_run import run_lockstep
+from firmware_sim.run import RECORD_S, Job, Run
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.voyage import Waypoint
 from tools.printing import command_line, show

@@ -14,8 +14,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from firmware_sim.bench import jobs_of
+from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.retuning_figures import SETTLING_S
-from firmware_sim.run import Job, Run, run_lockstep
+from firmware_sim.run import Job, Run
 from firmware_sim.scenario import Scenario
 from tools.printing import command_line, show
 from tools.studies.trial_setup import designed

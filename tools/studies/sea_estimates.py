@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from firmware_sim.bench import jobs_of
-from firmware_sim.run import COLUMNS, RECORD_S, run_lockstep
+from firmware_sim.lockstep_run import run_lockstep
+from firmware_sim.run import COLUMNS, RECORD_S
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
 from tools.printing import command_line, show

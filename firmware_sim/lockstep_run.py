@@ -1,0 +1,96 @@
+"""A run of a bench in simulated time."""
+
+from typing import Final
+
+from firmware_sim.faulty_bench import FaultyBench, Tap
+from firmware_sim.run import (
+    RECORD_NS,
+    RECORD_TICKS,
+    SECOND_NS,
+    Job,
+    Run,
+    Watch,
+    controller_of,
+    frame_log,
+    ship_figures,
+    ship_of,
+    side_by_side,
+)
+from firmware_sim.scenario import PASSIVE
+from firmware_sim.ship_side import ShipSide
+from firmware_sim.truth import TRUTH, TruthRecorder
+from utank_hil.assembly import works_of
+from utank_hil.retuning import SimulatedRetuner
+from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runtime.controller_node import ControllerNode
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.memory_log import MemoryLog
+from utank_hil.telemetry.node_tap import Tapped
+from utank_hil.tick import TICK_NS
+
+FRAME_BLOCK_NS: Final = 10 * SECOND_NS
+"""Of a frame log: each block waits for the disk."""
+
+
+def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
+    """Run in simulated time; the same job gives the same rows, bit for bit.
+
+    The scenario's faults are in it, but for the passive run.
+    """
+    retuner, estimating = (
+        work and SimulatedRetuner(work[0], job.scenario.retuner_latency_s)
+        for work in works_of(job.controller)
+    )
+    desks = Tapped(retuner, estimating, wanted=job.frames is not None)
+    with frame_log(job, desks, FRAME_BLOCK_NS) as tapped:
+        if job.scenario.faults and job.name != PASSIVE:
+            return _run_with_faults(job, watch, desks, tapped)
+        ship, truth, truth_log = ship_of(job)
+        controller, log = controller_of(job, desks)
+        bus = SimulatedBus(bit_rate=job.controller.bit_rate)
+        lockstep = Lockstep([*ship.nodes, tapped(controller), truth], bus)
+        _run_to_the_end(job, lockstep, watch)
+    return _lockstep_run(job, lockstep, controller, log, ship, truth, truth_log)
+
+
+def _run_with_faults(job: Job, watch: Watch | None, desks: Tapped, tapped: Tap) -> Run:
+    """A run in which the scenario's faults happen."""
+    log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+    bench = FaultyBench(
+        job.scenario, job.controller, job.law, seed=job.seed, script=job.script, sink=log.write,
+        sink_every=RECORD_TICKS, retuner=desks.retuner, estimating=desks.estimating, tapped=tapped,
+    )  # fmt: skip
+    truth_log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    truth = TruthRecorder(bench.ship.plant, truth_log, RECORD_NS)
+    bench.place(job.scenario.faults)
+    bench.join([truth])
+    _run_to_the_end(job, bench.lockstep, watch)
+    return _lockstep_run(job, bench.lockstep, bench.node, log, bench.ship, truth, truth_log)
+
+
+def _run_to_the_end(job: Job, lockstep: Lockstep, watch: Watch | None) -> None:
+    end_ns = job.ticks * TICK_NS
+    while lockstep.now_ns < end_ns:
+        if watch is not None and watch.stopped(lockstep.now_ns / SECOND_NS):
+            return
+        lockstep.run_until(min(lockstep.now_ns + SECOND_NS, end_ns))
+
+
+def _lockstep_run(
+    job: Job,
+    lockstep: Lockstep,
+    controller: ControllerNode,
+    log: MemoryLog,
+    ship: ShipSide,
+    truth: TruthRecorder,
+    truth_log: MemoryLog,
+) -> Run:
+    return Run(
+        job.name,
+        side_by_side(log.rows, truth_log.rows),
+        lockstep.bus.statistics(lockstep.now_ns).load,
+        *ship_figures(ship, truth),
+        retuning=controller.retuning_events,
+        fallbacks=controller.fallbacks,
+        law_error=controller.law_error,
+    )
