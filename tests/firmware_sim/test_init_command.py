@@ -2,7 +2,10 @@
 
 import json
 import math
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -22,6 +25,8 @@ SLOW = {"length": 200, "beam": 32.2, "displacement": 42000, "gm": 1.2, "draught"
 STIFF = SLOW | {"gm": 3.5}
 TRAWLER = {"length": 24, "beam": 7.5, "displacement": 240, "gm": 0.7, "draught": 3.0}
 
+Project = Callable[[dict[str, float]], tuple[Path, Any]]
+
 app = new_app()
 app.command("init")(init)
 
@@ -31,21 +36,33 @@ def run(folder: Path, ship: dict[str, float], *more: str) -> Result:
     return CliRunner().invoke(app, [str(folder), *options, *more], env={"COLUMNS": "200"})
 
 
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
+    """Makes the project of a ship, once; its folder, and what was told as JSON."""
+
+    @cache
+    def made(ship: tuple[tuple[str, float], ...]) -> tuple[Path, Any]:
+        folder = tmp_path_factory.mktemp("project")
+        done = run(folder, dict(ship), "--json")
+        assert done.exit_code == 0, done.output
+        return folder, json.loads(done.stdout)
+
+    return lambda ship: made(tuple(ship.items()))
+
+
 @pytest.mark.parametrize("ship", [PATROL, SLOW, STIFF, TRAWLER], ids=lambda ship: str(ship["gm"]))
 def test_project_is_valid_and_its_law_is_let_on_the_bus(
-    tmp_path: Path, ship: dict[str, float]
+    project: Project, ship: dict[str, float]
 ) -> None:
-    done = run(tmp_path, ship, "--json")
-    assert done.exit_code == 0, done.output
-    told = json.loads(done.stdout)
-    vessel = load_config(tmp_path / "ship.yaml", Vessel)
+    folder, told = project(ship)
+    vessel = load_config(folder / "ship.yaml", Vessel)
     period_s = 2 * math.pi / vessel.ship.natural_frequency_rad_s
     assert told["roll_period_s"] == pytest.approx(period_s)
     if "roll-period" in ship:
         assert period_s == pytest.approx(ship["roll-period"])
     assert vessel.ship.displacement_n == pytest.approx(9806.65 * ship["displacement"])
-    controller = load_config(tmp_path / "controller.yaml", ControllerConfig)
-    judged = judge(controller, tmp_path / "controller.yaml")
+    controller = load_config(folder / "controller.yaml", ControllerConfig)
+    judged = judge(controller, folder / "controller.yaml")
     assert judged.accepted
     assert judged.robustness is not None
     # the slow ship's water would be too fast in the duct before it is at the roof
@@ -53,7 +70,7 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     assert controller.limits.level_m == pytest.approx(most_m, rel=0.01)
     peak = judged.robustness.nominal.peak_sensitivity
     assert told["law"]["peak_sensitivity"] == pytest.approx(peak)
-    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+    scenario = load_config(folder / "scenario.yaml", Scenario)
     assert scenario.controllers["self_tuned"] == controller
     found = told["linear_prediction"]
     assert found["passive_below_no_tank"] > 0.2
@@ -62,9 +79,10 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
 
 
 @pytest.mark.slow
-def test_on_the_bench_the_law_is_armed_and_better_than_passive(tmp_path: Path) -> None:
-    assert run(tmp_path, PATROL).exit_code == 0
-    scenario = load_config(tmp_path / "scenario.yaml", Scenario)
+def test_on_the_bench_the_law_is_armed_and_better_than_passive(
+    project: Project,
+) -> None:
+    scenario = load_config(project(PATROL)[0] / "scenario.yaml", Scenario)
     result = run_bench(scenario, BenchOptions(duration_s=200.0), lambda *_: None)
     _, (passive, active) = figures(result)
     assert (active.mode, active.fault, active.active_share) == ("ACTIVE", "NONE", 1.0)
@@ -72,21 +90,18 @@ def test_on_the_bench_the_law_is_armed_and_better_than_passive(tmp_path: Path) -
     assert active.pump.level_peak_m < scenario.vessel.tank.level_limit_m
 
 
-def test_period_by_the_weather_criterion_is_said_in_the_file(tmp_path: Path) -> None:
-    assert run(tmp_path, TRAWLER).exit_code == 0
-    assert "weather criterion's formula" in (tmp_path / "ship.yaml").read_text()
+def test_period_by_the_weather_criterion_is_said_in_the_file(
+    project: Project,
+) -> None:
+    assert "weather criterion's formula" in (project(TRAWLER)[0] / "ship.yaml").read_text()
 
 
-def test_what_to_do_next_can_be_done(tmp_path: Path) -> None:
-    done = run(tmp_path, PATROL)
+def test_what_to_do_next_can_be_done_under_any_name(tmp_path: Path) -> None:
+    name = 'The "Rolling\nStone": #1'
+    done = run(tmp_path, PATROL, "--name", name)
     for file in ("controller.yaml", "scenario.yaml"):
         assert (tmp_path / file).exists()
         assert file in done.output.partition("Next:")[2]
-
-
-def test_names_with_quotes_and_lines_are_names(tmp_path: Path) -> None:
-    name = 'The "Rolling\nStone": #1'
-    assert run(tmp_path, PATROL, "--name", name).exit_code == 0
     assert load_config(tmp_path / "ship.yaml", Vessel).name == name
 
 
@@ -97,10 +112,10 @@ def test_sea_can_be_given(tmp_path: Path) -> None:
     assert scenario.sea.spectrum().hs_m == pytest.approx(2.25, rel=0.01)
 
 
-def test_a_tank_that_hardly_helps_is_said_to(tmp_path: Path) -> None:
-    assert json.loads(run(tmp_path / "a", PATROL, "--json").stdout)["little_help"] is None
+def test_a_tank_that_hardly_helps_is_said_to(project: Project) -> None:
+    assert project(PATROL)[1]["little_help"] is None
     slow = {"length": 300, "beam": 48, "displacement": 180e3, "gm": 0.6, "roll-period": 45}
-    said = json.loads(run(tmp_path / "b", slow, "--json").stdout)["little_help"]
+    said = project(slow)[1]["little_help"]
     assert "of the roll in a sea of 18 s, and the ship rolls in 45.0 s" in said
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from utank_hil.analysis.loop import self_tuning
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.observer_search import ObserverSearch
 from utank_hil.analysis.loop.robustness import robustness
@@ -68,8 +69,10 @@ def test_passive_roll_is_that_of_the_sum_over_components():
 
 @pytest.fixture
 def short_search(monkeypatch):
-    """An observer that is better than the first, not the best."""
+    """An observer that is better than the first, not the best; no other test gets its laws."""
     monkeypatch.setattr("utank_hil.analysis.loop.observer_search._ITERATIONS", 10)
+    yield
+    self_tuning._tuned.cache_clear()
 
 
 def test_a_power_budget_is_kept_and_costs_roll(short_search):

@@ -21,6 +21,7 @@ not all margins, the law that the search began with is taken.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Annotated, Final, Literal, Protocol
 
 import numpy as np
@@ -232,13 +233,19 @@ class SelfTunedDesign:
         NoLawError
             As `self_tuned`.
         """
-        sea = self.sea or unknown_sea(plant.ship)
-        return self_tuned(plant, sea, mean_power_w=self.mean_power_w)
+        return _tuned(self, plant)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
         law = self.tuned(plant).law
         return BuiltLaw(law.controller, _MEASURED, law)
+
+
+@lru_cache(maxsize=16)
+def _tuned(design: SelfTunedDesign, plant: DesignPlant) -> SelfTuned:
+    """As `SelfTunedDesign.tuned`; it takes seconds, and several ask for the same."""
+    sea = design.sea or unknown_sea(plant.ship)
+    return self_tuned(plant, sea, mean_power_w=design.mean_power_w)
 
 
 def unknown_sea(ship: RollShip) -> SeaModel:
