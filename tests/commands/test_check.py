@@ -12,6 +12,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
+from whole_configuration import whole
 from wrong_values import WRONG
 
 from firmware_sim.scenario import Scenario
@@ -39,23 +40,6 @@ def told(result) -> set[tuple[str, str, str]]:
     lines = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     found = [re.fullmatch(r"error: (\S+?): (?:([\w.]+): )?(.*)", line) for line in lines]
     return {(Path(each[1]).name, each[2] or "", each[3]) for each in found if each}
-
-
-def whole(path: Path) -> Any:
-    """Content of a file with all the files it names, so that any part of it can be changed."""
-
-    def resolved(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: resolved(item) for key, item in value.items()}
-        if isinstance(value, list):
-            return [resolved(item) for item in value]
-        if isinstance(value, str) and value.endswith(".yaml"):
-            return whole((path.parent / value).resolve())
-        if isinstance(value, str) and value.startswith("../"):
-            return str((path.parent / value).resolve())
-        return value
-
-    return resolved(yaml.safe_load(path.read_text()))
 
 
 def controller(folder: Path, shipped: str, **changes: object) -> Path:

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from whole_configuration import whole
 
 from firmware_sim.scenario import Scenario
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
@@ -18,23 +19,6 @@ from utank_hil.configuration.yaml_text import parse_yaml
 CONFIGS = Path("configs").resolve()
 MODELS = {"ships": Vessel, "controllers": ControllerConfig, "scenarios": Scenario}
 FOREIGN_WORDS = ("Input ", "valid ", "tag", "dictionary", "instance", "unable to", "Field ")
-
-
-def whole(path: Path) -> Any:
-    """Content of a file with all the files it names."""
-
-    def resolved(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: resolved(item) for key, item in value.items()}
-        if isinstance(value, list):
-            return [resolved(item) for item in value]
-        if isinstance(value, str) and value.endswith(".yaml"):
-            return whole((path.parent / value).resolve())
-        if isinstance(value, str) and value.startswith("../"):
-            return str((path.parent / value).resolve())
-        return value
-
-    return resolved(parse_yaml(path.read_text())[0])
 
 
 def places(content: Any, key: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:

@@ -3,14 +3,13 @@
 import ctypes
 import fcntl
 import os
-import signal
 import socket
 import struct
 
 CLONE_NEWUSER = 0x10000000
 CLONE_NEWNET = 0x40000000
 
-_PR_SET_PDEATHSIG, _PR_SET_KEEPCAPS, _PR_CAP_AMBIENT, _PR_CAP_AMBIENT_RAISE = 1, 8, 47, 2
+_PR_SET_KEEPCAPS, _PR_CAP_AMBIENT, _PR_CAP_AMBIENT_RAISE = 8, 47, 2
 _CAP_NET_ADMIN = 12
 _CAPABILITY_VERSION_3 = 0x20080522
 _SYS_INIT_MODULE = 175  # x86-64, the one machine that user-mode Linux is packaged for
@@ -51,11 +50,6 @@ def power_off() -> None:
 def unshare(flags: int) -> None:
     """Move the calling process into new namespaces (CLONE_* flags)."""
     _check(_libc.unshare(flags), "unshare")
-
-
-def die_with_parent() -> None:
-    """Have the calling process killed when the thread that started it ends."""
-    _check(_libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0), "prctl")
 
 
 def become(uid: int, gid: int, groups: list[int]) -> None:

@@ -7,14 +7,11 @@ more.
 
 import math
 from statistics import NormalDist
-from typing import Final
 
 import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-
-MIXED_POPULATION: Final = 1 / 3  # % per m/s^1.5: unadapted men and women, ISO 2631-1 annex D
 
 
 def motion_sickness_incidence(
@@ -75,11 +72,6 @@ def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
     weight = vertical_weighting(frequency_hz)
     weighted = np.fft.irfft(np.abs(weight) * spectrum, len(acceleration_m_s2))
     return float(np.sqrt(np.sum(np.square(weighted)) * step_s))
-
-
-def vomiting_incidence(dose_m_s15: float) -> float:
-    """Percentage of people who may vomit, ISO 2631-1:1997 annex D: a third of the dose."""
-    return MIXED_POPULATION * dose_m_s15
 
 
 def vertical_weighting(frequency_hz: FloatArray) -> ComplexArray:
