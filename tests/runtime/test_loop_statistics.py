@@ -29,7 +29,7 @@ def test_percentile_is_never_below_the_true_one_and_at_most_a_32nd_above(values,
 def test_nothing_is_lost_and_maximum_and_latest_are_exact(values):
     histogram = histogram_of(values)
     assert histogram.counts.sum() == len(values)
-    assert (histogram.max_ns, histogram.last_ns) == (max(values), values[-1])
+    assert (histogram.max_ns, histogram.last_s) == (max(values), values[-1] * 1e-9)
 
 
 def test_values_below_32_are_exact_and_bins_have_no_gaps():
