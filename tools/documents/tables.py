@@ -239,6 +239,37 @@ def renewed_seas(result: dict[str, Any]) -> Rows:
     ]
 
 
+def planning(result: dict[str, Any]) -> Rows:
+    """Planned laws beside the same laws clipped, a row a sea and pump."""
+
+    def level_m(case: dict[str, Any], law: str) -> str:
+        return f"{max(run['level_peak_m'] for run in case['runs'][law]):.2f}"
+
+    def below(case: dict[str, Any], rival: str) -> str:
+        gain = case["below"][rival]
+        return f"{100 * gain['mean']:.1f} ± {100 * gain['half_width']:.1f}"
+
+    return [
+        ["sea and pump", "Hs, Tp", "passive", "`gpc.yaml`", "clipped", "constrained", "below, %",
+         "self-tuned clipped", "self-tuned", "below, %",
+         "greatest level, m: clipped, constrained, self-tuned"],
+        *(
+            [
+                case["name"],
+                f"{case['hs_m']:.2f} m, {case['tp_s']:.1f} s",
+                *(f"{case['roll_rms_deg'][law]:.3f}"
+                  for law in ("passive", "GPC_ROLL", "clipped", "constrained")),
+                below(case, "clipped"),
+                *(f"{case['roll_rms_deg'][law]:.3f}"
+                  for law in ("self-tuned clipped", "self-tuned")),
+                below(case, "self-tuned clipped"),
+                ", ".join(level_m(case, law) for law in ("clipped", "constrained", "self-tuned")),
+            ]
+            for case in result["cases"]
+        ),
+    ]  # fmt: skip
+
+
 def voyage_stages(result: dict[str, Any]) -> Rows:
     """The renewed law beside the one that was given the truth, a row a stage."""
     return [
@@ -307,6 +338,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "step costs": ("cost_controllers", step_costs),
     "many seas": ("many_seas", many_seas),
     "renewed seas": ("renewed_seas", renewed_seas),
+    "planning": ("constrained_campaign", planning),
     "voyage stages": ("renewed_voyage", voyage_stages),
     "stiffness by loading": ("sea_estimates", stiffness_by_loading),
     "february hours": ("february_hours", february_hours),
