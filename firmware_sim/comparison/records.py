@@ -33,7 +33,8 @@ With half of them, the 95 % interval of an hour holds the true difference of two
 LEAST_PERIODS: Final = 20
 """The same in a shorter record, down to `LEAST_BATCHES`."""
 MOST_BATCHES, LEAST_BATCHES = 30, 6
-_WAVES: Final = ("sea", "voyage", "vessel")
+_WAVES: Final = ("sea", "voyage")
+"""Of a scenario: with the seed they draw the waves, whatever ship is in them."""
 
 CHARGE_ALIKE: Final = 0.1
 """Share of the time in charge by which records may differ without a word."""

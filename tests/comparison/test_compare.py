@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,8 +136,12 @@ def test_campaigns_in_the_same_waves_are_paired_and_their_passive_tank_is_the_sa
 
 
 def test_recordings_of_the_same_waves_are_paired_piece_by_piece(tmp_path: Path):
-    about = {"configuration": {"sea": {"file": "./a"}}, "seed": 1, "data": {"./a": "1234"}}
-    moved = {"configuration": {"sea": {"file": "../a"}}, "seed": 1, "data": {"../a": "1234"}}
+    def about_it(file: str, width_m: float) -> dict[str, Any]:
+        scenario = {"sea": {"file": file}, "vessel": {"tank": {"duct_width_m": width_m}}}
+        return {"configuration": scenario, "seed": 1, "data": {file: "1234"}}
+
+    # another folder and another tank: the waves are the same
+    about, moved = about_it("./a", 1.0), about_it("../a", 2.0)
     roll = waves(3, 2400.0)
     first = recorded(tmp_path / "a.rrd", roll, **about)
     small = recorded(tmp_path / "b.rrd", 0.8 * roll, **moved)
