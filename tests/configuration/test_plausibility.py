@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from firmware_sim.scenario import Scenario
-from utank_hil.configuration import ConfigError, Vessel, load_config
+from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
 from utank_hil.configuration.yaml_text import parse_yaml
 
 CONFIGS = Path("configs").resolve()
@@ -236,3 +236,18 @@ def test_unusual_sea_is_warned_of(
 )
 def test_seas_that_can_be_pass(tmp_path: Path, sea: dict[str, Any]) -> None:
     assert told(tmp_path, {**STORM, "sea": sea}, Scenario) == ({}, {})
+
+
+@pytest.mark.parametrize(("section", "watched"), [({}, False), ({"sea_estimate": {}}, True)])
+def test_limit_of_the_stability_that_nothing_watches_is_warned_of(
+    tmp_path: Path, section: dict[str, Any], watched: bool
+) -> None:
+    ship = copy.deepcopy(SHIPS[FIRST])
+    ship["ship"].pop("displacement_n", None)
+    ship["ship"]["displacement_t"] = 14500
+    (tmp_path / "ship.yaml").write_text(yaml.safe_dump({**ship, "least_gm_m": 0.45}))
+    content = parse_yaml((CONFIGS / "controllers" / "lqg.yaml").read_text())[0]
+    controller = {**content, "vessel": "ship.yaml", **section}
+    refused, warned = told(tmp_path, controller, ControllerConfig)
+    assert refused == {}
+    assert ("vessel.least_gm_m" not in warned) == watched

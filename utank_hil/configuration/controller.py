@@ -82,8 +82,12 @@ class ControllerConfig(Section):
         return self
 
     def warnings(self) -> list[Problem]:
-        """What is unusual in the vessel."""
-        return [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
+        """What is unusual in the vessel, and a limit of it that nothing watches."""
+        found = [(f"vessel.{key}", reason) for key, reason in self.vessel.warnings()]
+        if self.vessel.least_gm_m is not None and self.sea_estimate is None:
+            reason = "is not watched without the section sea_estimate: add `sea_estimate: {}`"
+            found.append(("vessel.least_gm_m", reason))
+        return found
 
     @property
     def renews(self) -> bool:
