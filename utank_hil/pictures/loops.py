@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.pictures.style import COLORS, picture
+from utank_hil.pictures.style import COLORS, STROKES, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,14 +55,15 @@ def draw_bode(
     row = system.output_labels.index("roll_rad")
     with picture(path, title, (9.0, 7.0)) as figure:
         axes = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        _add_bode(axes, w, ship, roll_response_without_tank(ship, w), NO_TANK, "#AAAAAA")
+        without = {"label": NO_TANK, "color": "#AAAAAA", "linestyle": ":"}
+        _add_bode(axes, w, ship, roll_response_without_tank(ship, w), without)
         passive, _ = closed_loop_response(None, system, (), w)
-        _add_bode(axes, w, ship, passive[:, row], PASSIVE, COLORS[0])
-        for loop, color in zip(loops, COLORS[1:], strict=False):
+        _add_bode(axes, w, ship, passive[:, row], {"label": PASSIVE, "color": COLORS[0]})
+        for loop, stroke in zip(loops, STROKES[1:], strict=False):
             active, _ = closed_loop_response(
                 loop.law, system, loop.measured, w, plant.delay_s, plant.lag_s
             )
-            _add_bode(axes, w, ship, active[:, row], loop.name, color)
+            _add_bode(axes, w, ship, active[:, row], {"label": loop.name, **stroke})
         axes[0].set_ylabel("Roll per effective wave slope")
         axes[1].set_ylabel("Phase (°)")
         axes[1].set_xlabel("Wave frequency (rad/s)")
@@ -114,10 +115,10 @@ def draw_nyquist(
             color=COLORS[2],
         )
         shown = [forbidden, circle]
-        for loop, color in zip(loops, COLORS[1:], strict=False):
+        for loop, stroke in zip(loops, STROKES[1:], strict=False):
             curve = -_loop(loop, plant)
-            axes.plot(curve.real, curve.imag, color=color, linewidth=1.6, label=loop.name)
-            axes.plot(curve.real, -curve.imag, color=color, linewidth=0.8, linestyle="--")
+            axes.plot(curve.real, curve.imag, linewidth=1.6, label=loop.name, **stroke)
+            axes.plot(curve.real, -curve.imag, linewidth=0.8, **stroke)
             shown.append(curve)
         _fit_axes(axes, np.concatenate(shown))
         axes.set_xlabel("Real part of −L")
@@ -139,14 +140,11 @@ def _add_bode(
     w: FloatArray,
     ship: RollShip,
     roll_per_moment: ComplexArray,
-    name: str,
-    color: str,
+    stroke: dict[str, Any],
 ) -> None:
     response = ship.stiffness_nm_rad * roll_per_moment
-    style = ":" if name == NO_TANK else "-"
-    axes[0].loglog(w, np.abs(response), style, color=color, linewidth=1.6, label=name)
-    phase = np.rad2deg(np.unwrap(np.angle(response)))
-    axes[1].semilogx(w, phase, style, color=color, linewidth=1.6)
+    axes[0].loglog(w, np.abs(response), linewidth=1.6, **stroke)
+    axes[1].semilogx(w, np.rad2deg(np.unwrap(np.angle(response))), linewidth=1.6, **stroke)
     for axis in axes:
         axis.grid(visible=True, which="minor", axis="x", linewidth=0.4)
 
