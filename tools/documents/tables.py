@@ -213,7 +213,11 @@ def many_seas(result: dict[str, Any]) -> Rows:
     return [
         ["sea", "passive, °", *laws],
         *(
-            [name, number(row.get("passive_deg"), ".2f"), *(share(row[law]) for law in laws)]
+            [
+                name,
+                number(row.get("passive_deg"), ".2f"),
+                *(share(row[law]) if law in row else "" for law in laws),
+            ]
             for name, row in rows.items()
         ),
     ]

@@ -33,6 +33,7 @@ from tools.studies.trial_setup import (
     shipped,
 )
 from utank_hil.analysis.loop.causal_bound import CausalProblem, causal_bound
+from utank_hil.analysis.loop.clairvoyant import NoHistoryError
 from utank_hil.analysis.loop.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
@@ -149,15 +150,21 @@ def entrants(case: Case) -> tuple[Entrant, ...]:
     )
 
 
-def causal_share(case: Case) -> Interval:
-    """Share of the clairvoyant bound that no causal law exceeds."""
+def causal_share(case: Case) -> Interval | None:
+    """Share of the clairvoyant bound that no causal law exceeds.
+
+    None where waves alone lift the water beyond its limit: neither bound is known then.
+    """
     plant = replace(case.ship.plant, limits=shipped("constrained_gpc").limits)
     problem = CausalProblem(plant, case.model(**CAUSAL_SEA))
-    runs = [problem.run(seed, CAUSAL_RECORD_S) for seed in range(1, 1 + CAUSAL_RECORDS)]
+    try:
+        runs = [problem.run(seed, CAUSAL_RECORD_S) for seed in range(1, 1 + CAUSAL_RECORDS)]
+    except NoHistoryError:
+        return None
     return causal_bound(problem, runs).share
 
 
-def causal_shares(wanted: Sequence[Case]) -> list[Interval]:
+def causal_shares(wanted: Sequence[Case]) -> list[Interval | None]:
     """Of each case, in a process for each core."""
     with one_thread_each(), ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         return list(pool.map(causal_share, wanted))
@@ -193,7 +200,8 @@ def main() -> None:
         passive_deg[name] = math.degrees(roll[PASSIVE].mean())
         shares[name] = {law: mean_interval(gained[law] / possible) for law in LAWS}
     for name, share in zip(wanted, causal_shares(list(wanted.values())), strict=True):
-        shares[name][CAUSAL] = share
+        if share is not None:
+            shares[name][CAUSAL] = share
     found = {
         "seconds": arguments.seconds,
         "seeds": arguments.seeds,
@@ -208,7 +216,7 @@ def main() -> None:
         found["mean of the first sixteen"] = {
             law: mean_interval(row)._asdict() for law, row in zip(LAWS, mean, strict=True)
         }
-        causal = [each[CAUSAL].mean for each in list(shares.values())[:SIXTEEN]]
+        causal = [each[CAUSAL].mean for each in list(shares.values())[:SIXTEEN] if CAUSAL in each]
         found["mean of the first sixteen"][CAUSAL] = {"mean": float(np.mean(causal))}
     show(found, arguments)
 

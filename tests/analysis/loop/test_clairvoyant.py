@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shipped_designs import GPC_ROLL
 
-from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
+from utank_hil.analysis.loop.clairvoyant import NoHistoryError, clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.active_set import ActiveSetSolver
@@ -125,5 +125,5 @@ def test_a_controller_on_the_same_record_stays_above_the_bound():
 
 def test_waves_that_flood_the_tank_whatever_the_pump_does_are_told():
     weak = PumpLimits(pressure_pa=10.0, rate_pa_s=100.0, level_m=0.1)
-    with pytest.raises(ValueError, match="level_m"):
+    with pytest.raises(NoHistoryError, match="level_m"):
         clairvoyant_bound(DesignPlant(SHIP, TANK, limits=weak), WAVES)

@@ -32,6 +32,10 @@ _ROLL, _LEVEL, _SPEED = (STATES.index(s) for s in ("roll_rad", "level_m", "level
 _PRESSURE = len(STATES)  # the last state
 
 
+class NoHistoryError(ValueError):
+    """No pressure history keeps a record within the limits, or none was found."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ClairvoyantRun:
     """The best history.
@@ -188,7 +192,7 @@ def best_history(
         settings,
     ).solve()
     if solution.status != clarabel.SolverStatus.Solved:
-        raise ValueError(
+        raise NoHistoryError(
             f"no pressure history keeps within the limits ({solution.status}): the waves alone may "
             f"lift the water beyond level_m = {limits.level_m}"
         )
