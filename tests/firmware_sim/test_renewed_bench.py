@@ -10,10 +10,11 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.run import Job
 from firmware_sim.scenario import Scenario
+from firmware_sim.scenario_sea import JonswapSea
 from utank_hil.assembly import build_law
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import Mode, RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.retuning import EstimateSettings, estimating
+from utank_hil.retuning import EstimateSettings, estimating, renewing
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import entries_of, replay
 from utank_hil.telemetry.replay_head import causes, recorded_config
@@ -29,13 +30,13 @@ class Unwatched:
         return False
 
 
-def job_of(duration_s: float) -> Job:
+def job_of(duration_s: float, scenario: Scenario = SCENARIO) -> Job:
     """The shipped configuration, which estimates more often and from a shorter record."""
     config = load_config(Path("configs/controllers/self_tuning.yaml"), ControllerConfig)
     often = EstimateSettings(every_s=30.0, record_s=300.0, renew=True)
     config = config.model_copy(update={"sea_estimate": often})
-    scenario = SCENARIO.model_copy(update={"controllers": {"renewed": config}})
-    return jobs_of(scenario, 1, duration_s)[1]
+    scenario = scenario.model_copy(update={"controllers": {"renewed": config}})
+    return jobs_of(scenario, scenario.seed, duration_s)[1]
 
 
 def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
@@ -55,3 +56,25 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
         result = replay(entries_of(log.blocks()), config, law, retuner=True, estimating=True)
         assert causes(log.head, config, law, tmp_path) == []
     assert (result.first, result.ticks) == (None, 24_000)
+
+
+def test_in_a_swell_that_the_first_law_is_wrong_for_the_pump_rests_in_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    swell = JonswapSea(
+        kind="jonswap",
+        hs_m=2.0,
+        tp_s=18.0,
+        gamma=6.0,
+        effective_slope=SCENARIO.sea.effective_slope,
+    )
+    job = job_of(90.0, SCENARIO.model_copy(update={"sea": swell, "seed": 2}))
+    run = run_lockstep(job, Unwatched())
+    (event,) = run.retuning
+    assert "times what she would with the pump at rest" in event.reasons[0]
+    after = run.between(event.time_ns * 1e-9 + 2.0, 90.0)
+    assert set(run.column("mode")[after]) == {Mode.ACTIVE}
+    assert not run.column("pressure_command_pa")[after].any()
+    # without the rest the monitor ends active control
+    monkeypatch.setattr(renewing, "LOSING", 100.0)
+    assert Mode.FAULT in run_lockstep(job, Unwatched()).column("mode")

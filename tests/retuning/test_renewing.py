@@ -69,7 +69,7 @@ class Rig:
         self.command_pa, self.samples = 0.0, 0
         self.commands: list[float] = []
         self.rows: list[FloatArray] = []
-        self.engaged = True
+        self.engaged = self.fresh = True
         self.wave: Callable[[int], float] = lambda k: 1.0
         self.passive: Callable[[int], float] = lambda k: 1.0
 
@@ -81,7 +81,11 @@ class Rig:
                 controller.applied(np.array([self.command_pa]))
             passive = 0.04 * self.passive(k) * np.sin(w * k)
             controller.update(
-                k * SAMPLE_NS, order, engaged=self.engaged, fresh=True, passive_roll_rad=passive
+                k * SAMPLE_NS,
+                order,
+                engaged=self.engaged,
+                fresh=self.fresh,
+                passive_roll_rad=passive,
             )
             order = RetuningOrder()
             motion = np.array(
@@ -99,6 +103,11 @@ class Rig:
             assert most > 0, f"still {self.controller.state.name}"
             self.run(1)
             most -= 1
+
+    def run_until_it_acts(self) -> None:
+        self.run(1)
+        while self.command_pa == 0.0:
+            self.run(1)
 
     @property
     def states(self) -> list[RetuningState]:
@@ -315,6 +324,66 @@ def test_forbidden_or_not_in_charge_nothing_begins() -> None:
         rig.run(1, RetuningOrder(forbidden=True))
     assert rig.states == []
     rig.run_until(TRYING)
+
+
+def test_the_pump_rests_when_the_law_loses_and_for_ten_minutes() -> None:
+    rig = Rig(renewed())
+    rig.passive = lambda k: 0.2
+    rig.run(140)  # half of four roll periods is 25 s
+    assert rig.controller.excused
+    begin = rig.samples - int(np.argmax(np.array(rig.commands[::-1]) != 0))
+    assert 125 <= begin <= 130
+    assert "times what she would with the pump at rest" in rig.reasons
+    assert rig.states == [IDLE]
+    rig.run_until_it_acts()
+    assert rig.samples - begin == pytest.approx(RETRY_NS / SAMPLE_NS, abs=2)
+    assert not rig.controller.excused
+    rig.run(140)
+    assert rig.controller.excused  # it loses again
+    assert rig.states == [IDLE, IDLE]
+
+
+def test_a_resting_pump_is_woken_by_the_next_law() -> None:
+    rig = Rig(renewed())
+    rig.passive = lambda k: 0.2
+    rig.run(300)
+    assert rig.controller.excused
+    rig.controller.note(estimate())
+    rig.run_until(TRYING)
+    assert rig.commands[-2] == 0.0 != rig.commands[-1]
+    rig.run(5)
+    assert not rig.controller.excused
+
+
+def test_a_pump_that_rests_is_not_in_charge_any_more_after_disarming() -> None:
+    rig = Rig(renewed())
+    rig.passive = lambda k: 0.2
+    rig.run(300)
+    rig.engaged = False
+    rig.run(1)
+    assert not rig.controller.excused
+    rig.engaged = True
+    rig.run(50)
+    assert 0.0 not in rig.commands[-50:]
+
+
+@pytest.mark.parametrize(
+    ("roll", "passive", "fresh"),
+    [
+        (1.0, 0.0, True),  # the passive ship's roll is not known
+        (1.0, np.nan, True),
+        (0.1, 0.05, True),  # small
+        (1.0, 0.75, True),  # 1.1 times her roll
+        (1.0, 0.2, False),  # not measured
+    ],
+)
+def test_no_pump_rests_without_a_reason(roll: float, passive: float, *, fresh: bool) -> None:
+    rig = Rig(None)
+    rig.fresh = fresh
+    rig.wave, rig.passive = lambda k: roll, lambda k: passive
+    rig.run(600)
+    assert rig.states == []
+    assert not rig.controller.excused
 
 
 def test_the_new_law_knows_the_past_as_if_it_had_been_stepped_all_along() -> None:

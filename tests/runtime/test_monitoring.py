@@ -39,7 +39,7 @@ class Table:
                 self.inbox,
                 Observations(**{**FRESH, **seen}),  # type: ignore[arg-type]
                 0.0,
-                excited=False,
+                excused=False,
             )
         return found
 

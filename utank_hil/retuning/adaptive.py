@@ -90,6 +90,11 @@ class AdaptiveController(LawExchange):
             command = np.full(1, pulse_pa) if self._settings.alone else command + pulse_pa
         return command
 
+    @property
+    def excused(self) -> bool:
+        """Whether the pulses roll the ship."""
+        return self.state is _IDENTIFY
+
     def note(self, estimate: MotionEstimate) -> None:
         """Take what the motion tells of the ship."""
         for law in self.laws.stepped:

@@ -166,6 +166,11 @@ class LawExchange(ABC):
         self._roll_rad = self._passive_roll_rad = 0.0
         self._fresh = self._engaged = False
 
+    @property
+    @abstractmethod
+    def excused(self) -> bool:
+        """Whether the roll says nothing of the law: it is caused on purpose, or the pump rests."""
+
     @abstractmethod
     def note(self, estimate: MotionEstimate) -> None:
         """Take what the motion tells of waves and ship."""

@@ -3,6 +3,10 @@
 `LawExchange` has the states. Nothing is stimulated: what the retuner is asked with is the latest
 estimate (`Estimator`). It is asked when the waves, or the ship, differ from those that the law in
 charge was designed for.
+
+A law may be wrong for waves that are not known yet. When the ship rolls more with it than she would
+with the pump at rest, the pump rests until another law is tried, or for `RETRY_NS`. This is before
+the monitor of the same comparison ends active control (ROLL_AMPLIFIED).
 """
 
 import dataclasses
@@ -24,7 +28,7 @@ from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
 from utank_hil.retuning.renewed_law import RenewedLaw
 from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import TrialSettings
-from utank_hil.retuning.trial import NOISE_FLOOR, WindowStatistics
+from utank_hil.retuning.trial import NOISE_FLOOR, MovingWindow, WindowStatistics
 from utank_hil.sea import SlopeSpectrum
 
 SEA_DIFFERENCE: Final = 0.2
@@ -36,6 +40,12 @@ LONGER: Final = 1.3
 TRIAL: Final = TrialSettings(
     trial_s=180.0, roll_factor=1.25, effort_factor=1.5, answer_within_s=300.0
 )
+LOSING: Final = 1.2
+"""Roll over the passive ship's at which a law has lost and the pump rests."""
+LOSING_PERIODS: Final = 4.0
+"""Roll periods that this is judged by, once half of them have passed."""
+LEAST_ROLL_RAD: Final = math.radians(0.25)
+"""Root mean square of the roll below which nothing is judged."""
 _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
 
 
@@ -76,6 +86,9 @@ class RenewingController(LawExchange):
         self._law = law
         self._limits = limits
         self._configured = self._ship = ship
+        samples = round(LOSING_PERIODS * ship.roll_period_s / self.sample_time_s)
+        self._lately = MovingWindow(samples)
+        self._rests_until_ns = 0
         self._latest: MotionEstimate | None = None
         self._due = ""
         self._asked: MotionEstimate | None = None
@@ -89,12 +102,43 @@ class RenewingController(LawExchange):
         before = controller.fallbacks
         command = super().step(y, reference)
         self.fallbacks += controller.fallbacks - before
+        if not self._engaged or self.state is RetuningState.TRIAL:
+            self._lately.clear()
+            self._rests_until_ns = 0
+        elif self.excused:
+            return np.zeros(1)
+        elif self._fresh:
+            self._rest_if_losing()
         return command
+
+    def _rest_if_losing(self) -> None:
+        lately = self._lately
+        lately.add(self._roll_rad, 0.0, self._passive_roll_rad)
+        now = lately.statistics
+        if (
+            2 * lately.samples > lately.length
+            and now.roll_rad > max(LEAST_ROLL_RAD, LOSING * now.passive_roll_rad)
+            and now.passive_roll_rad > 0  # it is known
+        ):
+            self._rests_until_ns = self._now_ns + RETRY_NS
+            lately.clear()
+            self._log_event(
+                (
+                    f"she rolls {now.roll_rad / now.passive_roll_rad:.2f} times what she would "
+                    "with the pump at rest: it rests until another law is tried, "
+                    f"{RETRY_NS // 60_000_000_000} minutes at most",
+                )
+            )
 
     def reset(self) -> None:
         """Reset all laws; a law on trial is dropped."""
         super().reset()
         self.fallbacks = 0
+
+    @property
+    def excused(self) -> bool:
+        """Whether the pump rests."""
+        return self._now_ns < self._rests_until_ns
 
     def note(self, estimate: MotionEstimate) -> None:
         """Take what the motion tells of waves and ship."""

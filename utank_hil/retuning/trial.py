@@ -41,12 +41,15 @@ class MovingWindow:
 
     Attributes
     ----------
+    length : int
+        Of the window.
     samples : int
         Samples since the start or the last `clear`.
     """
 
     def __init__(self, samples: int) -> None:
         self._rows = np.zeros((samples, 3))
+        self.length = samples
         self.clear()
 
     def clear(self) -> None:

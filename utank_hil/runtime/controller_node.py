@@ -52,7 +52,6 @@ FRESH_MS: Final = 50.0
 _ACTIVE: Final = Mode.ACTIVE
 _FAULT: Final = Mode.FAULT
 _CONTROL: Final = Demand.CONTROL
-_IDENTIFY: Final = RetuningState.IDENTIFY
 _NO_FAULT: Final = Fault.NONE
 _FAULT_OF_LIMIT: Final = {row.law_limit: row.code for row in FAULTS if row.law_limit}
 
@@ -351,13 +350,12 @@ class ControllerNode:
         self._observer.observe(now_ns, self._frames_sent)
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         if self.monitors is not None:
-            excited = False
+            excused = False
             if self._retuning is not None:
-                # the pulses roll the ship on purpose
-                excited = self._retuning.state is _IDENTIFY
+                excused = self._retuning.excused
                 self.monitors.follow(self._retuning.laws.active.found)
             seen.found = self.monitors.update(
-                now_ns, self.inbox, seen, self._level.rate_m_s, excited=excited
+                now_ns, self.inbox, seen, self._level.rate_m_s, excused=excused
             )
         if seen.reset_edge:
             self._drive_sequence.request_reset()

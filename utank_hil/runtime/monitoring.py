@@ -177,7 +177,7 @@ class Monitors:
         seen: Observations,
         level_rate_m_s: float,
         *,
-        excited: bool,
+        excused: bool,
     ) -> int:
         """Look at one tick.
 
@@ -190,8 +190,8 @@ class Monitors:
             Ages, and the pressure commanded last.
         level_rate_m_s : float
             As estimated.
-        excited : bool
-            The ship is rolled on purpose at present.
+        excused : bool
+            The law in charge is not to be judged by the roll, see `LawExchange.excused`.
 
         Returns
         -------
@@ -220,7 +220,7 @@ class Monitors:
                 limited=inbox.drive_held_back,
             )
         elif phase == 2 or phase == 7:
-            self._look_at_twin(inbox, level_rate_m_s, excited=excited)
+            self._look_at_twin(inbox, level_rate_m_s, excused=excused)
         elif phase == 3:
             self._look_at_water(now_ns, inbox, seen)
         elif phase == 4:
@@ -282,9 +282,9 @@ class Monitors:
             self._used.accused = True
             self._used, self._spare = spare, self._used
 
-    def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excited: bool) -> None:
+    def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excused: bool) -> None:
         twin = self.twin
-        if excited or self._pair.apart:
+        if excused or self._pair.apart:
             twin.excuse()
         twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
