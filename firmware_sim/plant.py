@@ -47,6 +47,8 @@ class Plant:
     ----------
     broken_pump : callable or None
         Fault to be tried out: the pressure that an enabled pump gives instead of a set-point.
+    presses_off : bool
+        It does when it is not enabled, too.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class Plant:
         self._values: list[float] = self._state.tolist()
         self._now_ns: int | None = None
         self.broken_pump: Callable[[float], float] | None = None
+        self.presses_off = False
 
     def _load(self, ship: RollShip) -> None:
         """Take the ship's parameters."""
@@ -134,7 +137,7 @@ class Plant:
         enabled : bool
             Whether the motor is on; if not, the rotor turns freely.
         """
-        if enabled and self.broken_pump is not None:
+        if self.broken_pump is not None and (enabled or self.presses_off):
             self.impose_pressure(self.broken_pump(setpoint_pa))
         elif self._has_pump:
             self._state[kernel.SETPOINT] = setpoint_pa

@@ -100,7 +100,10 @@ class Link(NodeFault):
 
 
 class Pump(Fault):
-    """While enabled, the pump presses with `times` its set-point and `plus_pa`, after `lag_s`."""
+    """While enabled, the pump presses with `times` its set-point and `plus_pa`, after `lag_s`.
+
+    With `off_too`, no command takes `plus_pa` away.
+    """
 
     needs = ("drive",)
     kind: Literal["pump"]
@@ -110,6 +113,8 @@ class Pump(Fault):
     """Pressure that it gives besides."""
     lag_s: NotNegative = 0.0
     """Time constant with which it does."""
+    off_too: bool = False
+    """It presses while it is off, too."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the pump, and mend it in the end."""
@@ -122,6 +127,7 @@ class Pump(Fault):
             return pressure_pa[0]
 
         drive = bench.nodes["drive"]
+        bench.plant.presses_off = self.off_too
         drive.at(span.begin_ns, lambda: setattr(bench.plant, "broken_pump", broken))
         drive.at(span.end_ns, lambda: setattr(bench.plant, "broken_pump", None))
 

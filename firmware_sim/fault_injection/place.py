@@ -15,6 +15,7 @@ class Pumped(Protocol):
     """A plant whose pump can be made to fail."""
 
     broken_pump: Callable[[float], float] | None
+    presses_off: bool
 
 
 class Trips(Protocol):

@@ -93,11 +93,19 @@ def test_a_drive_that_stays_in_quick_stop_is_switched_off_when_it_had_its_time(
         words.append(sequence.next_word(states.state, wanted=wanted and bool(words)))
         states.command(words[-1])
         states.tick(stopped=False)  # by its quick stop option code it waits for a word
-    assert words[: QUICK_STOPS + 1] == [C.QUICK_STOP] * (QUICK_STOPS + 1)
-    assert words[QUICK_STOPS + 1] is C.DISABLE_VOLTAGE
+    assert words[:QUICK_STOPS] == [C.QUICK_STOP] * QUICK_STOPS
+    assert words[QUICK_STOPS] is C.DISABLE_VOLTAGE
     assert states.state is (S.OPERATION_ENABLED if wanted else S.SWITCH_ON_DISABLED)
     # the next stop has its time again
     led(states, sequence, wanted=True)
     for _ in range(QUICK_STOPS):
         states.command(sequence.next_word(states.state, wanted=False))
         assert states.state is S.QUICK_STOP_ACTIVE
+
+
+def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_had_its_time() -> (
+    None
+):
+    sequence = DriveSequence()
+    words = [sequence.next_word(S.OPERATION_ENABLED, wanted=False) for _ in range(QUICK_STOPS + 2)]
+    assert words == [C.QUICK_STOP] * QUICK_STOPS + [C.DISABLE_VOLTAGE] * 2

@@ -4,8 +4,9 @@ from typing import Final
 
 from utank_hil.canbus import ControlWord, DriveState
 
-QUICK_STOPS: Final = 25
-"""Commands, half a second of them: a drive that brakes for longer, or waits for a word, is off."""
+QUICK_STOPS: Final = 26
+"""Commands, the first and half a second of them: a drive that brakes for longer, waits for a word
+or stays in operation is told to be off."""
 
 
 _TOWARDS_ENABLED = {
@@ -43,11 +44,10 @@ class DriveSequence:
         if self._resetting and state is DriveState.FAULT:
             return ControlWord.FAULT_RESET
         self._resetting = False
-        self._stops = self._stops + 1 if state is DriveState.QUICK_STOP_ACTIVE else 0
-        if self._stops > QUICK_STOPS:
-            return ControlWord.DISABLE_VOLTAGE
+        word = ControlWord.DISABLE_VOLTAGE
         if wanted and state is not None:
-            return _TOWARDS_ENABLED.get(state, ControlWord.DISABLE_VOLTAGE)
-        if state in _STOPPING:
-            return ControlWord.QUICK_STOP
-        return ControlWord.DISABLE_VOLTAGE
+            word = _TOWARDS_ENABLED.get(state, word)
+        elif state in _STOPPING:
+            word = ControlWord.QUICK_STOP
+        self._stops = self._stops + 1 if word is ControlWord.QUICK_STOP else 0
+        return ControlWord.DISABLE_VOLTAGE if self._stops > QUICK_STOPS else word

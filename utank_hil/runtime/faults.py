@@ -56,7 +56,8 @@ class Condition:
     findings : Finding
         Those of the monitors any of which is this condition, if it is one of theirs.
     ends_passive : bool
-        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled.
+        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled, and it is an alarm
+        in INIT.
     """
 
     reaction: Reaction
@@ -460,11 +461,12 @@ FAULTS: Final = (
     ),
     _row(
         Fault.DRIVE_NOT_FOLLOWING,
-        "The pump's pressure does not follow the command.",
-        "Check the pump for blockage, the drive for limits, and the pressure sensor.",
+        "The pump's pressure does not follow the command, or the pump presses though it is off.",
+        "If the pump presses though it is off, cut its power (hard-wired stop, main switch). Check "
+        "the pump for blockage, the drive for limits and local operation, and the pressure sensor.",
         _found(
             Reaction.STOP,
-            "15% of the pressure limit off for 500 ms",
+            "15% of the pressure limit off for 500 ms; drive off: and 2 kPa per m of level",
             Finding.DRIVE_LOST,
             ends_passive=True,
         ),

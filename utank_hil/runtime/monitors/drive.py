@@ -13,8 +13,8 @@ REVERSED_S: Final = 0.15
 """
 REVERSED_SHARE: Final = 1 / 3
 """Of the threshold: so much the other way is reversed."""
-ENABLED_S: Final = 0.5
-"""The drive is not judged before it has been enabled for so long."""
+SETTLED_S: Final = 0.5
+"""The drive is not judged before it has been enabled, or off, for so long: a rotor runs down."""
 FULL_SHARE: Final = 0.98
 HELD_S: Final = 10.0
 DEGRADED_SHARE: Final = 0.45
@@ -28,6 +28,8 @@ _SATURATED: Final = int(Finding.SATURATED)
 
 class DriveFollowing:
     """The pressure against a model of the drive: the command, later by a step, through its lag.
+
+    Of a drive that is off none is expected but what the water makes of a rotor that turns freely.
 
     A drive that says it is limited in power or speed may stay behind the command. It may oppose it
     only while the water flows the way of the command: a rotor at its greatest speed brakes water
@@ -52,15 +54,22 @@ class DriveFollowing:
     def __init__(self, lag_s: float, thresholds: MonitorThresholds, period_s: float) -> None:
         self._share = 1 - math.exp(-period_s / lag_s) if lag_s > 0 else 1.0
         self._limit_pa = thresholds.pressure_error_pa
+        self._free_pa_m = thresholds.free_rotor_pa_m
         self._period_s = period_s
-        self._command_pa = 0.0
-        self.expected_pa = self.late_pa = 0.0
-        self._enabled_s = self._behind_s = self._reversed_s = 0.0
+        self._enabled = False
+        self.restart()
+
+    def restart(self) -> int:
+        """Begin anew, as after a gap; return what is found then: nothing."""
+        self.expected_pa = self.late_pa = self._command_pa = 0.0
+        self._settled_s = self._behind_s = self._reversed_s = 0.0
+        return 0
 
     def update(
         self,
         command_pa: float,
         pressure_pa: float,
+        level_m: float,
         level_rate_m_s: float,
         *,
         enabled: bool,
@@ -71,25 +80,26 @@ class DriveFollowing:
         Parameters
         ----------
         command_pa, pressure_pa : float
-        level_rate_m_s : float
-            Of the starboard level: the way the water flows.
+        level_m, level_rate_m_s : float
+            Of the starboard side: how far the water is off, and the way it flows.
         enabled : bool
             Whether the drive is in operation enabled.
         limited : bool
             Whether it says that its power or its speed is at the limit.
         """
-        if not enabled:
-            self.expected_pa = self.late_pa = self._command_pa = 0.0
-            self._enabled_s = self._behind_s = self._reversed_s = 0.0
-            return 0
-        self.expected_pa = expected_pa = self.expected_pa + self._share * (
-            self._command_pa - self.expected_pa
-        )
-        self._command_pa = command_pa
-        self._enabled_s += self._period_s
-        if self._enabled_s < ENABLED_S:
-            return 0
+        if enabled is not self._enabled:
+            self._enabled = enabled
+            self.restart()
         limit_pa = self._limit_pa
+        if enabled:
+            self.expected_pa += self._share * (self._command_pa - self.expected_pa)
+            self._command_pa = command_pa
+        else:
+            limit_pa += self._free_pa_m * abs(level_m)
+        expected_pa = self.expected_pa
+        self._settled_s += self._period_s
+        if self._settled_s < SETTLED_S:
+            return 0
         along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
         outrun = limited and level_rate_m_s * expected_pa > 0
         if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa and not outrun:

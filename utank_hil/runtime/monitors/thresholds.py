@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import Positive, range_problems, refuse
 
 
@@ -67,6 +68,8 @@ class MonitorThresholds:
         Delay of the motion sensor.
     pressure_error_pa : float
         Error of the pump's pressure against the model of the drive.
+    free_rotor_pa_m : float
+        Pressure of a pump that is off, per level, that is excused besides.
     pressure_limit_pa : float
         Greatest command.
     amplified_roll_rad : float
@@ -92,6 +95,7 @@ class MonitorThresholds:
     least_pump_push_m2_s2: float
     motion_late_s: float
     pressure_error_pa: float
+    free_rotor_pa_m: float
     pressure_limit_pa: float
     amplified_roll_rad: float
 
@@ -136,6 +140,8 @@ def thresholds_of(
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
         motion_late_s=0.2 / frequency_rad_s,
         pressure_error_pa=0.15 * limits.pressure_pa,
+        # its inertia is some 7 % of the water's, which 2 rho g accelerates per level
+        free_rotor_pa_m=0.1 * 2 * tank.density_kg_m3 * GRAVITY_M_S2,
         pressure_limit_pa=limits.pressure_pa,
         amplified_roll_rad=math.radians(0.5),
     )
