@@ -183,6 +183,21 @@ def test_an_offset_that_nothing_explains_halves_and_then_ends_it() -> None:
     assert bench.node.fault is Fault.SENSORS_DISAGREE
 
 
+def test_a_wrong_sensor_beside_does_not_excuse_the_law_from_her_twin() -> None:
+    """The twin's comparison stood still for as long as the two sensors were apart."""
+    bench = Bench()
+    bench.fail("sensors_2", motion(WRONG["flipped"], Address.SENSORS_2))
+    bench.run(T0_S + 12.0)
+    assert bench.node.mode is Mode.ACTIVE
+    monitors = bench.node.monitors
+    assert monitors is not None
+    monitors.twin.amplified = True
+    monitors.twin._losing_s = 100.0
+    monitors.twin._power = 4 * max(monitors.twin._twin_power, 1e-3)
+    bench.run_to_fault(T0_S + 13.0)
+    assert bench.node.fault is Fault.ROLL_AMPLIFIED
+
+
 def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> None:
     bench = Bench()
 

@@ -283,12 +283,13 @@ class Monitors:
         heard = seen.motion_spare_age_ms <= SPARE_MS
         if heard and self._used.found and not (spare.found or spare.accused):
             inbox.exchange_motion(motions)
+            self.twin.excuse()  # of what the other one said
             self._used.accused = True
             self._used, self._spare = spare, self._used
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excused: bool) -> None:
         twin = self.twin
-        if excused or self._pair.apart:
+        if excused or self._pair.unclear:
             twin.excuse()
         twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0

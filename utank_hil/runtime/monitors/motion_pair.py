@@ -92,8 +92,8 @@ class MotionPair:
 
     Attributes
     ----------
-    apart : bool
-        Whether they disagree, or did within the last roll period.
+    unclear : bool
+        Whether they disagree, or did within the last roll period, and nothing says which is wrong.
     """
 
     def __init__(self, thresholds: MonitorThresholds, period_s: float) -> None:
@@ -109,7 +109,7 @@ class MotionPair:
         self._roll_rad = self._rate_rad_s = 0.0
         self._over_s = self._unclear_s = 0.0
         self._remembered_s = 0.0
-        self.apart = False
+        self.unclear = False
 
     def update(
         self, apart_rad: float, rate_apart_rad_s: float, used: SensorEvidence, spare: SensorEvidence
@@ -133,11 +133,11 @@ class MotionPair:
             self._remembered_s = self._roll_period_s
         else:
             self._remembered_s = max(self._remembered_s - self._period_s, 0.0)
-        self.apart = apart = self._remembered_s > 0
+        apart = self._remembered_s > 0
         for sensor in (used, spare):
             sensor.accused = sensor.found != 0 or (sensor.accused and apart)
-        decided = used.accused is not spare.accused
-        self._unclear_s = self._unclear_s + self._period_s if apart and not decided else 0.0
+        self.unclear = apart and used.accused is spare.accused
+        self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
         if not (apart or used.accused or spare.accused):
             return 0
         if self._unclear_s > UNCLEAR_PERIODS * self._roll_period_s:
