@@ -118,13 +118,19 @@ class Counter(FrameFault):
     kind: Literal["counter"]
     step: Annotated[int, Field(ge=0, le=15)]
     """From frame to frame; a sound one steps by 1."""
+    one_of: Annotated[int, Field(ge=1)] = 1
+    """Of so many frames one is sent, as by a node that is slower than its cycle."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         """As in `FrameFault`."""
         codec = self.named.codec
         counter: list[int] = []
+        left_out = [self.one_of - 1]
 
         def count(frame: Frame, _: float) -> Iterable[Frame]:
+            left_out[0] = (left_out[0] + 1) % self.one_of
+            if left_out[0]:
+                return ()
             message = codec.decode(frame.data)
             counter.append(frame.data[1] & 15 if not counter else counter.pop() + self.step)
             return (Frame(codec.can_id, codec.encode(message, counter[0] & 15)),)

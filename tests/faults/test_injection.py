@@ -133,6 +133,7 @@ def test_late_swapped_noisy_and_missing_values() -> None:
     [
         ({"kind": "counter", "step": 4}, {4}, True),
         ({"kind": "counter", "step": 0}, {0}, True),
+        ({"kind": "counter", "step": 1, "one_of": 5}, {1}, True),
         ({"kind": "frozen"}, {0}, True),
         ({"kind": "corrupted"}, {1}, False),
         ({"kind": "data_id"}, {1}, False),
@@ -151,6 +152,7 @@ def test_frames_are_spoiled_as_stated(fault, steps: set[int], intact: bool) -> N
     ("fault", "count"),
     [
         ({"kind": "lost", "message": "SENSOR_MOTION", "for_s": 0.1}, 40),
+        ({"kind": "counter", "step": 1, "one_of": 5, "message": "SENSOR_MOTION"}, 10),
         ({"kind": "mute", "node": "sensors"}, 0),
         ({"kind": "hangs", "node": "sensors", "at_s": 0.2}, 20),
         ({"kind": "slow", "node": "sensors", "by_s": 0.05}, 45),

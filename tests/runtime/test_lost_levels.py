@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from itertools import count
 
 import pytest
-from controller_bench import ControllerBench
+from controller_bench import CATALOGUE, ControllerBench
 
 from utank_hil.canbus import Frame, Quality, SensorTank, Switch
 from utank_hil.tick import TICK_NS
@@ -45,6 +45,21 @@ def always_good(tick: int) -> Quality:
 def test_lost_frames(one_of: int) -> None:
     error = worst_rate_error(lambda k, frame: () if k % one_of else (frame,), always_good)
     assert error < (0.1 if one_of <= 4 else 0.2)
+
+
+@pytest.mark.parametrize("one_of", [2, 3, 4])
+def test_gauges_that_send_more_slowly_than_their_cycle_with_a_counter_that_is_right(
+    one_of: int,
+) -> None:
+    codec = CATALOGUE.codec(SensorTank)
+    slow = CATALOGUE.transmitter(SensorTank)
+
+    def thinned(k: int, frame: Frame) -> Iterable[Frame]:
+        message = codec.decode(frame.data)
+        assert message is not None
+        return () if k % one_of else (slow.frame(message),)
+
+    assert worst_rate_error(thinned, always_good) < 0.2
 
 
 @pytest.mark.parametrize("bad_of", [2, 3])

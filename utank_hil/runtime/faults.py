@@ -524,11 +524,14 @@ FAULTS: Final = (
     ),
     _row(
         Fault.BUS_DEGRADED,
-        "Frames are lost on the CAN bus, though not so many in succession that it ends the run.",
-        "Check the cable, its plugs and termination, gateways between the nodes, and the load.",
+        "Frames are lost on the CAN bus, though not so many in succession that it ends the run, or "
+        "a node sends too seldom.",
+        "Check the cable, its plugs and termination, gateways between the nodes, the load, and "
+        "the nodes' cycle times.",
         _found(
             Reaction.WARN,
-            "over 0.1% of a message's frames missing by its counter, five too many",
+            "over 0.1% of a message's frames missing by its counter, five too many; or under "
+            "0.75 a cycle for 2 s",
             Finding.FRAMES_LOST,
         ),
     ),

@@ -30,7 +30,6 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
-from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.runtime.hardwired import HardwiredHeard
 from utank_hil.runtime.monitors.spikes import MotionGate, SpikeGates
 from utank_hil.runtime.motion_sensors import MotionSensor, MotionSensors
@@ -202,9 +201,8 @@ class Inbox:
         self.pump_ns = self.drive_ns = self.echo_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
         self._echo: int | None = None
         self.tank_cycles = self._cycles = self._tank_lost = 0
-        self._tank_frame_ns = NEVER_HEARD_NS
-        # a longer gap than the counter bridges is seen by the time
-        self._tank_gap_ns = (MAX_LOST + 1) * self._tank.cycle_ns + self._tank.cycle_ns // 2
+        self._tank_due_ns = NEVER_HEARD_NS  # when the last frame was due by its counter
+        self._tank_patience_ns = self._tank.cycle_ns * 3 // 2
         self.conflict_ns = self.claimed_twice_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
 
@@ -301,13 +299,21 @@ class Inbox:
             self.tank_ns, self.tank_cycles = now_ns, self._cycles
 
     def _count_cycles(self, now_ns: int) -> None:
-        """Count the cycles since the last frame; by its counter, since time of receipt jitters."""
-        lost, since_ns = self._tank.lost, now_ns - self._tank_frame_ns
-        if since_ns > self._tank_gap_ns:
-            self._cycles += round(since_ns / self._tank.cycle_ns)
-        else:
-            self._cycles += 1 + lost - self._tank_lost
-        self._tank_lost, self._tank_frame_ns = lost, now_ns
+        """Count the cycles since the last frame; by its counter, since time of receipt jitters.
+
+        A counter that falls behind the time is that of a long gap, or of a node that is too slow.
+        """
+        lost, cycle_ns = self._tank.lost, self._tank.cycle_ns
+        cycles = 1 + lost - self._tank_lost
+        self._tank_lost = lost
+        due_ns = self._tank_due_ns + cycles * cycle_ns
+        behind_ns = now_ns - due_ns
+        if behind_ns > self._tank_patience_ns:
+            missed = round(behind_ns / cycle_ns)
+            cycles += missed
+            due_ns += missed * cycle_ns
+        self._cycles += cycles
+        self._tank_due_ns = min(due_ns, now_ns)
 
     def _on_pump(self, pump: SensorPump, now_ns: int) -> None:
         if pump.quality in _USABLE and math.isfinite(pump.pressure_pa):

@@ -212,17 +212,14 @@ class Monitors:
         if phase == 0 or phase == 5:
             self._look_at_motion(now_ns, inbox, seen)
         elif phase == 1 or phase == 6:
-            if seen.pump_age_ms > STALE_MS:
-                self._of_drive = self.drive.restart()
-            else:
-                self._of_drive = self.drive.update(
-                    seen.command_pa,
-                    inbox.pressure_pa,
-                    inbox.level_m,
-                    level_rate_m_s,
-                    enabled=seen.drive_enabled,
-                    limited=inbox.drive_held_back,
-                )
+            self._of_drive = self.drive.update(
+                seen.command_pa,
+                inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else math.nan,
+                inbox.level_m,
+                level_rate_m_s,
+                enabled=seen.drive_enabled,
+                limited=inbox.drive_held_back,
+            )
         elif phase == 2 or phase == 7:
             self._look_at_twin(inbox, level_rate_m_s, excused=excused)
         elif phase == 3:

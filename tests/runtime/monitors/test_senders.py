@@ -69,6 +69,28 @@ def test_frames_lost_once_are_left_alone_and_a_loss_that_ended_is_forgotten() ->
     assert not any(found[755:])
 
 
+@pytest.mark.parametrize("cycle_ms", [10, 20])
+@pytest.mark.parametrize(("share", "found"), [(0.5, True), (0.7, True), (0.8, False), (0.0, False)])
+def test_message_slower_than_its_cycle_is_found_as_frames_lost(
+    share: float, found: bool, cycle_ms: int
+) -> None:
+    found_s = first_found(10 * share, 0, cycle_ms, what=Finding.FRAMES_LOST)
+    assert (found_s is not None) is found
+    assert found_s is None or 2.0 < found_s < 2.5
+
+
+def test_a_pause_is_no_slow_sender_and_one_that_ended_is_forgotten() -> None:
+    counted = Counted()
+    senders = Senders([Stream(counted)], 1700.0)
+    found = []
+    for k in range(100):
+        counted.heard += 10 if k < 10 or 30 <= k < 40 or k >= 70 else 0 if k < 30 else 5
+        found.append(bool(senders.update(0, STEP_S) & Finding.FRAMES_LOST))
+    assert not any(found[:60])
+    assert all(found[62:70])
+    assert not any(found[73:])
+
+
 @pytest.mark.parametrize(("cycle_ms", "within_s"), [(10, 0.31), (20, 0.41), (100, 1.7)])
 def test_second_sender_doubles_the_pace(cycle_ms: int, within_s: float) -> None:
     found_s = first_found(20, 0, cycle_ms)

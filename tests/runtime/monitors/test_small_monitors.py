@@ -198,14 +198,19 @@ def test_a_rotor_that_runs_down_or_turns_freely_in_the_water_is_left_alone() -> 
     assert off_findings(lambda _: 1.5 * THRESHOLDS.pressure_error_pa, 0.5)
 
 
-def test_a_gap_of_the_pressure_sensor_is_judged_by_nothing_and_begins_anew() -> None:
+def test_a_pressure_that_is_late_again_and_again_is_judged_by_what_comes_in_between() -> None:
     monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
-    held = {"enabled": False, "limited": False}
-    for _ in range(100):
-        found = monitor.update(0.0, 20e3, 0.0, 0.0, **held)
-    assert found
-    monitor.restart()
-    assert not monitor.update(0.0, 20e3, 0.0, 0.0, **held)
+    found = []
+    for k in range(60):
+        pressure_pa = 0.0 if k % 3 else math.nan
+        found.append(monitor.update(20e3, pressure_pa, 0.0, 0.0, enabled=True, limited=False))
+    first = next(k for k, each in enumerate(found) if each & Finding.DRIVE_LOST)
+    assert first < 30
+    assert all(each & Finding.DRIVE_LOST for each in found[first:])
+    held = {"enabled": True, "limited": False}
+    assert monitor.update(20e3, math.nan, 0.0, 0.0, **held) & Finding.DRIVE_LOST
+    assert not monitor.update(20e3, 20e3, 0.0, 0.0, **held)
+    assert not monitor.update(20e3, math.nan, 0.0, 0.0, **held)
 
 
 def test_command_held_at_its_limit_for_ten_seconds_is_saturated_until_it_leaves() -> None:

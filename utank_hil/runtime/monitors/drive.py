@@ -57,13 +57,12 @@ class DriveFollowing:
         self._free_pa_m = thresholds.free_rotor_pa_m
         self._period_s = period_s
         self._enabled = False
-        self.restart()
+        self._begin()
 
-    def restart(self) -> int:
-        """Begin anew, as after a gap; return what is found then: nothing."""
+    def _begin(self) -> None:
         self.expected_pa = self.late_pa = self._command_pa = 0.0
         self._settled_s = self._behind_s = self._reversed_s = 0.0
-        return 0
+        self._found = 0
 
     def update(
         self,
@@ -80,6 +79,8 @@ class DriveFollowing:
         Parameters
         ----------
         command_pa, pressure_pa : float
+            A pressure that is NaN, of a sensor that is late, changes nothing of what is found: one
+            that is late again and again is judged by what it sends in between.
         level_m, level_rate_m_s : float
             Of the starboard side: how far the water is off, and the way it flows.
         enabled : bool
@@ -89,17 +90,22 @@ class DriveFollowing:
         """
         if enabled is not self._enabled:
             self._enabled = enabled
-            self.restart()
+            self._begin()
         limit_pa = self._limit_pa
         if enabled:
             self.expected_pa += self._share * (self._command_pa - self.expected_pa)
             self._command_pa = command_pa
         else:
             limit_pa += self._free_pa_m * abs(level_m)
-        expected_pa = self.expected_pa
         self._settled_s += self._period_s
-        if self._settled_s < SETTLED_S:
-            return 0
+        if self._settled_s >= SETTLED_S and pressure_pa == pressure_pa:
+            self._found = self._judge(pressure_pa, level_rate_m_s, limit_pa, limited=limited)
+        return self._found
+
+    def _judge(
+        self, pressure_pa: float, level_rate_m_s: float, limit_pa: float, *, limited: bool
+    ) -> int:
+        expected_pa = self.expected_pa
         along_pa = pressure_pa if expected_pa > 0 else -pressure_pa
         outrun = limited and level_rate_m_s * expected_pa > 0
         if abs(expected_pa) > limit_pa and along_pa < -REVERSED_SHARE * limit_pa and not outrun:

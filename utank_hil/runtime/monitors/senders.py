@@ -12,7 +12,8 @@ CAN loses no frame: what disturbs it, it sends again. A gateway, or a slow recei
 frames do no harm, but two pump commands in succession let the drive's timeout of 50 ms go: once in
 five hours at random losses of 0.1 %, in three minutes at 1 %. Four motion frames, at which their
 age ends the run, are lost once in eleven days at 1 %. What is lost above 0.1 % of a message's
-frames is summed; with five too many people are to know.
+frames is summed; with five too many people are to know. So they are of a node that sends fewer than
+0.75 a cycle for two seconds, with a counter that misses none.
 """
 
 import math
@@ -24,6 +25,8 @@ from utank_hil.runtime.monitors.finding import Finding
 
 MOST_PER_CYCLE: Final = 1.25
 MOST_FRAMES: Final = 8.0
+LEAST_PER_CYCLE: Final = 0.75
+SLOW_S: Final = 2.0
 LOST_SHARE: Final = 0.001
 MOST_LOST: Final = 5.0
 FOREIGN_SHARE: Final = 0.1
@@ -75,7 +78,7 @@ class Stream:
         self._damaged = receiver.rejected[_CRC]
         self.damaged = 0
         self.excess = self._missing = 0.0
-        self._silent_s = 0.0
+        self._silent_s = self._slow_s = 0.0
 
     def update(self, elapsed_s: float) -> int:
         """Judge what came since the last call; return what was found."""
@@ -88,14 +91,17 @@ class Stream:
         damaged = receiver.rejected[_CRC]
         self.damaged = damaged - self._damaged
         self._damaged = damaged
-        excess = self.excess + came - MOST_PER_CYCLE * self._cycles_per_s * elapsed_s
+        cycles = self._cycles_per_s * elapsed_s
+        excess = self.excess + came - MOST_PER_CYCLE * cycles
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
         self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
+        if heard:  # a silence is judged elsewhere
+            self._slow_s = self._slow_s + elapsed_s if came < LEAST_PER_CYCLE * cycles else 0.0
         missing = self._missing + lost - LOST_SHARE * came
         self._missing = missing = min(max(missing, 0.0), MOST_LOST + 1.0)
         found = _SECOND if excess > MOST_FRAMES else 0
-        if missing > MOST_LOST:
+        if missing > MOST_LOST or self._slow_s > SLOW_S:
             found |= _LOST
         return found | _SILENT if self._silent_s > self._silent_limit_s else found
 
