@@ -14,7 +14,9 @@ import json
 import math
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,7 @@ from tools.evidence.sources import ROOT, digest_of, imported
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.one_thread import one_thread_each
 from utank_hil.runtime.panel import Action, TimedAction
 
 CACHE = ROOT / ".cache" / "false_alarms"
@@ -110,18 +113,28 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def rated(case: tuple[str, str, Scenario, int]) -> dict[str, Any]:
+    """`judged` of one law in one sea; in a process of its own."""
+    name, sea, scenario, count = case
+    return judged(name, sea, sail(name, sea, scenario, count))
+
+
 def main() -> int:
     """Sail what is missing, and print the rates."""
     parser = command_line(__doc__)
     parser.add_argument("--hours", type=int, default=50, help="of each law in each sea")
     parser.add_argument("--law", action="append", help="only this one; may be given again")
+    parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     options = parser.parse_args()
     laws = sorted(file.stem for file in (ROOT / "configs/controllers").glob("*.yaml"))
-    rows = [
-        judged(name, sea, sail(name, sea, scenario, options.hours))
+    cases = [
+        (name, sea, scenario, options.hours)
         for name in options.law or laws
         for sea, scenario in hours(name)
     ]
+    spawn = get_context("spawn")
+    with one_thread_each(), ProcessPoolExecutor(options.workers, mp_context=spawn) as pool:
+        rows = list(pool.map(rated, cases))
     show({"aim_per_hour": AIM_PER_HOUR, "runs": rows}, options)
     return 0
 
