@@ -412,7 +412,8 @@ FAULTS: Final = (
         "Check the motion sensor and the level gauges.",
         _found(
             Reaction.RAMP,
-            "roll or rate still while the other one moves, or level still while it is pushed",
+            "roll or rate still while the other one moves, both while the water does, or level "
+            "still while it is pushed",
             Finding.ROLL_STUCK | Finding.RATE_STUCK | Finding.LEVEL_STUCK,
         ),
     ),

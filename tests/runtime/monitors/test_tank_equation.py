@@ -99,6 +99,20 @@ def test_levels_that_stand_still_are_found_within_five_seconds() -> None:
         assert found_after(ship, stick)[Finding.LEVEL_STUCK] - shift_s <= 5.0
 
 
+@pytest.mark.parametrize("stands_deg", [0.0, 1.4])
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(
+    pressure_pa: float, stands_deg: float
+) -> None:
+    """Roll and rate agree then, and no sign is wrong: a dead sensor may go on sending zeros."""
+    stands_rad = math.radians(stands_deg)
+    ship = MovingShip(math.radians(1.0), pressure_pa)
+    found = found_after(ship, lambda _, roll, *rest: (stands_rad, *rest))
+    assert found[Finding.ROLL_STUCK] <= 1.25 * T
+    calm = MovingShip(math.radians(0.2), pressure_pa)
+    assert Finding.ROLL_STUCK not in found_after(calm, lambda _, roll, *rest: (0.0, *rest))
+
+
 def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
     ship = MovingShip(math.radians(2.0), 5e3)
 

@@ -13,6 +13,7 @@ differentiating. Sums with a memory of 0.4 roll periods tell the gains::
     level  sum(y (p + x)) / sum((p + x) (p + x))   1; -1 with the gauges swapped, 0 if stuck
 
 and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
+Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
 The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
 sixteen times as large is half of it.
@@ -34,6 +35,9 @@ SIGN_GAIN: Final = -0.25
 SETTLED: Final = 10.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
+STILL_PERIODS: Final = 0.25
+STILL_PUSHES: Final = 4.0
+"""Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LEAST_SHARE: Final = 0.06
@@ -45,6 +49,7 @@ _WATER_SIGN: Final = int(Finding.WATER_SIGN)
 _PUMP_SIGN: Final = int(Finding.PUMP_SIGN)
 _LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 _LATE: Final = int(Finding.MOTION_LATE)
+_ROLL_STUCK: Final = int(Finding.ROLL_STUCK)
 
 
 def roll_push_at_natural_frequency(ship: RollShip, tank: Tank) -> float:
@@ -146,6 +151,9 @@ class TankEquation:
         self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
         late_share = thresholds.least_roll_push_m2_s2 * frequency_rad_s
         self._least_dd = late_share**2 / (1 - self._late_keep)
+        self._still_rad = thresholds.roll_still_rad
+        self._still_samples = round(STILL_PERIODS * thresholds.roll_period_s / period_s)
+        self._most_unmoved = STILL_PUSHES**2 * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
         self._late_samples = round(thresholds.roll_period_s / period_s)
         self.restart()
@@ -155,7 +163,9 @@ class TankEquation:
         self._wait = -1
         self._xx = self._pp = self._rest_x = self._rest_p = self._both = self._level_both = 0.0
         self._lead = self._dd = 0.0
-        self._samples = 0
+        self._samples = self._still = 0
+        self._roll_rad = math.inf
+        self._unmoved = 0.0
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
 
     def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
@@ -193,6 +203,12 @@ class TankEquation:
         self._lead = self._late_keep * self._lead + (y - push) * d
         self._dd = dd = self._late_keep * self._dd + d * d
         self._samples += 1
+        self._still += 1
+        if abs(roll_rad - self._roll_rad) > self._still_rad:
+            self._roll_rad = roll_rad
+            self._still = 0
+        left = y - push
+        self._unmoved = keep * self._unmoved + left * left
         return self._judge(xx, pp, both, dd)
 
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
@@ -213,6 +229,8 @@ class TankEquation:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
+        if self._still > self._still_samples and self._unmoved > self._most_unmoved:
+            found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
             self.late_s = late_s = self._lead / dd
             if late_s > self._late_limit_s:
