@@ -249,6 +249,18 @@ def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
     assert bench.node.command_pa == 0.0
 
 
+def test_a_stop_that_is_let_go_before_the_next_look_is_heard() -> None:
+    node = build_controller_node(config(), commissioned=True)
+    transmitter = CATALOGUE.transmitter(HardwiredInputs)
+    shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
+    for stop in (Switch.OFF, Switch.ON, Switch.OFF):
+        node.receive(transmitter.frame(shut._replace(stop_loop=stop)), 0)
+    node.tick(10 * MS)
+    assert node.seen.hardwired_stop
+    node.tick(20 * MS)
+    assert not node.seen.hardwired_stop
+
+
 @pytest.mark.parametrize("switch", [Switch.ON, Switch.ERROR, None])
 def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
     switch: Switch | None,

@@ -25,6 +25,8 @@ class HardwiredHeard:
         When the last accepted frame of good quality came.
     stop : bool
         The stop loop is open or broken.
+    stop_heard : bool
+        It was, in a frame since the last look; the one who looks clears it.
     high_level : bool
         A switch is closed or broken.
     """
@@ -32,14 +34,14 @@ class HardwiredHeard:
     def __init__(self, receiver: Receiver[HardwiredInputs]) -> None:
         self.receiver = receiver
         self.heard_ns = NEVER_HEARD_NS
-        self.stop = self.high_level = False
+        self.stop = self.stop_heard = self.high_level = False
 
     def accept(self, frame: Frame) -> HardwiredInputs | None:
         """Return the message of a frame, None if it is rejected; hear its stop."""
         inputs = self.receiver.accept(frame)
         heard = inputs or self.receiver.intact(frame)
         if heard is not None and heard.stop_loop is not _OFF:
-            self.stop = True
+            self.stop = self.stop_heard = True
         return inputs
 
     def take(self, inputs: HardwiredInputs, now_ns: int) -> None:

@@ -221,7 +221,8 @@ class Observer:
         hardwired = inbox.hardwired
         if hardwired is not None:
             seen.high_level |= hardwired.high_level
-            seen.hardwired_stop = hardwired.stop
+            seen.hardwired_stop = hardwired.stop or hardwired.stop_heard
+            hardwired.stop_heard = False
             seen.hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         seen.roll_rad = inbox.roll_rad
         seen.heel_rad += HEEL_SHARE * (inbox.roll_rad - seen.heel_rad)
