@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.safety_limits import SafetyLimits
 
 # name: default, most
@@ -51,3 +52,17 @@ def test_no_threshold_is_beyond_what_switches_a_protection_off(name: str) -> Non
     for value in (0, -1, above, math.nan):
         with pytest.raises(ValueError, match=name):
             SafetyLimits(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [("roll_noise_rad", 2e-3), ("roll_rate_noise_rad_s", 1e-2), ("level_noise_m", 0.05)],
+)
+def test_no_noise_is_so_great_that_the_monitors_are_as_good_as_switched_off(
+    name: str, most: float
+) -> None:
+    """Degrees in the place of radians: a wrong sign of the rate took a minute to be found."""
+    assert getattr(SensorFigures(**{name: most}), name) == most
+    for value in (0, math.nextafter(most, math.inf), math.nan):
+        with pytest.raises(ValueError, match=name):
+            SensorFigures(**{name: value})

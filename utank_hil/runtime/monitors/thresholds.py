@@ -7,15 +7,18 @@ the ship rolls; s a sensor's noise. The smallest roll at which each fault can be
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import Positive, range_problems, refuse
+from utank_hil.parameters import Range, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)
 class SensorFigures:
     """Noise of the sensors as their makers state it, standard deviations of one sample.
+
+    Ten to twenty times the default at most, at which wrong signs are still found within seconds.
 
     Attributes
     ----------
@@ -27,12 +30,12 @@ class SensorFigures:
     Raises
     ------
     ValueError
-        If a figure is not positive.
+        If a figure is out of its range.
     """
 
-    roll_noise_rad: Positive = 2e-4
-    roll_rate_noise_rad_s: Positive = 5e-4
-    level_noise_m: Positive = 0.005
+    roll_noise_rad: Annotated[float, Range(above=0, most=2e-3)] = 2e-4
+    roll_rate_noise_rad_s: Annotated[float, Range(above=0, most=1e-2)] = 5e-4
+    level_noise_m: Annotated[float, Range(above=0, most=0.05)] = 0.005
 
     def __post_init__(self) -> None:
         refuse("sensors", range_problems(self))
