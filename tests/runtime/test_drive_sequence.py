@@ -2,7 +2,7 @@ import pytest
 
 from firmware_sim.drive_states import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
-from utank_hil.runtime.drive_sequence import QUICK_STOPS, DriveSequence
+from utank_hil.runtime.drive_sequence import DISABLES, QUICK_STOPS, DriveSequence
 
 S, C = DriveState, ControlWord
 
@@ -109,3 +109,11 @@ def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_h
     sequence = DriveSequence()
     words = [sequence.next_word(S.OPERATION_ENABLED, wanted=False) for _ in range(QUICK_STOPS + 2)]
     assert words == [C.QUICK_STOP] * QUICK_STOPS + [C.DISABLE_VOLTAGE] * 2
+    for _ in range(DISABLES - 2):
+        assert not sequence.ignored
+        sequence.next_word(S.OPERATION_ENABLED, wanted=False)
+    assert not sequence.ignored
+    sequence.next_word(S.OPERATION_ENABLED, wanted=False)
+    assert sequence.ignored
+    sequence.next_word(S.SWITCH_ON_DISABLED, wanted=False)
+    assert not sequence.ignored

@@ -83,5 +83,17 @@ def test_a_drive_that_no_quick_stop_takes_out_of_operation_is_told_to_be_off(
     table.drive_follows, table.drive_state = False, state
     table.run(100)
     assert table.word is ControlWord.QUICK_STOP
-    table.run(600)
+    assert Fault.DRIVE_FAULT not in table.node.alarms.codes
+    table.run(900)
     assert table.word is ControlWord.DISABLE_VOLTAGE
+    # it does not hear that either: nobody can take its pressure away
+    assert Fault.DRIVE_FAULT in table.node.alarms.codes
+    table.order_is(mode_request=Mode.ACTIVE, arm=True)
+    table.run(400)
+    assert (table.node.mode, table.node.fault) == (Mode.STANDBY, Fault.DRIVE_FAULT)
+    table.order_is(arm=False)
+    table.drive_follows, table.drive_state = True, DriveState.SWITCH_ON_DISABLED
+    table.run(400)
+    table.order_is(arm=True)
+    table.run(400)
+    assert table.node.mode is Mode.ACTIVE

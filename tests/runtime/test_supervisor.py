@@ -61,6 +61,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.DRIVE_SILENT, Reaction.STOP, {"drive_age_ms": 70}),
     (Fault.DRIVE_SILENT, Reaction.STOP, {"echo_age_ms": 110}),
     (Fault.DRIVE_FAULT, Reaction.STOP, {"drive_fault": True}),
+    (Fault.DRIVE_FAULT, Reaction.STOP, {"drive_stays_on": True}),
     (Fault.VALVE_SILENT, Reaction.STOP, {"valve_age_ms": 70}),
     (Fault.VALVE_SILENT, Reaction.STOP, {"valve_echo_age_ms": 110}),
     (Fault.VALVE_FAULT, Reaction.STOP, {"valve_fault": True}),

@@ -349,6 +349,7 @@ class ControllerNode:
         seen = self.seen
         self._observer.observe(now_ns, self._frames_sent)
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
+        seen.drive_stays_on = self._pump and self._drive_sequence.ignored
         if self.monitors is not None:
             excused = False
             if self._retuning is not None:

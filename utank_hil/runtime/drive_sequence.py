@@ -7,6 +7,8 @@ from utank_hil.canbus import ControlWord, DriveState
 QUICK_STOPS: Final = 26
 """Commands, the first and half a second of them: a drive that brakes for longer, waits for a word
 or stays in operation is told to be off."""
+DISABLES: Final = 10
+"""Commands that tell it so, after which it does not obey."""
 
 
 _TOWARDS_ENABLED = {
@@ -21,11 +23,18 @@ _STOPPING = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 
 
 class DriveSequence:
-    """Chooses the control word of each pump command."""
+    """Chooses the control word of each pump command.
+
+    Attributes
+    ----------
+    ignored : bool
+        Whether the drive has been told to be off in vain.
+    """
 
     def __init__(self) -> None:
         self._resetting = False
         self._stops = 0
+        self.ignored = False
 
     def request_reset(self) -> None:
         """Reset the drive's fault with the next commands; only ever on an operator's order."""
@@ -50,4 +59,5 @@ class DriveSequence:
         elif state in _STOPPING:
             word = ControlWord.QUICK_STOP
         self._stops = self._stops + 1 if word is ControlWord.QUICK_STOP else 0
+        self.ignored = self._stops > QUICK_STOPS + DISABLES
         return ControlWord.DISABLE_VOLTAGE if self._stops > QUICK_STOPS else word

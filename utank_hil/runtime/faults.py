@@ -177,8 +177,9 @@ FAULTS: Final = (
     ),
     _row(
         Fault.DRIVE_FAULT,
-        "The pump drive reports a fault, or is not in operation enabled.",
-        "Read the drive's fault in DRIVE_STATUS_2 and remove its cause.",
+        "The pump drive reports a fault, is not in operation enabled, or can't be switched off.",
+        "Read the drive's fault in DRIVE_STATUS_2 and remove its cause. If it can't be switched "
+        "off, cut its power (hard-wired stop, main switch).",
         Condition(
             Reaction.STOP,
             "drive reports a fault, or is out of operation enabled for over "
@@ -186,6 +187,11 @@ FAULTS: Final = (
             lambda seen, limits: (
                 seen.drive_fault or seen.drive_out_ms > limits.drive_enabled_within_ms
             ),
+        ),
+        Condition(
+            Reaction.STOP,
+            "still in operation, or braking, 0.2 s after *disable voltage*",
+            lambda seen, _: seen.drive_stays_on,
         ),
         Condition(
             Reaction.GIVE_UP,

@@ -53,6 +53,8 @@ class Observations:
         Time since arming was accepted; the supervisor counts it.
     drive_fault : bool
         The drive's status reports a fault.
+    drive_stays_on : bool
+        It was told to be off in vain.
     valve_age_ms, valve_echo_age_ms : float
         Time since the valve's status, and since its echo of a new command; zero without a valve.
     valve_fault : bool
@@ -115,6 +117,7 @@ class Observations:
     drive_out_ms: float = 0.0
     arming_ms: float = 0.0
     drive_fault: bool = False
+    drive_stays_on: bool = False
     valve_age_ms: float = 0.0
     valve_echo_age_ms: float = 0.0
     valve_fault: bool = False
@@ -159,7 +162,8 @@ class Observer:
     Attributes
     ----------
     seen : Observations
-        `law_failed`, `found`, `gm_low` and `command_pa` are the node's own to set.
+        `law_failed`, `found`, `gm_low`, `drive_stays_on` and `command_pa` are the node's own to
+        set.
     """
 
     def __init__(self, inbox: Inbox, bit_rate: int, command_cycle_ns: int) -> None:
