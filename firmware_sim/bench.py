@@ -47,10 +47,8 @@ class BenchResult:
 
     Attributes
     ----------
-    scenario : Scenario
     mode : str
         "lockstep", "real time" or "real time on" and the interface.
-    seed : int
     duration_s : float
         Length asked for of each run.
     settle_s, end_s : float
@@ -215,8 +213,6 @@ def run_bench(
 
     Parameters
     ----------
-    scenario : Scenario
-    options : BenchOptions
     progress : callable
         Called several times a second while runs go on.
     laws : mapping of str to BuiltLaw, optional
@@ -254,7 +250,6 @@ def run_in_turn(
 
     Parameters
     ----------
-    scenario : Scenario
     seed : int
         Instead of the scenario's.
     laws : mapping of str to BuiltLaw, optional

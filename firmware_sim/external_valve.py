@@ -18,11 +18,8 @@ class ExternalValve:
 
     Parameters
     ----------
-    plant : Plant
-    tank : Tank
     valve : Valve
         Of the ship file: which loss an opening has.
-    catalogue : Catalogue
 
     Attributes
     ----------

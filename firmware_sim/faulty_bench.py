@@ -32,17 +32,14 @@ class FaultyBench:
     ----------
     scenario : Scenario
         Its own faults are left to the caller.
-    config : ControllerConfig
     law : BuiltLaw, optional
         Of the controller; it is designed without.
-    seed : int
     script : tuple of TimedAction
         What the operator does.
     trace : callable, optional
         As `Lockstep` takes it.
     sink : callable, optional
         Takes the controller's telemetry, one row of so many ticks.
-    sink_every : int
     retuner : Retuner, optional
         Of a controller that retunes itself; its law can't be made to fail.
     estimating : Retuner, optional
@@ -54,13 +51,10 @@ class FaultyBench:
 
     Attributes
     ----------
-    ship : ShipSide
     nodes : dict of str to FaultyNode
         Sensors, drive, valve, panel and controller, as far as there are.
     node : ControllerNode
         The controller that runs at present.
-    bus : FaultyBus
-    lockstep : Lockstep
     """
 
     def __init__(

@@ -25,20 +25,15 @@ class RunFigures:
 
     Attributes
     ----------
-    name : str
     ranked : bool
         Whether the run counts, see `firmware_sim.verdicts`.
     rank : int or None
         Place by roll RMS among the runs that count, from 1.
-    roll : RollStatistics
     roll_below_no_tank, roll_below_passive : float or None
         Share by which the roll RMS is less than without a tank, and than with the passive tank;
         None where the run or the one it is compared with does not count, and on still water.
-    pump : PumpStatistics
     strikes : int
         How often the water hit a reservoir's roof or bottom, over the whole run.
-    bus_load : float
-    refused_commands : int
     mode, fault : str
         Of the controller at the end of the run.
     active_share : float

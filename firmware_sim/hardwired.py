@@ -27,7 +27,6 @@ class HardwiredNode:
         The ship whose levels move the switches.
     high_level_m : float
         Level above still water at which a reservoir's switch closes.
-    catalogue : Catalogue
     configuration_version : int
         Sent in the heartbeat.
 

@@ -34,7 +34,6 @@ class Plant:
     ----------
     ship : RollShip or callable
         The ship, or the ship at a time in s since the start; that is asked for once a second.
-    tank : Tank
     pump : Pump or None
         None for a tank without one.
     waves : Waves or Harmonics

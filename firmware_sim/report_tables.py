@@ -115,7 +115,6 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     ----------
     values : sequence of float
         Zero or more, in the unit without a prefix.
-    unit : str
 
     Returns
     -------

@@ -27,7 +27,6 @@ class ShipInFigures:
     ----------
     roll_period_s, damping_nms_rad : float
         Of the ship without tank water.
-    tank_damping_ratio : float
     """
 
     roll_period_s: float
@@ -86,7 +85,6 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
 
     Parameters
     ----------
-    run : Run
     scenario : Scenario
         Whose ship is the truth.
     settle_s : float

@@ -54,15 +54,10 @@ class Job:
 
     Attributes
     ----------
-    name : str
-    scenario : Scenario
-    controller : ControllerConfig
     law : BuiltLaw
         Of the controller.
     script : tuple of TimedAction
         What the operator does.
-    seed : int
-    duration_s : float
     frames : Path or None
         Where the run leaves its frame log, if it is to leave one.
     """
@@ -107,7 +102,6 @@ class Run:
 
     Attributes
     ----------
-    name : str
     rows : ndarray, shape (n, len(COLUMNS))
         Controller's telemetry and the truth, every `RECORD_S`, on the ship's time: `time_s` counts
         from the start of its motion in the waves. In real time rows are left out
@@ -130,7 +124,6 @@ class Run:
         Of the loop with the controller; None in simulated time.
     retuning : tuple of RetuningEvent
         What the controller did to retune itself.
-    fallbacks : int or None
     law_error : str
         As in `ControllerNode`.
     """

@@ -144,7 +144,6 @@ class IrregularSea(_AnySea, ABC):
         ----------
         known : sequence of tuple
             Time in s and spectrum; the first is that of this sea.
-        seed : int
         """
         if len(known) == 1:
             return PassingSea.of(self.sea(seed))

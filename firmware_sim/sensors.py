@@ -49,8 +49,6 @@ class SensorNode:
     ----------
     plant : Plant
         The ship to measure.
-    errors : SensorErrors
-    catalogue : Catalogue
     configuration_version : int
         Sent in the heartbeat, for the controller to compare with its own.
     seed : int

@@ -36,15 +36,10 @@ class ShipSide:
 
     Attributes
     ----------
-    vessel : Vessel
-    plant : Plant
-    sensors : SensorNode
     drive : PumpDrive or None
         If the tank has a pump.
-    panel : OperatorPanel
     valve : ValveNode or None
         If the tank has one.
-    second_motion : SensorNode or None
     hardwired : HardwiredNode or None
         If the vessel's redundancy has them.
     """
@@ -105,7 +100,6 @@ def bare_plant(scenario: Scenario, seed: int) -> Plant:
 
     Parameters
     ----------
-    scenario : Scenario
     seed : int
         Of the sea.
     """
@@ -124,7 +118,6 @@ def build_ship_side(scenario: Scenario, seed: int, script: tuple[TimedAction, ..
 
     Parameters
     ----------
-    scenario : Scenario
     seed : int
         Of sea and sensor noise.
     script : tuple of TimedAction

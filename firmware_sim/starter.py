@@ -55,11 +55,8 @@ class StarterProject:
 
     Attributes
     ----------
-    vessel : Vessel
-    sized : SizedTank
     demand : PumpDemand
         What the pump was made for.
-    law : SelfTuned
     prediction : RollPrediction
         In the scenario's sea; with the pump, of a gentle LQG law that stays within the limits.
     sea : dict
@@ -114,8 +111,6 @@ def make_starter(
 
     Parameters
     ----------
-    ship : StarterShip
-    room : TankRoom
     stability_share : float
         That the free surface may take, as `size_tank` takes it.
     hs_m, tp_s : float, optional

@@ -19,14 +19,8 @@ class StarterShip:
 
     Parameters
     ----------
-    name : str
-    length_m, beam_m : float
-    displacement_t : float
-    gm_m : float
     roll_period_s : float, optional
         By the weather criterion's formula if not given; then the draught is needed.
-    draught_m : float, optional
-    roll_damping_ratio : float
 
     Raises
     ------

@@ -24,7 +24,6 @@ class TruthRecorder:
 
     Parameters
     ----------
-    plant : Plant
     log : MemoryLog
         Takes the rows, columns `TRUTH`.
     period_ns : int

@@ -43,9 +43,6 @@ class ValveNode:
     ----------
     plant : Plant
         Its valve loss is set.
-    tank : Tank
-    valve : Valve
-    catalogue : Catalogue
     configuration_version : int
         Sent in the heartbeat, for the controller to compare with its own.
 

@@ -63,7 +63,6 @@ def track(
 
     Parameters
     ----------
-    voyage : iterable of Waypoint
     start : float
         Its value at time 0.
     value : callable

@@ -66,7 +66,6 @@ class PassingWaves:
 
     Parameters
     ----------
-    sea : PassingSea
     turn_rad, speed_m_s : callable
         Turn of the ship since the start, clockwise, and its speed, at a time in s.
     moment : callable

@@ -81,10 +81,6 @@ def measure_of(names: tuple[str, ...]) -> Measure:
 def build_law(config: ControllerConfig) -> BuiltLaw:
     """Design the law of a configuration for its vessel.
 
-    Parameters
-    ----------
-    config : ControllerConfig
-
     Returns
     -------
     BuiltLaw
@@ -153,7 +149,6 @@ def build_controller_node(
 
     Parameters
     ----------
-    config : ControllerConfig
     law : BuiltLaw, optional
         Of this configuration, if it was built before; it is designed without.
     retuner : Retuner, optional
@@ -277,7 +272,6 @@ def retuning_task(
 
     Parameters
     ----------
-    config : ControllerConfig
     order : int
         Of the ARX model.
     roll_period_range_s : tuple of float

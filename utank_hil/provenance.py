@@ -85,7 +85,6 @@ def describe(
         Where the result is written: paths of data files are relative to it.
     options : mapping of str to any
         Options and arguments of the command.
-    seed : int, optional
     scenario : BaseModel, optional
         Whose sea counted, where the configuration is not a scenario itself.
 

@@ -38,7 +38,6 @@ def case_name(simulation: str, content: dict[str, Any]) -> str:
 
     Parameters
     ----------
-    simulation : str
     content : dict
         Of the scenario, its seed included. A data file counts by what is in it.
     """

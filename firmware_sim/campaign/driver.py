@@ -68,7 +68,6 @@ class Driver:
 
     Parameters
     ----------
-    loaded : LoadedStudy
     store : Store
         Begun for this study.
     progress : callable

@@ -14,7 +14,6 @@ def draw(results: Results, groups: list[dict[str, Any]], path: Path) -> Path:
 
     Parameters
     ----------
-    results : Results
     groups : list of dict
         Its `summary`.
     path : Path

@@ -58,7 +58,6 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
     ----------
     simulation : str
         "bus", "linear" or "nonlinear".
-    scenario : Scenario
     seed : int
         Instead of the scenario's.
     laws : mapping of str to BuiltLaw

@@ -49,7 +49,6 @@ class Stopping:
     ----------
     stop : Stop or None
         None needs all.
-    cases : sequence of Case
     """
 
     def __init__(self, stop: Stop | None, cases: Sequence[Case]) -> None:

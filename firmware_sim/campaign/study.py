@@ -112,7 +112,6 @@ class Case:
         Hash of configuration, seed and code.
     waves : str
         Hash of what makes the waves.
-    seed : int
     group : tuple
         Values of the keys that make groups.
     parameters : dict
@@ -136,9 +135,6 @@ class LoadedStudy:
 
     Attributes
     ----------
-    path : Path
-    study : Study
-    cases : list of Case
     keys : tuple of str
         Keys that make groups.
     """

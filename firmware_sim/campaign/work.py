@@ -36,7 +36,6 @@ class Batch:
 
     Attributes
     ----------
-    simulation : str
     scenario : str
         Content of the study's scenario, as text.
     code : str

@@ -49,10 +49,8 @@ class Comparison:
     ----------
     source : str
         Where the run is from.
-    run : str
     parameters : dict
         What both have in common of the keys that are varied.
-    figures : dict of str to Difference
     remarks : tuple of str
         What is to be known of it.
     """

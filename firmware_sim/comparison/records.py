@@ -60,7 +60,6 @@ class Record:
 
     Attributes
     ----------
-    path : Path
     about : dict
         Where it comes from; empty where it does not say.
     runs : dict

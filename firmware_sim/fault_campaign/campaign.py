@@ -56,8 +56,6 @@ class Setup(Section):
 
     Attributes
     ----------
-    scenario : Scenario
-    controller : str
     actual_ship : dict of str to float
         What she is from the moment of the fault on, keys as in a scenario.
     redundancy : Redundancy

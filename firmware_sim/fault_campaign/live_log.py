@@ -62,7 +62,6 @@ def times_of(
 
     Parameters
     ----------
-    log : LiveLog
     fault_s, end_s : float
         When it was made, and to when the bus was listened to.
     silences : Stream, optional

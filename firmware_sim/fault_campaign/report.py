@@ -22,7 +22,6 @@ def as_json(
 
     Parameters
     ----------
-    results : sequence of Result
     on_bus : sequence of mapping
         Live rows, as `run_live` gives them.
     not_run : mapping of str to str

@@ -82,10 +82,6 @@ def run_rows(
 
     Parameters
     ----------
-    campaign : Campaign
-    rows : sequence of Row
-    seeds : sequence of int
-    window : Window
     progress : callable
         Called several times a second.
     stopped : callable

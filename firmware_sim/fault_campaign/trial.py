@@ -62,13 +62,8 @@ class Outcome:
 
     Attributes
     ----------
-    row : str
-    seed : int
-    found_ms, halved_ms, noted_ms, alarm_ms, zero_ms : float or None
     mode, code : str
         In the end, and the fault that was latched or shown.
-    alarms : tuple of str
-    was_active, armed_again : bool
     refused : int
         Commands that the drive refused.
     steepest_pa_s : float
@@ -141,12 +136,8 @@ class Sea:
 
     Parameters
     ----------
-    campaign : Campaign
-    setup : Setup
     law : BuiltLaw
         Of the setup's controller.
-    seed : int
-    window : Window
     recorded : bool
         Whether the outcomes hold recordings.
     """

@@ -21,12 +21,10 @@ class Result:
 
     Attributes
     ----------
-    row : Row
     requirement : str
         Its text.
     found_ms, zero_ms : float or None
         When the reaction asked for began, and when the drive's set-point was zero for good.
-    zero_limit_ms : float or None
     codes : tuple of str
         What the fault was called, over the seeds.
     wire : str

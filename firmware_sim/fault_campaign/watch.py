@@ -61,7 +61,6 @@ class Watch:
 
     Parameters
     ----------
-    bench : FaultyBench
     operator : iterable of TimedAction
         Buttons to press, at times after the first tick.
     counts_from : mapping of str to float

@@ -45,10 +45,8 @@ class Disturbance:
 
     Attributes
     ----------
-    span : Span
     does : str
         "loses", "delays", "doubles", "changes" or "swaps" (with the next one of its identifier).
-    share : float
     can_id : int or None
         None for all.
     by_ns : int
@@ -67,13 +65,11 @@ class FaultyBus:
 
     Parameters
     ----------
-    bit_rate : int
     seed : int
         Of what happens by chance.
 
     Attributes
     ----------
-    disturbances : list of Disturbance
     bit_errors : list of tuple of (Span, float, int or None)
         Share of the attempts that are destroyed, of one sender or of all.
     error_counts : dict of int to int

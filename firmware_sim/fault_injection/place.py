@@ -40,9 +40,6 @@ class Bench:
     ----------
     nodes : dict of str to FaultyNode
         By name.
-    plant : Pumped
-    drive : Trips or None
-    valve : Sticks or None
     version : int
         Of the ship's configuration.
     bus : FaultyBus or None

@@ -66,8 +66,6 @@ class Candidate:
 
     Attributes
     ----------
-    controller : Controller
-    measured : tuple of str
     plant : DesignPlant
         That it is run on.
     pumps : bool

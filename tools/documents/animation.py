@@ -52,8 +52,6 @@ class Section:
 
     Parameters
     ----------
-    axes : Axes
-    size : SceneSize
     name : str
         Title.
     """

@@ -243,7 +243,7 @@ def _meanings(section: type) -> dict[str, str]:
             for parameter in (*parsed["Parameters"], *parsed["Attributes"]):
                 meaning = " ".join(" ".join(parameter.desc).split())
                 for name in parameter.name.split(", "):
-                    if not (name in found and meaning.startswith("As in ")):
+                    if not meaning.startswith("As in "):
                         found[name] = meaning
             found |= _strings_below(each)
     return found

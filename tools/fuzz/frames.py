@@ -84,7 +84,6 @@ class Noise:
 
     Parameters
     ----------
-    draw : random.Random
     counters : callable
         The counter that the receiver of an identifier expects next.
     intrusions : float
@@ -160,7 +159,6 @@ class Session:
 
     Parameters
     ----------
-    seed : int
     burst : int
         Most frames of noise in a tick.
     hushed : bool

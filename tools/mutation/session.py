@@ -106,7 +106,6 @@ class Exchange:
         The file that is changed.
     unchanged : CodeType
         Of it.
-    mutants : sequence of Mutant
     report : callable
         Takes a mutant as soon as a test fails.
     end_s : float

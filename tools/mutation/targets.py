@@ -206,7 +206,6 @@ class Target:
 
     Attributes
     ----------
-    file : str
     tests : tuple of str
         Those that mirror it.
     behind : tuple of str

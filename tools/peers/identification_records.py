@@ -57,12 +57,9 @@ def record(
 
     Parameters
     ----------
-    samples : int
     noise : float
         Standard deviation, as a part of each output's.
-    limits : PumpLimits
     sea : {"calm", "one wave", "storm"}
-    seed : int
     """
     pressure = random_pulses(samples * SAMPLE_TIME_S, limits, seed, sample_time_s=SAMPLE_TIME_S)
     y = respond(pressure, np.zeros(samples))

@@ -164,7 +164,6 @@ class ProgrammeFamily:
         Samples of the horizon at which the level is held.
     rise : ndarray, shape (j,)
         How far the command may move up to each knot, of the greatest pressure.
-    level_m : float
     penalty : float
         Of the slack; cost in units of `cost`.
     cost : float

@@ -130,7 +130,6 @@ class Osqp:
 
     Parameters
     ----------
-    family : ProgrammeFamily
     tolerance : float
         Absolute and relative; 1e-3 is OSQP's own.
     polish : bool

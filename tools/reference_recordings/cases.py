@@ -46,7 +46,6 @@ class Case:
         Also of the file.
     controller : str
         Name of a shipped controller.
-    seconds : float
     script : tuple
         Times and buttons of the operator.
     faults : tuple of dict
@@ -163,7 +162,6 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
 
     Parameters
     ----------
-    case : Case
     folder : Path
         Where it is written.
     home : Path, optional

@@ -75,7 +75,6 @@ class Model:
 
     Attributes
     ----------
-    name : str
     plant : LinearModel
         Its outputs are `STATES`.
     covariance : ndarray, shape (n, n)

@@ -39,9 +39,6 @@ class Error:
 
     Attributes
     ----------
-    name : str
-    extra_delay_s : float
-    pump_gain : float
     lag_s : float or None
         None as configured.
     period_scale : float

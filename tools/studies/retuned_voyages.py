@@ -34,8 +34,6 @@ class Voyage:
 
     Attributes
     ----------
-    seed : int
-    controller : str
     begun_s : float or None
         First identification; None if there was none.
     ended : str

@@ -51,8 +51,6 @@ class Part:
 
     Attributes
     ----------
-    sea, law : str
-    period_s, minutes : float
     of_sea, of_ship : str
         Verdicts.
     moment, height, peak : float
@@ -63,7 +61,6 @@ class Part:
         Relative deviation stated of `moment`.
     stiffness, period : float
         Relative errors of stiffness and roll period.
-    stiffness_deviation : float
     """
 
     sea: str

@@ -116,7 +116,6 @@ def sail(
     ----------
     seconds, sample_s : float
         Ship time in all, and from one sample to the next.
-    seed : int
     settings, retune : optional
         Of the retuning, in the place of the configuration's.
     episode_s, cargo_s : float

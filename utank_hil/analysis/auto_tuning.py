@@ -47,7 +47,6 @@ class AutoTuned:
     ----------
     design : PredictiveDesign or LQGDesign
         Its numbers.
-    robustness : Robustness
     cost : float
         Predicted; 1 is that of the passive tank's roll.
     """

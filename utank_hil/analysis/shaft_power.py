@@ -20,8 +20,6 @@ def mean_shaft_power_w(
 
     Parameters
     ----------
-    pump : Pump
-    pressure_rms_pa, flow_rms_m3_s : float
     water_power_w : float
         Mean of pressure times flow.
     """

@@ -30,7 +30,6 @@ class TankFigures:
         Of the water.
     peak : float
         Greatest roll per static roll over all wave frequencies.
-    duct_area_m2 : float
     """
 
     mass_ratio: float
@@ -63,7 +62,6 @@ def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
 
     Parameters
     ----------
-    ship : RollShip
     tank : Tank
         Its reservoirs, width, height and place are kept.
 

@@ -85,8 +85,6 @@ class RollPrediction:
 
     Attributes
     ----------
-    without_tank_rad : float
-    passive : MotionInSea
     active : MotionInSea or None
         None where there is no pump or no law.
     mean_power_w : float or None
@@ -127,7 +125,6 @@ class LoadingPoint:
         Of the roll period, by the stiffness.
     without_tank_rad, passive_rad : float
         Roll RMS.
-    active_rad : float or None
     """
 
     period_scale: float
@@ -144,9 +141,6 @@ class SweepPoint:
     ----------
     stability_share, frequency_ratio : float
         What the tank was given: share of stability, and frequency of the water per roll frequency.
-    mass_ratio : float
-    tank : Tank
-    prediction : RollPrediction
     """
 
     stability_share: float
@@ -217,7 +211,6 @@ def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> Rol
     ----------
     plant : DesignPlant
         With the limits of its pump.
-    sea : SeaState
     pump : bool
         Whether there is one.
     """

@@ -101,7 +101,6 @@ class SizedTank:
 
     Attributes
     ----------
-    tank : Tank
     reservoir_length_m, reservoir_breadth_m : float
         Of one reservoir, along and across the ship.
     duct_height_m : float
@@ -146,12 +145,10 @@ class TankCost:
 
     Attributes
     ----------
-    water_t : float
     share_of_displacement : float or None
         The water's; None for a ship without a displacement.
     stability_taken : float
         By the free surface, as a share.
-    gm_loss_m : float or None
     water_period_s, damping_ratio : float
         Of the water in the ship held still.
     usable_level_m : float
@@ -187,7 +184,6 @@ def size_tank(
     ----------
     ship : RollShip
         With her displacement.
-    room : TankRoom
     stability_share : float
         0.03 to 0.25.
 

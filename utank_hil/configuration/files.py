@@ -183,7 +183,6 @@ class _Reader:
 
     Attributes
     ----------
-    problems : list of ConfigProblem
     unread : set of Key
         Keys of the whole that stand for files which could not be read.
     origins : dict of Key to Path
@@ -202,7 +201,6 @@ class _Reader:
 
         Parameters
         ----------
-        file : Path
         key : tuple
             Where it stands in the whole.
         stack : tuple of Path

@@ -36,7 +36,6 @@ class ARX:
         Output coefficients alpha_1 ... alpha_p.
     beta : array_like, shape (p + 1, m, r)
         Input coefficients beta_0 ... beta_p; beta_0 acts at once.
-    sample_time_s : float
 
     Raises
     ------

@@ -20,8 +20,6 @@ class DesignPlant:
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     delay_s : float
         From the sampling of a measurement to the drive's answer to the command made of it.
     lag_s : float

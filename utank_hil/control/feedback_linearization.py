@@ -106,9 +106,6 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
     ----------
     frequency_rad_s, ..., kind
         As in `FeedbackLinearizationDesign`.
-    ship : RollShip
-    tank : Tank
-    sample_time_s : float
 
     Raises
     ------
@@ -206,7 +203,6 @@ def level_brake(model: RollModel, damping_ratio: float) -> float:
 
     Parameters
     ----------
-    model : RollModel
     damping_ratio : float
         zeta_h that the zero dynamics get.
 

@@ -19,7 +19,6 @@ class GainLaw:
     ----------
     gain : ndarray, shape (r, m)
         K.
-    sample_time_s : float
 
     Raises
     ------

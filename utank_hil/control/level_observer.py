@@ -25,7 +25,6 @@ class LevelObserver:
 
     Parameters
     ----------
-    tank : Tank
     period_s : float
         Time between two measurements.
     bandwidth_rad_s : float
@@ -75,8 +74,6 @@ class LevelObserver:
 
         Parameters
         ----------
-        measured_m : float
-        pressure_pa : float
         periods : int
             Since the last measurement; more than one after a gap.
         """

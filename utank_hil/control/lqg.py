@@ -211,7 +211,6 @@ class LQGController:
 
     Parameters
     ----------
-    law : LQGLaw
     washout_share : float
         Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
         no washout.

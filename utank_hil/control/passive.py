@@ -19,7 +19,6 @@ class PassiveController:
     ----------
     inputs : int
         Number of pumps r.
-    sample_time_s : float
 
     Raises
     ------

@@ -29,7 +29,6 @@ class PumpWithValve:
 
     Parameters
     ----------
-    valve : ValveRange
     pump : Controller
         One input. Its `applied` gets the pressure that both really made.
     measured : int

@@ -43,8 +43,6 @@ def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
 
     Parameters
     ----------
-    valve : ValveRange
-    pressure_pa : float
     flow_m_s : float
         Level rate dh/dt.
 
@@ -66,11 +64,9 @@ class OnOffValve:
 
     Parameters
     ----------
-    valve : ValveRange
     threshold_rad_m_s2 : float
         The valve moves when the product of roll rate and level rate is beyond this, so that it does
         not chatter on noise.
-    sample_time_s : float
 
     Raises
     ------
@@ -106,7 +102,6 @@ class ClippedValve:
 
     Parameters
     ----------
-    valve : ValveRange
     pump : Controller
         One input. Its `applied` gets the pressure that the valve really made.
     measured : int, optional

@@ -118,7 +118,6 @@ class SystemMatrices:
     Parameters
     ----------
     D : tuple of tuple of float, 1 x m
-    sample_time_s : float
     A, B, C : tuple of tuple of float, n x n, n x m, 1 x n
         Left out for a law without states.
 
@@ -163,7 +162,6 @@ class StateSpaceDesign:
     ----------
     measured : tuple of str
         What the law measures, in the order of the columns of B and D; names of `STATES`.
-    system : SystemMatrices
 
     Raises
     ------

@@ -106,13 +106,10 @@ class Stimulation(StimulationDesign):
     ----------
     amplitude_rad, ..., kind
         As in `StimulationDesign`.
-    ship : RollShip
-    tank : Tank
     pressure_pa : float
         Greatest pressure.
     level_limit_m : float
         Where the stimulation ends.
-    sample_time_s : float
 
     Raises
     ------

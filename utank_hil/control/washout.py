@@ -31,7 +31,6 @@ class WashoutLaw:
 
     Parameters
     ----------
-    law : PredictiveLaw or LQGLaw
     corner_rad_s : float
         w0, far below the ship's roll frequency.
 

@@ -54,12 +54,9 @@ def harmonic_response(
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     frequency_rad_s : array_like, shape (n,)
     pressure_pa, wave_moment_nm : float
         Amplitudes of the inputs.
-    pressure_phase_rad, wave_phase_rad : float
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     half = tank.width_m / 2  # level per tank angle; turns the level's force into a moment

@@ -63,7 +63,6 @@ class Impact(NamedTuple):
 
     Attributes
     ----------
-    time_s : float
     level_m : float
         The limit; positive if starboard is full.
     speed_m_s : float
@@ -152,7 +151,6 @@ class RollModel:
 
         Parameters
         ----------
-        time_s : float
         state : ndarray, shape (4,)
             With the level at its limit and moving outward.
         """

@@ -89,7 +89,6 @@ class Pump:
         Bandwidth of the drive's speed loop.
     pressure_gain, integral_time_s : float
         Proportional gain and integral time of the pressure loop.
-    density_kg_m3 : float
 
     Raises
     ------
@@ -156,7 +155,6 @@ class Pump:
         ----------
         area_m2 : float
             Duct cross-section: 6.22 for the first ship, 0.19 for Patti-B.
-        max_pressure_pa : float
         """
         if not (area_m2 > 0 and max_pressure_pa > 0):
             raise ValueError(
@@ -265,14 +263,12 @@ def pump_step(
 
     Parameters
     ----------
-    state : PumpState
     setpoint : float
         Pressure set-point in Pa, held over the step.
     flow : float
         Flow to starboard Q = At dh/dt in m^3/s, held over the step.
     step_s : float
         About 20 ms at most.
-    c : PumpCoefficients
     """
     target = min(max(setpoint, -c.max_pressure), c.max_pressure)
     change = (target - state.reference_pa) * (1.0 - math.exp(-step_s / c.reference_lag))

@@ -65,8 +65,6 @@ def simulate_reference(
 
     Parameters
     ----------
-    model : RollModel
-    duration_s : float
     initial : array_like, shape (4,)
     pressure_pa, wave_moment_nm : callable
         Smooth functions of time in s.

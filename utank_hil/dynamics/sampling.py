@@ -37,7 +37,6 @@ class LinearModel(NamedTuple):
 
     Attributes
     ----------
-    A, B, C, D : ndarray
     dt : float
         Sample time in seconds, 0 if continuous.
     """
@@ -59,7 +58,6 @@ def sampled_model(
     system : control.StateSpace
         Continuous, without feedthrough; all inputs are pump inputs. Select signals by name:
         ``coupled_model(ship, tank)[["roll_rad"], ["pressure_pa"]]``.
-    sample_time_s : float
     delay_s : float
         From measurement to effect at the drive; any value, not only whole samples.
     lag_s : float
@@ -155,7 +153,6 @@ def noise_covariance(a: FloatArray, noise: FloatArray, time_s: float) -> FloatAr
         State matrix.
     noise : ndarray, shape (n, k)
         Input matrix of the k noises.
-    time_s : float
 
     References
     ----------

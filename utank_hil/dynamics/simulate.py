@@ -100,17 +100,14 @@ def simulate(
 
     Parameters
     ----------
-    model : RollModel
     duration_s : float
         A whole number of steps.
     initial : array_like, shape (4,)
         Roll, roll rate, level, level rate.
-    wave : WaveMoment or utank_hil.sea.Harmonics
     pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape () or (k,)
         Samples, each held for `hold_s`, the last one to the end.
     hold_s : float, optional
         A whole number of steps; one step if not given.
-    step_s : float
     record_every : int
         Steps between the recorded states.
     capsize_rad : float
@@ -187,7 +184,6 @@ def simulate_batch(
 
     Parameters
     ----------
-    models : RollModel or sequence of RollModel
     duration_s : float
         A whole number of steps.
     initial : array_like, shape (4,) or (n, 4)
@@ -197,10 +193,8 @@ def simulate_batch(
         Samples, each held for `hold_s`, the last one to the end.
     hold_s : float, optional
         A whole number of steps; one step if not given.
-    step_s : float
     record_every : int, optional
         Steps between recorded states; nothing is recorded if not given.
-    capsize_rad : float
 
     Raises
     ------

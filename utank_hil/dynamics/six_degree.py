@@ -41,7 +41,6 @@ class SixDegreeShip:
     ----------
     roll : RollShip
         Roll; its inertia includes ``added_mass[3][3]``.
-    mass_kg : float
     pitch_inertia_kg_m2, yaw_inertia_kg_m2 : float
         Without added mass, about the centre of gravity.
     product_xz_kg_m2 : float
@@ -103,8 +102,6 @@ class SixDegreeModel:
 
     Parameters
     ----------
-    ship : SixDegreeShip
-    tank : Tank
     free : tuple of str
         Free motions out of `MOTIONS`; the others are constrained to rest.
 
@@ -137,7 +134,6 @@ class SixDegreeModel:
         Parameters
         ----------
         state : ndarray, shape (14,)
-        pressure_pa : float
         force : ndarray, shape (6,), optional
             External force and moment in body axes, as from waves.
 
@@ -225,8 +221,6 @@ def simulate_six_degree(
 
     Parameters
     ----------
-    model : SixDegreeModel
-    duration_s : float
     initial : ndarray, shape (14,)
     pressure_pa, force : callable
         Functions of time in s; `force` is in body axes, shape (6,).

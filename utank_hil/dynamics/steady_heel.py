@@ -14,7 +14,6 @@ class SteadyHeel(NamedTuple):
 
     Attributes
     ----------
-    roll_rad : float
     at_the_end : bool
         A reservoir is full or empty.
     """

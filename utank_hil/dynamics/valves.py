@@ -118,7 +118,6 @@ def added_damping_ratio(tank: Tank, loss: float, level_m: float) -> float:
 
     Parameters
     ----------
-    tank : Tank
     loss : float
         Pa per (m/s)^2 of dh/dt.
     level_m : float
@@ -143,7 +142,6 @@ def duct_valve_loss(tank: Tank, opening: float) -> float:
 
     Parameters
     ----------
-    tank : Tank
     opening : float
         Open fraction s of the duct's area, above 0 and up to 1.
 
@@ -169,7 +167,6 @@ def air_valve_loss(
 
     Parameters
     ----------
-    tank : Tank
     pipe_area_m2 : float
         Area of the pipe with its valve fully open.
     opening : float

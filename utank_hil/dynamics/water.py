@@ -18,7 +18,6 @@ class WaterMoments(NamedTuple):
 
     Attributes
     ----------
-    mass_kg : float
     first_kgm : ndarray, shape (..., 3)
         Integral of r dm about the ship's centre of gravity.
     first_slope_kg : ndarray, shape (..., 3)
@@ -50,7 +49,6 @@ def water_moments(tank: Tank, level_m: npt.ArrayLike) -> WaterMoments:
 
     Parameters
     ----------
-    tank : Tank
     level_m : array_like, shape (...)
     """
     h = np.asarray(level_m, dtype=np.float64)

@@ -39,7 +39,6 @@ def tank_wrench(
 
     Parameters
     ----------
-    tank : Tank
     h, h_dot, h_ddot : array_like, shape (...)
         Level in m and its derivatives in m/s and m/s^2.
     velocity : array_like, shape (..., 3)

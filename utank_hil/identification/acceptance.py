@@ -49,7 +49,6 @@ def model_objections(validation: Validation, fit: ShipFit, limits: ModelLimits) 
         Validation of the identified ARX model.
     fit : ShipFit
         Ship and tank fitted to it.
-    limits : ModelLimits
     """
     found = []
     # written so that NaN is an objection too

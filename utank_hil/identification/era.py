@@ -61,7 +61,6 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
         ``markov[0]`` is D.
     order : int or None
         Number of states; None: `order_from_singular_values`.
-    sample_time_s : float
 
     Returns
     -------
@@ -93,8 +92,6 @@ def era_with_observer(
     markov : array_like, shape (K, m, r)
     observer_gain : array_like, shape (K - 1, m, m)
         C A^(k-1) K, as `okid` returns it.
-    order : int or None
-    sample_time_s : float
 
     Returns
     -------

@@ -26,13 +26,10 @@ def random_pulses(
 
     Parameters
     ----------
-    duration_s : float
     limits : PumpLimits
         Pressure and rate limits are used.
-    seed : int
     hold_s : tuple of float
         Shortest and longest pulse.
-    sample_time_s : float
 
     Returns
     -------
@@ -87,7 +84,6 @@ def multisine(
     ----------
     duration_s, limits, seed, sample_time_s
         As in `random_pulses`.
-    band_rad_s : tuple of float
 
     Returns
     -------

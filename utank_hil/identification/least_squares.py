@@ -42,7 +42,6 @@ class Fit:
         Upper triangle of the Gram matrix.
     penalty : ndarray, shape (m,)
         Term of the shrinkage on the diagonal of the inputs' part; zero without shrinkage.
-    rank : int
     excitation_order : int
         See `persistence.excitation_order`, for p + 1 lags.
     """

@@ -21,7 +21,6 @@ def markov_parameters(arx: ARX, count: int) -> tuple[FloatArray, FloatArray]:
 
     Parameters
     ----------
-    arx : ARX
     count : int
         Number K of Markov parameters.
 
@@ -54,7 +53,6 @@ def markov_gradient(arx: ARX, markov: FloatArray, weights: np.ndarray) -> np.nda
 
     Parameters
     ----------
-    arx : ARX
     markov : ndarray, shape (K, m, r)
     weights : ndarray, shape (K, m, r)
         Real or complex.

@@ -57,7 +57,6 @@ class ModalConfidence:
 
     Parameters
     ----------
-    modes : ModalParameters
     frequency_std_rad_s : ndarray, shape (k,)
     damping_ratio_std : ndarray, shape (k,)
     """
@@ -103,7 +102,6 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
 
     Parameters
     ----------
-    result : OkidResult
     order : int
         Order of the model, as in `era`.
 

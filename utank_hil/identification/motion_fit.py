@@ -108,7 +108,6 @@ def fit_motion(
         Roll in rad, roll rate in rad/s and level in m, without gaps.
     plant : DesignPlant
         Ship that the prior is about, and the tank.
-    sample_time_s : float
     spread : tuple of float
         Deviations of the prior.
     """

@@ -26,10 +26,8 @@ def coefficients(
     ----------
     signals : ndarray, shape (N, m)
         Without gaps. A straight line is taken off each.
-    sample_time_s : float
     omega_rad_s : ndarray, shape (F,)
         Below the Nyquist frequency.
-    tapers : int
 
     Returns
     -------

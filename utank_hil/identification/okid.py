@@ -38,7 +38,6 @@ class OkidResult:
         System Markov parameters; ``markov[0]`` is D, ``markov[k]`` is C A^(k-1) B.
     observer_gain : ndarray, shape (K - 1, m, m)
         Observer gain Markov parameters C A^(k-1) K, K being -G of the thesis.
-    basis : DisturbanceBasis
     disturbance : ndarray, shape (d, m)
         Coefficients of the disturbance basis in the ARX equation.
     residual_covariance : ndarray, shape (m, m)
@@ -125,7 +124,6 @@ def okid(
         the row index is time. Join separate records with one such row between them.
     order : int
         Order p of the ARX model.
-    sample_time_s : float
     disturbance_frequencies_rad_s : sequence of float
         Frequencies of regular waves; see `find_disturbance_frequencies`.
     disturbance_polynomial_degree : int or None

@@ -31,7 +31,6 @@ class RecursiveArx:
         Order p.
     output_scale, input_scale : array_like, shape (m,) and (r,)
         Typical magnitudes of outputs and inputs, such as 0.05 rad and 20 kPa.
-    sample_time_s : float
     forgetting : float
         Forgetting factor lambda, above 0 and at most 1, for a memory of 1 / (1 - lambda) samples.
 

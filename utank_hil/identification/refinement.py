@@ -51,8 +51,6 @@ class Refinement:
 
     Parameters
     ----------
-    system : control.StateSpace
-    confidence : ModalConfidence
     gain : float
         Relative reduction of the whitened squared error; 0 if there is none.
     noise_order : int

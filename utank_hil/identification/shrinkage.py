@@ -28,7 +28,6 @@ def shrinkage_estimate(
 
     Parameters
     ----------
-    regression : LagRegression
     gram : ndarray, shape (n, n)
         Upper triangle of the Gram matrix.
     right : ndarray, shape (n, m)

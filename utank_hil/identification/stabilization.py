@@ -20,8 +20,6 @@ class StabilizationPoint:
 
     Parameters
     ----------
-    order : int
-    frequency_rad_s, damping_ratio : float
     frequency_stable, damping_stable, shape_stable : bool
         Whether it changes by 1 % in frequency or less, by 5 % in damping ratio or less, and has a
         modal assurance of 0.98 or more.
@@ -45,7 +43,6 @@ def stabilization(
     markov : ndarray, shape (K, m, r)
     orders : sequence of int
         Increasing, at most the rank of the Markov parameters.
-    sample_time_s : float
 
     Returns
     -------

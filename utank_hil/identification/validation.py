@@ -66,7 +66,6 @@ def validate(
 
     Parameters
     ----------
-    arx : ARX
     u : array_like, shape (N, r) or (N,)
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.

@@ -40,7 +40,6 @@ def find_disturbance_frequencies(
     u : array_like, shape (N, r) or (N,)
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.
-    sample_time_s : float
     most : int
         Largest number of lines.
     band_rad_s : tuple of float

@@ -61,8 +61,6 @@ class BenchBar:
 
     Attributes
     ----------
-    name : str
-    color : str
     roll_rad : float or None
         Root mean square; None for a run that gives none.
     said : str
@@ -103,7 +101,6 @@ def draw_bench(
         roll.
     path : Path
         The `.png` file; overwritten.
-    title : str
     about : mapping, optional
         As in `picture`.
     bars : sequence of BenchBar

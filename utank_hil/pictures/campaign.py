@@ -22,7 +22,6 @@ class CampaignRun:
 
     Attributes
     ----------
-    name : str
     mean_rad, half_width_rad : sequence of float
         Roll RMS of each group; not a number where there is none.
     rolls_rad : sequence of float
@@ -52,10 +51,8 @@ def draw_campaign(
         first `MOST_GROUPS` are drawn.
     axis : str
         What the numbers are.
-    runs : sequence of CampaignRun
     path : Path
         The `.png` file; overwritten.
-    title : str
     about : mapping, optional
         As in `picture`.
     """

@@ -27,7 +27,6 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
         Such as one ship without and with its tank; all in the same wave.
     path : Path
         The `.png` file; overwritten.
-    title : str
 
     Raises
     ------

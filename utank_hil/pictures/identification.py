@@ -40,10 +40,8 @@ def draw_identification(
     record : ndarray, shape (N, 1 + m)
     found : Identification
         Result for that record.
-    task : RetuningTask
     path : Path
         The `.png` file; overwritten.
-    title : str
     about : mapping, optional
         As in `picture`.
     """

@@ -36,10 +36,8 @@ def draw_bode(
     ----------
     loops : sequence of Loop
         One to seven laws; the passive tank is always drawn.
-    plant : DesignPlant
     path : Path
         The `.png` file; overwritten.
-    title : str
 
     Raises
     ------

@@ -24,7 +24,6 @@ def draw_time(
         has the same stroke in all panels, the first one grey.
     path : Path
         The `.png` file; overwritten.
-    title : str
 
     Raises
     ------
@@ -69,7 +68,6 @@ def draw_phase(
         Labels of the two axes, units included.
     path : Path
         The `.png` file; overwritten.
-    title : str
 
     Raises
     ------

@@ -21,9 +21,6 @@ class ReportTable:
 
     Attributes
     ----------
-    headings : sequence of str
-    rows : sequence of sequence of str
-    caption : str
     text : bool
         Whether the cells are sentences and not figures.
     """
@@ -66,7 +63,6 @@ class Verdict:
 
     Attributes
     ----------
-    lines : sequence of str
     good : bool
         Whether nothing was wrong.
     """
@@ -103,7 +99,6 @@ def write_report_page(
         Heading, and the line below it.
     verdicts : sequence of Verdict
         Of each run that is reported.
-    sections : sequence of ReportSection
 
     Raises
     ------

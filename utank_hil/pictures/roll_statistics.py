@@ -30,7 +30,6 @@ def draw_roll_statistics(
         Sample time.
     path : Path
         The `.png` file; overwritten.
-    title : str
     """
     from scipy.signal import welch
 

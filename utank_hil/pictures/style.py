@@ -73,7 +73,6 @@ def picture(
     ----------
     path : Path
         The `.png` file; overwritten.
-    title : str
     size_in : tuple of float
         Width and height in inches.
     about : mapping, optional

@@ -26,11 +26,8 @@ def draw_tank(
 
     Parameters
     ----------
-    curves : RollCurves
-    loadings : sequence of LoadingPoint
     path : Path
         The `.png` file; overwritten.
-    title : str
     about : mapping, optional
         As in `picture`.
     """
@@ -76,10 +73,8 @@ def draw_sweep(
 
     Parameters
     ----------
-    points : sequence of SweepPoint
     path : Path
         The `.png` file; overwritten.
-    title : str
     about : mapping, optional
         As in `picture`.
     """

@@ -35,7 +35,6 @@ def draw_figure(figure: Figure, path: Path, title: str) -> None:
         With one panel or more.
     path : Path
         The `.png` file; overwritten.
-    title : str
     """
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)

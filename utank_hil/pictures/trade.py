@@ -33,10 +33,8 @@ def draw_trade(
 
     Parameters
     ----------
-    trade : Trade
     path : Path
         The `.png` file; overwritten.
-    title : str
     pressure_limit_pa, level_limit_m : float
         Drawn as lines. The RMS values are those of linear theory, without limits.
     about : mapping, optional

@@ -45,7 +45,6 @@ class AdaptiveController(LawExchange):
         The ship that it was designed for.
     roll : int
         Index of the roll among the outputs.
-    settings : RetuningSettings
     pulses_pa : ndarray, shape (N,)
         Excitation pressure, one value a sample.
     retuner : Retuner

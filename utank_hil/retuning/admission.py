@@ -71,14 +71,8 @@ class WarmUp:
 
     Parameters
     ----------
-    law : MonitoredLaw
-    history : SampleHistory
     observe : callable, optional
         Takes a measurement in the place of the law's `step`, whose answers go nowhere.
-
-    Attributes
-    ----------
-    law : MonitoredLaw
     """
 
     def __init__(

@@ -50,7 +50,6 @@ class ModelSummary:
         Relative standard deviation of that period.
     inertia_kg_m2, stiffness_nm_rad, damping_nms_rad : float
         Roll inertia, stiffness and linear damping of the ship.
-    tank_damping_ratio : float
     held_out_fit : float
         Worst one-step fit of an output on validation data.
     peak_sensitivity : float
@@ -95,10 +94,8 @@ class Candidate:
 
     Attributes
     ----------
-    law : PredictiveLaw
     washout_rad_s : float
         Corner frequency of the washout; 0 for none.
-    summary : ModelSummary
     """
 
     law: PredictiveLaw

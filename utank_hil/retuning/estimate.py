@@ -24,7 +24,6 @@ class ShipFigures:
 
     Attributes
     ----------
-    stiffness_nm_rad, inertia_kg_m2, damping_nms_rad : float
     stiffness_deviation, period_deviation : float
         Relative standard deviations of stiffness and roll period.
 

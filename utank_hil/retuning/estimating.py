@@ -63,7 +63,6 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
     request : ndarray, shape (1 + N, 4)
         The known ship's stiffness, inertia and damping, and a number of no meaning; then
         `estimator.COLUMNS`, gaps NaN.
-    task : EstimateTask
     """
     known, record = request[0, :3], request[1:]
     period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s

@@ -161,7 +161,6 @@ def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) ->
     ----------
     ship : RollShip
         Of the displacement.
-    tank : Tank
     stiffness_nm_rad : float
         Of the ship without tank water.
     """
@@ -178,18 +177,15 @@ class Estimator:
 
     Parameters
     ----------
-    settings : EstimateSettings
     desk : Retuner
         Answers with a `MotionEstimate`.
     ship : RollShip
         The configured ship.
-    tank : Tank
     least_gm_m : float or None
         Limit of the stability booklet on the metacentric height.
 
     Attributes
     ----------
-    figures : EstimateFigures
     trouble : str
         Why no estimates come, as it was first known; empty while they do.
     """
@@ -239,7 +235,6 @@ class Estimator:
 
         Parameters
         ----------
-        now_ns : int
         pressure_pa : float
             Measured across the pump.
         motion : tuple of float

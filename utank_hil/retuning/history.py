@@ -13,7 +13,6 @@ class SampleHistory:
 
     Attributes
     ----------
-    capacity, outputs : int
     count : int
         Samples taken so far.
     """

@@ -31,8 +31,6 @@ class MonitoredLaw:
 
     Attributes
     ----------
-    controller : Controller
-    monitor : ChangeMonitor
     found : ModelSummary, ShipFigures or None
         The identified ship that the law was designed for; None for that of the configuration.
     estimate : MotionEstimate or None
@@ -55,8 +53,6 @@ class LawBank:
 
     Attributes
     ----------
-    accepted : MonitoredLaw
-    on_trial, previous : MonitoredLaw or None
     stepped : tuple of MonitoredLaw
         Every law of the bank, once.
     """

@@ -117,7 +117,6 @@ class LawExchange(ABC):
         First law.
     outputs, roll : int
         Number of outputs, and index of the roll among them.
-    settings : TrialSettings
     retuner : Retuner
         Designs.
     history_samples : int
@@ -125,11 +124,8 @@ class LawExchange(ABC):
 
     Attributes
     ----------
-    sample_time_s : float
-    state : RetuningState
     events : deque of RetuningEvent
         The last `MOST_EVENTS`.
-    laws : LawBank
     """
 
     def __init__(
@@ -204,8 +200,6 @@ class LawExchange(ABC):
 
         Parameters
         ----------
-        now_ns : int
-        order : RetuningOrder
         engaged : bool
             Whether this controller's command drives the pump.
         fresh : bool

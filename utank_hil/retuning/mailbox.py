@@ -66,7 +66,6 @@ class Mailbox:
         ----------
         number : int
             Different from the last message's, and not 0.
-        data : bytes
 
         Raises
         ------

@@ -32,7 +32,6 @@ def record_problems(
         Length of the record.
     outputs : int
         Number of measured outputs.
-    sample_time_s : float
     shortest_period_s : float
         Shortest roll period of the stability booklet.
 

@@ -69,7 +69,6 @@ class RetuningTask:
         The configured plant: start of the fit.
     order : int
         Order of the ARX model.
-    limits : ModelLimits
     least_gain : float or None
         Least relative reduction of the roll against the configured law; None: not compared.
     """
@@ -87,12 +86,10 @@ class Identification:
 
     Attributes
     ----------
-    okid : OkidResult
     wave_frequencies_rad_s : tuple of float
         Frequencies of regular waves; empty in an irregular sea.
     validation : Validation
         On the second part of the record.
-    fit : ShipFit
     """
 
     okid: OkidResult
@@ -113,7 +110,6 @@ def retune(record: FloatArray, task: RetuningTask) -> Candidate | Refusal:
     record : ndarray, shape (N, 1 + m)
         Mean command since the last sample, and the measured outputs of `task.design`, at its
         sample time. Outputs that are not finite are gaps.
-    task : RetuningTask
 
     Returns
     -------

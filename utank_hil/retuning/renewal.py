@@ -45,10 +45,6 @@ class TailedSpectrum:
 
     There the elevation's density falls with the fifth power of the frequency (Phillips), so that
     of the slope with the first.
-
-    Parameters
-    ----------
-    waves : SlopeSpectrum
     """
 
     def __init__(self, waves: SlopeSpectrum) -> None:
@@ -70,7 +66,6 @@ def renew(request: FloatArray, task: RenewalTask) -> RenewedLaw | Refusal:
     ----------
     request : ndarray, shape (1, N)
         `MotionEstimate.numbers` of an estimate that holds both.
-    task : RenewalTask
     """
     estimate = MotionEstimate.of_numbers(request[0])
     if estimate.waves is None or estimate.ship is None:

@@ -44,7 +44,6 @@ class RenewedLaw:
 
     Attributes
     ----------
-    law : ConstrainedLaw
     roll_rad, pressure_pa : float
         Root mean squares that are predicted in these waves, without limits.
     passive_roll_rad : float

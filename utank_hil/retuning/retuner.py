@@ -32,7 +32,6 @@ class SimulatedRetuner:
 
     Parameters
     ----------
-    retune : RetuneFunction
     latency_s : float
         Simulated time from request to answer.
 

@@ -53,12 +53,7 @@ class Excitation:
 
 @dataclass(frozen=True, slots=True)
 class TrialSettings:
-    """How a new law is awaited and tried: the keys of `RetuningSettings` of the same names.
-
-    Attributes
-    ----------
-    trial_s, roll_factor, effort_factor, answer_within_s : float
-    """
+    """How a new law is awaited and tried: the keys of `RetuningSettings` of the same names."""
 
     trial_s: float
     roll_factor: float

@@ -44,8 +44,6 @@ def wave_frequencies(
     ----------
     encounter_rad_s : float
         Magnitude of the encounter frequency, greater than zero.
-    heading_rad : float
-    speed_m_s : float
 
     Returns
     -------

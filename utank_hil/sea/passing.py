@@ -59,8 +59,6 @@ class PassingSea:
         ----------
         time_s : sequence of float
             When the sea has each of the spectra.
-        spectra : sequence of Spectrum
-        seed : int
         heading_rad : sequence of float or ndarray, shape (F,)
             Mean direction of travel of each, for all bands or for each band.
         spreading, components

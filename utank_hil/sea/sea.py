@@ -140,7 +140,6 @@ class Sea:
 
         Parameters
         ----------
-        spectrum : Spectrum
         seed : int
             Zero or more. The random numbers are the raw stream of `numpy.random.PCG64`, which is
             the same in every numpy version.

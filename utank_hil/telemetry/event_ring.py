@@ -71,7 +71,6 @@ class EventWriter(Closing):
 
         Parameters
         ----------
-        event : RetuningEvent or AlarmEvent
         start_ns : int
             Time of the first telemetry row; readers get the time since then.
         """

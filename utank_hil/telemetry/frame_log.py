@@ -122,7 +122,6 @@ class BlockSink:
 
     Parameters
     ----------
-    writer : FrameLogWriter
     block_ns : int
         Longer blocks make smaller files.
     """
@@ -158,7 +157,6 @@ class FrameLog:
 
     Attributes
     ----------
-    head : dict
     first_part : bool
         Whether it begins where the run did.
     cut : str

@@ -71,10 +71,6 @@ def live_runs() -> list[LiveRun]:
 class LiveStream(Closing):
     """Streams a run to viewers, those that connect late included.
 
-    Parameters
-    ----------
-    run : LiveRun
-
     Attributes
     ----------
     url : str

@@ -36,7 +36,6 @@ class MotionFigures:
 
     Parameters
     ----------
-    recording : rerun.RecordingStream
     path : str
         Entity path of the run.
     columns : sequence of str

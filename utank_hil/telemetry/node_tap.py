@@ -36,8 +36,6 @@ class NodeTap:
 
     Parameters
     ----------
-    node : ControllerNode
-    sink : Sink
     taps : sequence of RetunerTap
         Whose records belong among the node's.
     every : int
@@ -116,7 +114,6 @@ class RetunerTap:
 
     Parameters
     ----------
-    retuner : Retuner
     alive, answer : Kind
         Of its records.
     """
@@ -167,7 +164,6 @@ class Tapped:
     ----------
     retuner, estimating : Retuner or None
         As `build_controller_node` takes them.
-    wanted : bool
 
     Attributes
     ----------

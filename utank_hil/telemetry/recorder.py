@@ -157,8 +157,6 @@ class FrameRecording(Closing):
         Its name.
     file : Path
         The recording beside which the log is written.
-    head : mapping
-    rotation : Rotation, optional
 
     Attributes
     ----------

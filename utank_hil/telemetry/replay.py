@@ -37,7 +37,6 @@ class Difference:
         Since its first tick.
     message, signal : str
         Where; the message is "retuner" or "estimator" if the controller asked it something else.
-    recorded, replayed : str
     """
 
     tick: int
@@ -153,7 +152,6 @@ def replay(
     ----------
     entries : iterable of Entry
         Of a whole run, from the controller's start.
-    config : ControllerConfig
     law : BuiltLaw
         Of the configuration.
     retuner, estimating : bool

@@ -47,7 +47,6 @@ def replay_head(
     ----------
     command : str
         Name of the command that runs.
-    config : ControllerConfig
     law : BuiltLaw
         Of the configuration.
     folder : Path

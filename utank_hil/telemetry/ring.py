@@ -90,8 +90,6 @@ class RingWriter(Closing):
 
     Attributes
     ----------
-    name : str
-    columns : tuple of str
     count : int
         Slots written so far.
 
@@ -208,10 +206,8 @@ class RingReader(Closing):
 
     Attributes
     ----------
-    columns : tuple of str
     about : mapping or None
         Where the rows come from, if the writer says.
-    writer_pid : int
     lost : int
         Rows overwritten before they were read; a slot counts as full.
 

@@ -44,7 +44,6 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     file : Path
         A recording of the folder, there or to come, which stays. Others are those whose names begin
         alike, up to the first hyphen.
-    keep_bytes : int
 
     Returns
     -------

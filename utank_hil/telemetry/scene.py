@@ -147,12 +147,10 @@ class Scene:
 
     Parameters
     ----------
-    recording : rerun.RecordingStream
     path : str
         Entity path of the run.
     columns : sequence of str
         Names of a row's values.
-    size : SceneSize
     batch_s : float
         Pictures are sent when there are so many seconds of them, the last ones by `close`: a chunk
         of few costs a file more than its content.

@@ -84,7 +84,6 @@ def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
     ----------
     path : Path
         Overwritten; ``.csv`` or ``.parquet``.
-    columns : mapping of str to array (n,)
     """
     if path.suffix.lower() == ".parquet":
         import pyarrow
@@ -113,7 +112,6 @@ def even_rows(
     ----------
     path : Path
         Where it comes from, for errors.
-    columns : mapping of str to array (n,)
     sample_time_s : float
         Of the law that is to be identified for.
     from_s, to_s : float, optional

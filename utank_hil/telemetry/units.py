@@ -59,7 +59,6 @@ class Field:
         Name in the recording, unit included.
     label : str
         Label in the plot, without unit.
-    unit : Unit
     """
 
     column: str

@@ -59,17 +59,14 @@ class Panel:
 
     Attributes
     ----------
-    title : str
     x_label, y_label : str
         Units included.
     curves : tuple of Curve
         One to `MOST_CURVES`.
-    log_x, log_y : bool
     span : tuple of float, optional
         Abscissae to highlight.
     span_label : str
         What the highlight means.
-    y_limits : tuple of float, optional
 
     Raises
     ------
@@ -100,8 +97,6 @@ class Row:
 
     Attributes
     ----------
-    quantity : str
-    unit : str
     printed : float or tuple of float
         A number, or the ends of a range; the upper one infinite for "or more".
     ours : float or None
@@ -132,8 +127,6 @@ class Check:
 
     Attributes
     ----------
-    statement : str
-    verdict : Verdict
     measured : str
         What it was judged by.
     """
@@ -169,12 +162,8 @@ class Figure:
         How ours was made.
     open_points : str
         What the source leaves open, and what was assumed or varied.
-    panels : tuple of Panel
-    rows : tuple of Row
-    checks : tuple of Check
     columns : int
         Panels side by side.
-    table : Table, optional
     """
 
     method: str

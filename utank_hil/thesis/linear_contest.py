@@ -44,8 +44,6 @@ class Entrant:
 
     Attributes
     ----------
-    law : GainLaw or PredictiveLaw
-    measured : tuple of str
     delay_s : float
         From measurement to effect.
     """
@@ -158,11 +156,8 @@ def regular_wave_run(
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     entrant : Entrant or None
         None for the passive tank. Its delay is none or one sample.
-    moment_nm, wave_rad_s, duration_s : float
     step_s : float
         The sample time is a whole number of steps.
     """

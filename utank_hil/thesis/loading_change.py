@@ -41,7 +41,6 @@ class Wave:
 
     Attributes
     ----------
-    frequency_rad_s : float
     slope_rad : float
         Its moment per stiffness of the changed ship.
     """
@@ -127,9 +126,6 @@ def voyage(ship: RollShip, tank: Tank, adaptation: Adaptation, wave: Wave) -> Vo
     ----------
     ship : RollShip
         Before the change.
-    tank : Tank
-    adaptation : Adaptation
-    wave : Wave
     """
     measured = adaptation.measured
     sea = _Sea(changed(ship), tank, wave)

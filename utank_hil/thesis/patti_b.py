@@ -42,7 +42,6 @@ class Run:
     pressure_pa : ndarray, shape (n,)
     parameters : ndarray, shape (n, p)
         Of a direct fuzzy law; p = 0 for others.
-    result : Survival
     """
 
     time_s: FloatArray

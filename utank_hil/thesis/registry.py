@@ -53,7 +53,6 @@ class Entry:
     ----------
     key : str
         Number of the figure, or name of the group.
-    title : str
     make : callable or None
         What makes it anew; None for a sketch, of which there is nothing to compute.
     word : str

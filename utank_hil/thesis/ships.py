@@ -24,7 +24,6 @@ def first_ship(
         Roll damping of the ship.
     tank_damping : float
         Damping ratio of the water.
-    reservoir_area_m2 : float
     """
     tank = Tank(17.1, 4.88, reservoir_area_m2, 6.22, lz_m=1.83, damping_ratio=tank_damping)
     return RollShip(INERTIA_KG_M2, INERTIA_KG_M2 * ROLL_RAD_S**2, damping_nms_rad), tank

@@ -71,7 +71,6 @@ def contest(law: str, pump_pa: float = math.inf, duration_s: float = 300.0) -> C
         Largest pressure. The rate limit is ten times that per second, and the level barrier of
         `CommandLimiter` keeps the water within `LEVEL_M`, also with the passive law. Infinite: a
         pump without limits, and a passive tank without a pump.
-    duration_s : float
 
     Raises
     ------

@@ -22,7 +22,6 @@ class CapsizeMap(NamedTuple):
     ----------
     name : str
         Name of the ship in a figure.
-    equilibria : tuple of Equilibrium
     trajectories : tuple of ndarray, shape (k, 2)
         Roll and roll rate in calm water, starting on either side of each saddle.
     roll_rad : ndarray, shape (a,)
@@ -53,7 +52,6 @@ def phase_grid(model: RollModel, points: int) -> tuple[FloatArray, FloatArray]:
 
     Parameters
     ----------
-    model : RollModel
     points : int
         Number in either direction.
 
@@ -90,8 +88,6 @@ def capsize_map(
 
     Parameters
     ----------
-    name : str
-    model : RollModel
     frequency_rad_s : float
         Frequency of the wave moment, a cosine from the start on.
     wave_nm : float

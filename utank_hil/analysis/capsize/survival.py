@@ -58,7 +58,6 @@ def controlled_run(
 
     Parameters
     ----------
-    model : RollModel
     controller : Controller
         Its outputs are roll, roll rate, level and level rate; one command.
     wave : WaveMoment

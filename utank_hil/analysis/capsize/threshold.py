@@ -27,7 +27,6 @@ class Equilibrium(NamedTuple):
 
     Attributes
     ----------
-    roll_rad, level_m : float
     stable : bool
         True for a minimum of the potential energy; otherwise a saddle.
     """
@@ -116,11 +115,8 @@ def capsize_threshold(
 
     Parameters
     ----------
-    model : RollModel
-    frequency_rad_s : float
     highest_nm : float
         Largest amplitude of the scan.
-    duration_s : float
     phase_rad : float
         Phase in ``amplitude cos(frequency t + phase)``.
     cells : int
@@ -158,10 +154,8 @@ def safe_basin(
 
     Parameters
     ----------
-    model : RollModel
     roll_rad : ndarray, shape (a,)
     roll_rate_rad_s : ndarray, shape (b,)
-    duration_s : float
     wave : WaveMoment, optional
         One sea for all starts; by default calm water.
 
@@ -194,12 +188,9 @@ def erosion(
 
     Parameters
     ----------
-    model : RollModel
     amplitude_nm : ndarray, shape (n,)
-    frequency_rad_s : float
     roll_rad, roll_rate_rad_s : ndarray
         Grid of starts, as for `safe_basin`.
-    duration_s : float
 
     Returns
     -------
@@ -231,11 +222,9 @@ def capsize_probability(
 
     Parameters
     ----------
-    model : RollModel
     seas : WaveMoment or iterable of utank_hil.sea.Harmonics
         Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
         as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for some seeds.
-    duration_s : float
 
     Raises
     ------

@@ -147,11 +147,9 @@ class CausalProblem:
         As it is.
     noise : SensorNoise
         White, once a sample.
-    sample_time_s : float
 
     Attributes
     ----------
-    innovations : Innovations
     passive_rad : float
         Roll RMS of the ship with the passive tank.
     """
@@ -260,7 +258,6 @@ def causal_bound(problem: CausalProblem, runs: Sequence[CausalRun]) -> CausalBou
 
     Parameters
     ----------
-    problem : CausalProblem
     runs : sequence of CausalRun
         Of the problem, two or more.
     """

@@ -42,7 +42,6 @@ class ClairvoyantRun:
 
     Attributes
     ----------
-    roll_rms_rad : float
     motion : ndarray, shape (N, 4)
         `STATES` at the end of each sample.
     pressure_pa : ndarray, shape (N,)

@@ -34,7 +34,6 @@ def closed_loop_eigenvalues(
 
     Parameters
     ----------
-    law : LinearLaw
     plant : control.StateSpace or LinearModel
         Sampled plant from the law's inputs to its outputs (`sampled_model`).
     gain : float

@@ -31,8 +31,6 @@ class Loop:
 
     Attributes
     ----------
-    name : str
-    law : LinearLaw
     measured : tuple of str
         Names of outputs of `coupled_model`, in the law's order.
     """
@@ -48,7 +46,6 @@ class ComparisonRow:
 
     Attributes
     ----------
-    name : str
     motion : MotionInSea or None
         None if the loop is unstable.
     roll_below_no_tank, roll_below_passive : float or None
@@ -76,8 +73,6 @@ def compare(
 
     Parameters
     ----------
-    loops : sequence of Loop
-    plant : DesignPlant
     wave_moment : Harmonics
         The sea's roll moment in N m.
 

@@ -165,7 +165,6 @@ def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
     ----------
     impulse : ndarray, shape (N, r, m)
         C B, C A B, C A^2 B, ...
-    sample_time_s : float
 
     Raises
     ------

@@ -30,12 +30,7 @@ _LEVEL, _SPEED = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 @dataclass(frozen=True, slots=True)
 class SensorNoise:
-    """Standard deviations of white noise on the sensors; of the two level gauges' mean.
-
-    Attributes
-    ----------
-    roll_rad, roll_rate_rad_s, level_m, pressure_pa : float
-    """
+    """Standard deviations of white noise on the sensors; of the two level gauges' mean."""
 
     roll_rad: float = 2e-4
     roll_rate_rad_s: float = 5e-4
@@ -68,12 +63,8 @@ def passive_motion(
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     wave_moment : Harmonics
         In N m.
-    step_s : float
-    count : int
 
     Returns
     -------
@@ -118,12 +109,10 @@ def simulate_loop(
         Its delay must be a whole number of ticks.
     wave_motion : ndarray, shape (n, 4)
         From `passive_motion` with a step of `TICK_S`.
-    controller : Controller
     measured : tuple of str
         Outputs that it sees, in its order.
     pump_gain : float
         Pressure that a command of 1 Pa ends in.
-    noise : SensorNoise, optional
     seed : int
         Of the noise.
     progress : callable, optional

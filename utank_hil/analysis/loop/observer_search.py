@@ -59,7 +59,6 @@ class ObserverSearch:
         Stable on all ships.
     design : ConstrainedDesign
         What it was made from.
-    plant : DesignPlant
     weights : tuple of float
         Of the cost, on the squares of roll in rad, level in m, and pressure per the pump's most.
     others_share : float

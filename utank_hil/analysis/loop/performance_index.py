@@ -32,7 +32,6 @@ def performance_index(
 
     Parameters
     ----------
-    law : LinearLaw
     plant : DesignPlant
         The thesis has a lag of 0 and, since its u(k) is made of y(k-1), a delay of one sample.
     measured : tuple of str

@@ -137,8 +137,6 @@ def deviations(ship: RollShip, tank: Tank, angle_unit: float = 1.0) -> Deviation
 
     Parameters
     ----------
-    ship : RollShip
-    tank : Tank
     angle_unit : float
         Printed unit of the tank angle in radians: 1 if it is h / (L/2) as defined.
     """

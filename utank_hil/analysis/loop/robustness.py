@@ -84,8 +84,6 @@ def robustness(
 
     Parameters
     ----------
-    law : LinearLaw
-    plant : DesignPlant
     measured : tuple of str
         Outputs the law sees.
     with_delay_margin : bool

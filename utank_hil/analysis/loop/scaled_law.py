@@ -71,10 +71,8 @@ class FirstLaw:
 
     Attributes
     ----------
-    design : PredictiveDesign or LQGDesign
     weight_factor : float
         Of the weights that similarity gives; 1 where those were accepted.
-    robustness : Robustness
     """
 
     design: LinearDesign

@@ -32,8 +32,6 @@ class MotionInSea:
 
     Attributes
     ----------
-    roll_rms_rad : float
-    level_rms_m : float
     pressure_rms_pa : float
         Of the pressure that the law asks for, after delay and lag.
     """

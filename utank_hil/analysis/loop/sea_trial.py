@@ -47,7 +47,6 @@ class Entrant:
 
     Attributes
     ----------
-    name : str
     law : LinearLaw
         Also one that is linear within its limits only.
     measured : tuple of str
@@ -94,12 +93,8 @@ class Trial:
 
     Attributes
     ----------
-    sea : Spectrum
     seed : int
         Of waves and sensor noise.
-    vessel : TrialShip
-    entrants : tuple of Entrant
-    duration_s : float
     bound_limits : PumpLimits or None
         Limits of the clairvoyant bound (`CLAIRVOYANT`); None leaves it out.
     """
@@ -118,7 +113,6 @@ class TrialFigures:
 
     Attributes
     ----------
-    roll_rms_rad, level_rms_m, level_peak_m, pressure_rms_pa : float
     power_peak_w : float
         Into the water.
     held_back : float
@@ -185,7 +179,6 @@ def run_trials(
 
     Parameters
     ----------
-    trials : sequence of Trial
     progress : callable, optional
         Told the finished share after each trial.
 

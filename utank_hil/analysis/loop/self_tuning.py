@@ -96,7 +96,6 @@ class Prediction:
 
     Attributes
     ----------
-    roll_rad, level_m, pressure_pa : float
     power_w : float
         Mean of what the pump puts into the water, what it takes out not counted.
     """
@@ -113,11 +112,8 @@ class SelfTuned:
 
     Attributes
     ----------
-    design : ConstrainedDesign
     law : ConstrainedLaw
         The design's, with another observer where a better one was found.
-    robustness : Robustness
-    passive_roll_rad : float
     prediction : Prediction
         In the sea that it expects.
     """
@@ -199,7 +195,6 @@ def cost_weights(passive_rad: float, limits: PumpLimits) -> tuple[float, float, 
     ----------
     passive_rad : float
         Roll RMS with the passive tank.
-    limits : PumpLimits
     """
     return 1.0, _LEVEL_COST * (passive_rad / limits.level_m) ** 2, _PRESSURE_COST * passive_rad**2
 

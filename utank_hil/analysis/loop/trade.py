@@ -34,7 +34,6 @@ class TradePoint:
         Linear prediction; None if the loop is unstable on its own ship.
     roll_below_passive : float or None
         Share by which the roll RMS is less than with the passive tank.
-    robustness : Robustness
     """
 
     factor: float
@@ -58,7 +57,6 @@ class Trade:
         What is scaled, in words.
     passive : MotionInSea
         With the tank alone.
-    points : tuple of TradePoint
     """
 
     varied: str
@@ -104,7 +102,6 @@ def trade(
 
     Parameters
     ----------
-    design : PredictiveDesign, ConstrainedDesign or LQGDesign
     plant : DesignPlant
         A constrained design is judged and predicted within its limits, where it is linear.
     wave_moment : Harmonics

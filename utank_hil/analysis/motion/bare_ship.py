@@ -30,8 +30,6 @@ def roll_without_tank(
         one.
     wave_moment : Harmonics
         Wave moment in N m.
-    step_s : float
-    count : int
     later_ship : RollShip, optional
         The ship after a change of loading; angle and rate are continuous.
     later_from_s : float

@@ -99,7 +99,6 @@ def comfort(
     ----------
     roll_rad, roll_rate_rad_s : ndarray, shape (n,)
         Uniformly sampled at 10 Hz or more.
-    step_s : float
     height_m, starboard_m : float
         Position above, and to starboard of, the ship's centre of gravity.
     """
@@ -133,7 +132,6 @@ def apparent_gravity(
     Parameters
     ----------
     roll_rad, roll_rate_rad_s : ndarray, shape (n,)
-    step_s : float
     height_m, starboard_m : float
         As for `comfort`.
 
@@ -165,7 +163,6 @@ def motion_induced_interruptions(
     ----------
     lateral_m_s2, vertical_m_s2 : ndarray, shape (n,)
         From `apparent_gravity`.
-    step_s : float
     tipping_coefficient : float
         Half the stance width over the height of the person's centre of gravity.
     """

@@ -43,7 +43,6 @@ def rayleigh_exceedance(standard_deviation: float, levels: FloatArray) -> FloatA
 
     Parameters
     ----------
-    standard_deviation : float
     levels : ndarray, shape (k,)
     """
     share: FloatArray = np.exp(-np.square(levels) / (2 * standard_deviation**2))

@@ -65,7 +65,6 @@ def motion_sickness_dose(acceleration_m_s2: FloatArray, step_s: float) -> float:
     ----------
     acceleration_m_s2 : ndarray, shape (n,)
         Uniformly sampled at several Hz; its mean is subtracted.
-    step_s : float
     """
     spectrum = np.fft.rfft(acceleration_m_s2 - np.mean(acceleration_m_s2))
     frequency_hz = np.arange(len(spectrum)) / (step_s * len(acceleration_m_s2))

@@ -34,9 +34,7 @@ def simulated_response(
 
     Parameters
     ----------
-    model : RollModel
     frequency_rad_s : ndarray, shape (n,)
-    amplitude_nm : float
     """
     first = np.empty((2, len(frequency_rad_s)), dtype=np.complex128)
     angle = math.tau * np.arange(SAMPLES) / SAMPLES

@@ -18,7 +18,6 @@ class StimulatedRoll(NamedTuple):
 
     Attributes
     ----------
-    run : RollRun
     stimulated_rad : float
         Largest roll in the last cycle before the pump stops.
     level_lead_rad : float
@@ -61,10 +60,8 @@ def stimulate_on_still_water(
 
     Parameters
     ----------
-    model : RollModel
     pressure_pa : float
         Amplitude of the pump pressure.
-    frequency_rad_s : float
     off_s : float
         Time at which the pump stops.
 

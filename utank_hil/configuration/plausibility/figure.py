@@ -12,8 +12,6 @@ class Figure:
     ----------
     key : str
         What is most likely wrong when it lies outside.
-    value : float
-    refused_below, warned_below, warned_above, refused_above : float
     low, high : str
         What is wrong with a value too low and too high, and the remedy.
     """

@@ -82,7 +82,6 @@ class ConstrainedDesign:
         level limit all the same.
     iteration_limit : int
         Budget of a quadratic programme, 200 at most.
-    sample_time_s : float
     """
 
     kind: Literal["constrained_gpc"]

@@ -117,10 +117,6 @@ class ConstrainedLaw:
 class ConstrainedController:
     """Steps a `ConstrainedLaw`.
 
-    Parameters
-    ----------
-    law : ConstrainedLaw
-
     Attributes
     ----------
     limited : bool

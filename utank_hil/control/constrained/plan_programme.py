@@ -26,13 +26,10 @@ class PlanProgramme:
     ----------
     horizon : Horizon
         In Pa; j knots.
-    limits : PumpLimits
-    sample_time_s : float
     level_output : int or None
         Which output is the level; None leaves the level free.
     level_penalty : float
         Cost of a metre above the limit, in the unit of the horizon's cost.
-    iteration_limit : int
 
     Attributes
     ----------

@@ -27,15 +27,12 @@ def sea_plant(
 
     Parameters
     ----------
-    sea : SeaModel
-    plant : DesignPlant
     pressure_noise_pa_rt_s : float
         Root of the two-sided density of a white pressure disturbance: what the model ignores.
     slope_noise_rad_rt_s : float
         The same of a white roll moment, per roll stiffness.
     heel_std_rad, heel_time_s : float
         Standard deviation and time constant of the heeling moment, per roll stiffness.
-    sample_time_s : float
 
     Returns
     -------

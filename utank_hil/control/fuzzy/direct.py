@@ -42,7 +42,6 @@ class SmallGainFuzzy(FuzzyLaw):
         As in `FuzzyLaw`.
     gamma : float
         Below 1.
-    rho : float
     adaptation, leakage : float
         Gamma and sigma.
     initial : float
@@ -144,7 +143,6 @@ class DirectFuzzyController(FuzzyController):
 
     Attributes
     ----------
-    law : SmallGainFuzzy or RobustFuzzy
     parameters : tuple of float
         What is adapted: (lambda,) or (lambda, theta).
     """

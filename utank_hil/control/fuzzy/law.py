@@ -40,14 +40,12 @@ class FuzzyLaw(ABC):
 
     Parameters
     ----------
-    error : ErrorDynamics
     ranges : tuple of float
         Ranges of the fuzzy inputs, the first two to four of `STATES`.
     gain_rad_s2_pa : float
         Nominal g: roll acceleration per pressure.
     brake_pa_s_m : float
         Pump pressure per level rate against the flow (`level_brake`); 0 for the source's law.
-    sample_time_s : float
     """
 
     error: ErrorDynamics

@@ -111,7 +111,6 @@ class Predictor:
         RMS of the effective wave slope, wave moment per roll stiffness of the ship.
     pressure_noise_pa_rt_s : float
         Root of the two-sided density of the white pressure disturbance.
-    sample_time_s : float
     """
 
     measured: tuple[str, ...]
@@ -145,8 +144,6 @@ class PredictiveDesign:
     ----------
     kind : {"gpc", "dpc"}
         Which law.
-    predictor : Predictor
-    control_horizon, prediction_horizon : int
     output_weight : tuple of float, optional
         One for each measured output. None, for DPC alone, is the exact deadbeat.
     first_output : int

@@ -28,7 +28,6 @@ def design_gpc(
 
     Parameters
     ----------
-    arx : ARX
     control_horizon : int
         hc, number of free inputs; zero input after them.
     prediction_horizon : int
@@ -88,7 +87,6 @@ def design_dpc(
 
     Parameters
     ----------
-    arx : ARX
     control_horizon : int
         hc; a longer one asks for less pressure.
     prediction_horizon : int

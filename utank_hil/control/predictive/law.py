@@ -27,7 +27,6 @@ class PredictiveLaw:
     output_gains : ndarray, shape (p, r, m)
     reference_gains : ndarray, shape (hp, r, m)
         On the target y_T(k) ... y_T(k + hp - 1).
-    sample_time_s : float
     """
 
     input_gains: FloatArray
@@ -84,7 +83,6 @@ class PredictiveController:
 
     Parameters
     ----------
-    law : PredictiveLaw
     washout_share : float
         Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
         no washout.
