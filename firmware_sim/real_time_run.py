@@ -39,9 +39,9 @@ from utank_hil.runtime import (
 )
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RingWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
+from utank_hil.telemetry.ring import RingWriter
 from utank_hil.tick import TICK_NS, TICK_S
 
 

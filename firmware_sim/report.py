@@ -22,7 +22,7 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.telemetry import write_recording
+from utank_hil.telemetry.recording import write_recording
 from utank_hil.whole_file import write_whole
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"

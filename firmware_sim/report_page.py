@@ -21,7 +21,7 @@ from utank_hil.commands.report_parts import (
 from utank_hil.commands.ship_report import ship_line
 from utank_hil.configuration import Vessel
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.telemetry import read_recording
+from utank_hil.telemetry.recording import read_recording
 
 Recorded = Mapping[str, Mapping[str, FloatArray]]
 """Columns by run."""

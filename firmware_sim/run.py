@@ -26,11 +26,11 @@ from utank_hil.runtime import LoopStatistics, SchedulingReport
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RingWriter
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
+from utank_hil.telemetry.ring import RingWriter
 from utank_hil.tick import TICK_NS
 
 SECOND_NS: Final = 1_000_000_000

@@ -14,7 +14,7 @@ from utank_hil.control import pump_model
 from utank_hil.dynamics import RollShip
 from utank_hil.dynamics.sampling import sample
 from utank_hil.identification import random_pulses
-from utank_hil.telemetry import write_recording
+from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow
 

@@ -30,7 +30,7 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.runtime import RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.assembly import build_controller_node
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RingWriter
+from utank_hil.telemetry.ring import RingWriter
 
 assert SocketCanPort
 for path in sorted(Path("configs/controllers").glob("*.yaml")):

@@ -21,7 +21,7 @@ from utank_hil.cli import app
 from utank_hil.commands.recording import RunRecording
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.provenance import commit, describe, headline, version
-from utank_hil.telemetry import read_about
+from utank_hil.telemetry.recording import read_about
 
 CONFIGS = Path("configs")
 PATTI_B = CONFIGS / "scenarios" / "patti_b.yaml"

@@ -10,7 +10,7 @@ import pytest
 
 from utank_hil.pictures.report_page import write_report_page
 from utank_hil.pictures.style import picture
-from utank_hil.telemetry import write_recording
+from utank_hil.telemetry.recording import write_recording
 from utank_hil.whole_file import write_whole
 
 ROOM = 1024

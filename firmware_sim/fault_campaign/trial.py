@@ -320,7 +320,7 @@ def write_recordings(
     folder: Path, outcomes: Mapping[str, Sequence[Outcome]], about: Mapping[str, Any]
 ) -> dict[str, Path]:
     """Write a recording of each row that has one, and return the files by row."""
-    from utank_hil.telemetry import write_recording
+    from utank_hil.telemetry.recording import write_recording
 
     files = {}
     for name, each in outcomes.items():

@@ -24,9 +24,9 @@ from utank_hil.commands.identify import identify_log
 from utank_hil.commands.replay import replay
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import write_recording
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.replay import Entry, entries_of
 from utank_hil.telemetry.replay_head import recorded_config
 from utank_hil.telemetry.signal_files import TABLE_SUFFIXES, even_rows, read_signals, write_signals

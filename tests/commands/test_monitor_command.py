@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 from utank_hil.cli import app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RingWriter, live, viewer, write_recording
+from utank_hil.telemetry import live, viewer
+from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.ring import RingWriter
 
 pytestmark = pytest.mark.slow
 

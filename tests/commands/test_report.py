@@ -20,7 +20,7 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
 from utank_hil.provenance import describe
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import write_recording
+from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow
 

@@ -13,7 +13,9 @@ import pytest
 from utank_hil.commands import recording as module
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderError, RecorderReport, Rotation, read_recording
+from utank_hil.telemetry.recorder import RecorderError, RecorderReport
+from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.rotation import Rotation
 
 SHM = Path("/dev/shm")
 

@@ -15,9 +15,10 @@ from tools.documents import screenshot
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.commands.monitor import LOOKS
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import open_viewer, write_recording
 from utank_hil.telemetry.blueprint import _PALETTE
+from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.scene import HULL, LIMIT, SEA, WATER
+from utank_hil.telemetry.viewer import open_viewer
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 

@@ -20,7 +20,7 @@ from firmware_sim.comparison.records import batch_count
 from utank_hil.analysis.motion.confidence import batch_means, rms_batches
 from utank_hil.canbus.enumerations import Mode
 from utank_hil.commands.common import new_app
-from utank_hil.telemetry import write_recording
+from utank_hil.telemetry.recording import write_recording
 
 APP = new_app()
 APP.command()(compare)

@@ -20,8 +20,8 @@ from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
 from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.runtime.commissioning.pulses import plan_pulses
 from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.telemetry import event_text
 from utank_hil.telemetry.bus_records import RECORD
+from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.replay import entries_of, replay
 

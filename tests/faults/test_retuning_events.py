@@ -14,7 +14,7 @@ from utank_hil.retuning import (
 )
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.telemetry import EventReader, EventWriter
+from utank_hil.telemetry.event_ring import EventReader, EventWriter
 
 SECOND = 1_000_000_000
 SCRIPT = (TimedAction(1.0, Action.ARM), TimedAction(2.0, Action.RETUNE))

@@ -33,7 +33,7 @@ from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
 from utank_hil.provenance import describe
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import read_recording
+from utank_hil.telemetry.recording import read_recording
 
 pytestmark = pytest.mark.slow
 

@@ -91,8 +91,7 @@ def test_more_runs_than_colours_are_refused(tmp_path: Path) -> None:
 def test_the_controller_process_can_import_the_ring_without_rerun_or_matplotlib() -> None:
     code = """
 import sys
-import utank_hil.telemetry
-utank_hil.telemetry.RingWriter, utank_hil.telemetry.RecorderProcess, utank_hil.telemetry.open_viewer
+import utank_hil.telemetry.recorder, utank_hil.telemetry.ring, utank_hil.telemetry.viewer
 heavy = {"rerun", "matplotlib", "numba", "control", "scipy", "pyarrow"} & set(sys.modules)
 assert not heavy, heavy
 import utank_hil.pictures

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from utank_hil.telemetry import Rotation
 from utank_hil.telemetry.bus_records import LAYOUT, RECORD, Kind, Records
 from utank_hil.telemetry.frame_log import BlockSink, FrameLog, FrameLogError, FrameLogWriter
+from utank_hil.telemetry.rotation import Rotation
 
 TICK_NS = 10_000_000
 SECOND_NS = 1_000_000_000

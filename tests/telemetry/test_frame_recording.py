@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderProcess, RingWriter
 from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.recorder import FrameRecording
+from utank_hil.telemetry.recorder import FrameRecording, RecorderProcess
+from utank_hil.telemetry.ring import RingWriter
 
 pytestmark = pytest.mark.slow
 

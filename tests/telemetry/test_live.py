@@ -18,10 +18,10 @@ from utank_hil.canbus import RetuningState
 from utank_hil.commands.monitor import _chosen
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import EventWriter, RingWriter, read_about, read_recording
+from utank_hil.telemetry.event_ring import EventWriter
 from utank_hil.telemetry.live import LiveRun, LiveStream, live_runs
-from utank_hil.telemetry.recording import _read_chunks
-from utank_hil.telemetry.ring import ring_names
+from utank_hil.telemetry.recording import _read_chunks, read_about, read_recording
+from utank_hil.telemetry.ring import RingWriter, ring_names
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 ABOUT = {
@@ -83,7 +83,7 @@ def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
 
 def test_a_killed_run_is_none() -> None:
     code = (
-        "import time; from utank_hil.telemetry import RingWriter;"
+        "import time; from utank_hil.telemetry.ring import RingWriter;"
         "from utank_hil.runtime.signals import SIGNALS;"
         "ring = RingWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
     )

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from utank_hil.telemetry import write_recording
 from utank_hil.telemetry.motion_figures import SEGMENT, STEP_S, band_hz, spectrum
-from utank_hil.telemetry.recording import _read_chunks
+from utank_hil.telemetry.recording import _read_chunks, write_recording
 
 
 @pytest.mark.parametrize("length", [SEGMENT, 1250, 1500])

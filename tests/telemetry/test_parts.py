@@ -11,16 +11,11 @@ from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import (
-    RecorderProcess,
-    RecorderReport,
-    RingWriter,
-    Rotation,
-    read_about,
-    read_recording,
-)
 from utank_hil.telemetry.parts import RecordingParts
-from utank_hil.telemetry.rotation import remove_oldest
+from utank_hil.telemetry.recorder import RecorderProcess, RecorderReport
+from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation, remove_oldest
 
 TIME = SIGNALS.index("time_s")
 

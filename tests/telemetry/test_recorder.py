@@ -19,14 +19,10 @@ from rerun.chunk import RrdReader
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import (
-    EventWriter,
-    RecorderError,
-    RecorderProcess,
-    RecorderReport,
-    RingWriter,
-    read_recording,
-)
+from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
+from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.ring import RingWriter
 
 pytestmark = pytest.mark.slow
 
@@ -205,7 +201,8 @@ import os, signal, sys
 import numpy as np
 from utank_hil.canbus import RetuningState
 from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry import EventWriter, RingWriter
+from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.ring import RingWriter
 ring, events = RingWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)
 sys.stdin.readline()
@@ -254,7 +251,7 @@ def test_recorder_ends_when_the_writer_is_killed(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     code = f"""
 import sys, numpy as np
-from utank_hil.telemetry import RingWriter
+from utank_hil.telemetry.ring import RingWriter
 ring = RingWriter({SIGNALS!r})
 ring.write(np.zeros({len(SIGNALS)}))
 print(ring.name, flush=True)

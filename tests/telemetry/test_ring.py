@@ -15,7 +15,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from utank_hil.telemetry import RingError, RingReader, RingWriter
+from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
 
 SHM = Path("/dev/shm")
 
@@ -192,7 +192,7 @@ def test_the_name_of_a_living_writer_is_not_taken_over() -> None:
 
 WRITE_FOR_EVER = """
 import sys, numpy as np
-from utank_hil.telemetry import RingWriter
+from utank_hil.telemetry.ring import RingWriter
 writer = RingWriter([str(i) for i in range(14)], capacity=64, name=sys.argv[1])
 print("ready", flush=True)
 sys.stdin.readline()
@@ -309,7 +309,7 @@ def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> Non
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """
 import sys
-from utank_hil.telemetry import RingReader
+from utank_hil.telemetry.ring import RingReader
 reader = RingReader(sys.argv[1])
 assert reader.read().shape == (1, 1)
 """

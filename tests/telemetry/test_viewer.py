@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.telemetry import open_viewer, write_recording
+from utank_hil.telemetry.recording import write_recording
+from utank_hil.telemetry.viewer import open_viewer
 
 
 def fetch(url: str, seconds: float = 20.0) -> bytes:

@@ -31,8 +31,9 @@ from utank_hil.provenance import describe
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RingReader, RingWriter, read_recording, write_recording
 from utank_hil.telemetry.node_tap import NodeTap
+from utank_hil.telemetry.recording import read_recording, write_recording
+from utank_hil.telemetry.ring import RingReader, RingWriter
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 STORM: Final = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"

@@ -22,13 +22,12 @@ from rich.console import Console
 from rich.progress import track
 
 from tools.printing import command_line, show
-from utank_hil.analysis import (
+from utank_hil.analysis.capsize.maps import capsize_map, phase_grid
+from utank_hil.analysis.capsize.sea_stack import stacked_seas
+from utank_hil.analysis.capsize.threshold import (
     Probability,
-    capsize_map,
     capsize_probability,
     capsize_threshold,
-    phase_grid,
-    stacked_seas,
     without_tank,
 )
 from utank_hil.configuration import ConfigError, Vessel, load_config

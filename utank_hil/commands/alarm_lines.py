@@ -6,7 +6,7 @@ import subprocess
 from typing import Final
 
 from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.telemetry import event_text
+from utank_hil.telemetry.event_ring import event_text
 
 _END_S: Final = 10.0
 _STANDARD_ERROR: Final = 2

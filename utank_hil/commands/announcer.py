@@ -23,8 +23,7 @@ from utank_hil.commands.common import notes, shown
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry import EventReader, EventWriter, event_text
-from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5

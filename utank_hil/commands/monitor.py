@@ -11,8 +11,8 @@ import typer
 from utank_hil.commands.common import fail, notes
 
 if TYPE_CHECKING:
-    from utank_hil.telemetry import Viewer
     from utank_hil.telemetry.live import LiveRun
+    from utank_hil.telemetry.viewer import Viewer
 
 LIVE: Final = "rerun+http://"
 """How the address of a live stream begins."""
@@ -62,7 +62,7 @@ def watch(
         Sends what there is to see since the last call, and returns whether more may come.
     """
     from utank_hil.runtime import stop_on_signals
-    from utank_hil.telemetry import open_viewer
+    from utank_hil.telemetry.viewer import open_viewer
 
     with stop_on_signals() as stopped, ExitStack() as stack:
         viewer = _said(stack.enter_context(open_viewer(source, at_s)), at_s)

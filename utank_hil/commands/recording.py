@@ -10,10 +10,11 @@ from utank_hil.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry import RecorderError, RecorderProcess, RingWriter, Rotation
 from utank_hil.telemetry.bus_records import IN_A_SLOT, ROW
 from utank_hil.telemetry.frame_log import SUFFIX
-from utank_hil.telemetry.recorder import NEEDS_RERUN
+from utank_hil.telemetry.recorder import NEEDS_RERUN, RecorderError, RecorderProcess
+from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation
 
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"

@@ -52,8 +52,7 @@ from utank_hil.runtime import (
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
-from utank_hil.telemetry import event_text
-from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.event_ring import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 

@@ -19,7 +19,7 @@ def logged_samples(
     Parameters
     ----------
     columns : mapping of str to ndarray, shape (n,)
-        Columns of one run from `utank_hil.telemetry.read_recording`; rows may be missing.
+        Columns of one run from `telemetry.recording.read_recording`; rows may be missing.
     measured : tuple of str
         Outputs, among roll_rad, roll_rate_rad_s and level_m.
     sample_time_s : float

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from utank_hil.analysis import capsize_map, phase_grid, safe_basin, without_tank
 from utank_hil.analysis.capsize.contest import PATTI_B
+from utank_hil.analysis.capsize.maps import capsize_map, phase_grid
+from utank_hil.analysis.capsize.threshold import safe_basin, without_tank
 from utank_hil.dynamics import RollModel, RollShip, Tank
 from utank_hil.pictures import draw_capsize_maps
 

@@ -3,7 +3,7 @@ import re
 import numpy as np
 import pytest
 
-from utank_hil.analysis import stacked_seas
+from utank_hil.analysis.capsize.sea_stack import stacked_seas
 from utank_hil.dynamics import WaveMoment
 from utank_hil.sea import Sea, jonswap
 

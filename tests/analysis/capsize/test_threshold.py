@@ -4,13 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from utank_hil.analysis import (
+from utank_hil.analysis.capsize.sea_stack import stacked_seas
+from utank_hil.analysis.capsize.threshold import (
     capsize_probability,
     capsize_threshold,
     equilibria,
     erosion,
     safe_basin,
-    stacked_seas,
     without_tank,
 )
 from utank_hil.dynamics import (
