@@ -182,7 +182,7 @@ class LiveRow(Section):
     Attributes
     ----------
     does : str
-        Name of the function in `firmware_sim.fault_campaign.live`; empty where it is shown
+        Name in `firmware_sim.fault_campaign.live.ACTIONS`; empty where it is shown
         elsewhere.
     judged : str
         Whether the controller's fault or the drive's end counts.

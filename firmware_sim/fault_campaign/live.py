@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import can
 from can.interfaces.socketcan import SocketcanBus
@@ -176,46 +176,18 @@ class LiveBench:
         return time.time()
 
 
-def controller_killed(bench: LiveBench) -> Later:
-    """SIGKILL the controller."""
-    bench.controller.kill()
-    return None
+Act = Callable[[LiveBench], Later]
 
 
-def controller_stopped(bench: LiveBench) -> Later:
-    """SIGSTOP the controller."""
-    bench.controller.send_signal(signal.SIGSTOP)
-    return None
+def _sent(program: Literal["controller", "ship"], number: int, *, rested: bool = False) -> Act:
+    """Send a signal to a program; `rested`: and SIGCONT when the other side has long noticed."""
 
+    def act(bench: LiveBench) -> Later:
+        process = bench.controller if program == "controller" else bench.ship
+        process.send_signal(number)
+        return (RESTED_S, partial(process.send_signal, signal.SIGCONT)) if rested else None
 
-def controller_stopped_for_a_second(bench: LiveBench) -> Later:
-    """SIGSTOP the controller, and SIGCONT when its drive has long been off."""
-    bench.controller.send_signal(signal.SIGSTOP)
-    return RESTED_S, partial(bench.controller.send_signal, signal.SIGCONT)
-
-
-def controller_hung_up(bench: LiveBench) -> Later:
-    """SIGHUP the controller."""
-    bench.controller.send_signal(signal.SIGHUP)
-    return None
-
-
-def controller_terminated(bench: LiveBench) -> Later:
-    """SIGTERM the controller, as a service manager does."""
-    bench.controller.terminate()
-    return None
-
-
-def ship_killed(bench: LiveBench) -> Later:
-    """SIGKILL the ship's side, sensors and drive with it."""
-    bench.ship.kill()
-    return None
-
-
-def ship_stopped_for_a_second(bench: LiveBench) -> Later:
-    """SIGSTOP the ship's side, and SIGCONT when the controller has long faulted."""
-    bench.ship.send_signal(signal.SIGSTOP)
-    return RESTED_S, partial(bench.ship.send_signal, signal.SIGCONT)
+    return act
 
 
 def bus_off(bench: LiveBench) -> Later:
@@ -226,16 +198,18 @@ def bus_off(bench: LiveBench) -> Later:
     return None
 
 
-ACTIONS: Final[dict[str, tuple[Callable[[LiveBench], Later], Stream | None]]] = {
-    "controller_killed": (controller_killed, "commands"),
-    "controller_stopped": (controller_stopped, "commands"),
-    "controller_stopped_for_a_second": (controller_stopped_for_a_second, "commands"),
-    "controller_hung_up": (controller_hung_up, None),
-    "controller_terminated": (controller_terminated, None),
-    "ship_killed": (ship_killed, "motions"),
-    "ship_stopped_for_a_second": (ship_stopped_for_a_second, "motions"),
+ACTIONS: Final[dict[str, tuple[Act, Stream | None]]] = {
+    "controller_killed": (_sent("controller", signal.SIGKILL), "commands"),
+    "controller_stopped": (_sent("controller", signal.SIGSTOP), "commands"),
+    "controller_stopped_for_a_second": (
+        _sent("controller", signal.SIGSTOP, rested=True), "commands"
+    ),
+    "controller_hung_up": (_sent("controller", signal.SIGHUP), None),
+    "controller_terminated": (_sent("controller", signal.SIGTERM), None),
+    "ship_killed": (_sent("ship", signal.SIGKILL), "motions"),
+    "ship_stopped_for_a_second": (_sent("ship", signal.SIGSTOP, rested=True), "motions"),
     "bus_off": (bus_off, None),
-}
+}  # fmt: skip
 """What is done, and the stream that ends with it."""
 
 
