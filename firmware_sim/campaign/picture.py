@@ -16,8 +16,6 @@ def draw(results: Results, groups: list[dict[str, Any]], path: Path) -> Path:
     ----------
     groups : list of dict
         Its `summary`.
-    path : Path
-        The `.png` file; overwritten.
     """
     names = list(dict.fromkeys(run for group in groups for run in group["runs"]))
     found = groups_of(results)

@@ -1,4 +1,8 @@
-"""Figures in one style; no other package except the commands imports this one."""
+"""Figures in one style; no other package except the commands imports this one.
+
+Each `draw_...` writes a `.png` file at `path`, over what is there; `about` is kept in it, as
+`style.picture` says.
+"""
 
 from utank_hil.pictures.bench_curves import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.capsize_maps import draw_capsize_maps

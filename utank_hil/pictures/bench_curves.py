@@ -99,10 +99,6 @@ def draw_bench(
     curves : sequence of BenchCurve
         The first is the reference, the passive tank: drawn in grey, and searched for the largest
         roll.
-    path : Path
-        The `.png` file; overwritten.
-    about : mapping, optional
-        As in `picture`.
     bars : sequence of BenchBar
         Of the summary, those of the curves last; there is none without any.
     wrong : sequence of str

@@ -51,10 +51,6 @@ def draw_campaign(
         first `MOST_GROUPS` are drawn.
     axis : str
         What the numbers are.
-    path : Path
-        The `.png` file; overwritten.
-    about : mapping, optional
-        As in `picture`.
     """
     along = len(groups) > 1 and all(isinstance(group, float | int) for group in groups)
     height = 5.0 if along else min(2.5 + 0.3 * len(groups) * max(len(runs), 2), 16.0)

@@ -25,8 +25,6 @@ def draw_capsize_maps(maps: Sequence[CapsizeMap], path: Path, title: str) -> Pat
     ----------
     maps : sequence of CapsizeMap
         Such as one ship without and with its tank; all in the same wave.
-    path : Path
-        The `.png` file; overwritten.
 
     Raises
     ------

@@ -40,10 +40,6 @@ def draw_identification(
     record : ndarray, shape (N, 1 + m)
     found : Identification
         Result for that record.
-    path : Path
-        The `.png` file; overwritten.
-    about : mapping, optional
-        As in `picture`.
     """
     measured = task.design.predictor.measured
     roll, arx = measured.index("roll_rad"), found.okid.arx

@@ -36,8 +36,6 @@ def draw_bode(
     ----------
     loops : sequence of Loop
         One to seven laws; the passive tank is always drawn.
-    path : Path
-        The `.png` file; overwritten.
 
     Raises
     ------

@@ -22,8 +22,6 @@ def draw_time(
     panels : mapping of str to mapping of str to ndarray, shape (n,)
         Records by name, of each panel by its label; records are in the unit of the label. A name
         has the same stroke in all panels, the first one grey.
-    path : Path
-        The `.png` file; overwritten.
 
     Raises
     ------
@@ -66,8 +64,6 @@ def draw_phase(
         Abscissa and ordinate by name, in the units of the labels.
     labels : tuple of str
         Labels of the two axes, units included.
-    path : Path
-        The `.png` file; overwritten.
 
     Raises
     ------

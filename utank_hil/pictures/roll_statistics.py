@@ -28,8 +28,6 @@ def draw_roll_statistics(
         come first.
     step_s : float
         Sample time.
-    path : Path
-        The `.png` file; overwritten.
     """
     from scipy.signal import welch
 

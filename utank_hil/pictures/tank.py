@@ -22,15 +22,7 @@ def draw_tank(
     title: str,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw roll over wave period, and roll in the sea over the ship's loading.
-
-    Parameters
-    ----------
-    path : Path
-        The `.png` file; overwritten.
-    about : mapping, optional
-        As in `picture`.
-    """
+    """Draw roll over wave period, and roll in the sea over the ship's loading."""
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         waves, loading = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2)
         waves.fill_between(
@@ -69,15 +61,7 @@ def draw_sweep(
     title: str,
     about: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Draw roll in the sea over the water's frequency, a line for each share of stability.
-
-    Parameters
-    ----------
-    path : Path
-        The `.png` file; overwritten.
-    about : mapping, optional
-        As in `picture`.
-    """
+    """Draw roll in the sea over the water's frequency, a line for each share of stability."""
     with picture(path, title, (WIDEST_IN, 4.6), about) as figure:
         passive = figure.add_subplot(1, 2, 1)
         active = figure.add_subplot(1, 2, 2, sharey=passive)

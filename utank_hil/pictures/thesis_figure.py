@@ -33,8 +33,6 @@ def draw_figure(figure: Figure, path: Path, title: str) -> None:
     ----------
     figure : Figure
         With one panel or more.
-    path : Path
-        The `.png` file; overwritten.
     """
     columns = min(figure.columns, len(figure.panels))
     rows = math.ceil(len(figure.panels) / columns)

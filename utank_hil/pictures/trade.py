@@ -33,12 +33,8 @@ def draw_trade(
 
     Parameters
     ----------
-    path : Path
-        The `.png` file; overwritten.
     pressure_limit_pa, level_limit_m : float
         Drawn as lines. The RMS values are those of linear theory, without limits.
-    about : mapping, optional
-        As in `picture`.
 
     Raises
     ------

@@ -199,21 +199,7 @@ class RecorderProcess(Closing):
 
     Start it before the loop: it takes about a second, mostly for importing Rerun. It runs in a
     session of its own, so that Ctrl-C in the terminal does not end it before the loop's last rows.
-
-    Parameters
-    ----------
-    ring : str
-        Name of the ring.
-    file : Path
-        The `.rrd` file; overwritten.
-    events : str, optional
-        Name of the ring of events (`EventWriter`) that belongs to it.
-    rotation : Rotation, optional
-        Where it goes on in another file; without it there is one.
-    frames : str, optional
-        Name of the ring of `bus_records`; they go into a frame log beside the file.
-    head : mapping, optional
-        Head of the frame log (`replay_head`).
+    Arguments are those of `record_ring`.
 
     Raises
     ------
