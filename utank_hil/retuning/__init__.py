@@ -4,41 +4,26 @@ Exports what the controller's process needs. Identification and design (`redesig
 of their own and are not imported here.
 """
 
-from utank_hil.retuning.adaptive import AdaptiveController
-from utank_hil.retuning.answer import Answer, Candidate, ModelSummary, Refusal
-from utank_hil.retuning.desk import Desk
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
-from utank_hil.retuning.estimator import EstimateFigures, EstimateSettings, Estimator
-from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent, RetuningOrder
-from utank_hil.retuning.pulses import make_pulses
-from utank_hil.retuning.renewed_law import RenewedLaw
-from utank_hil.retuning.renewing import RenewingController
-from utank_hil.retuning.retuner import RetuneFunction, Retuner, SimulatedRetuner, Work
-from utank_hil.retuning.retuner_process import RetunerProcess
-from utank_hil.retuning.settings import RetuningSettings
-
-__all__ = [
-    "AdaptiveController",
-    "Answer",
-    "Candidate",
-    "Desk",
-    "EstimateFigures",
-    "EstimateSettings",
-    "Estimator",
-    "LawExchange",
-    "ModelSummary",
-    "MotionEstimate",
-    "Refusal",
-    "RenewedLaw",
-    "RenewingController",
-    "RetuneFunction",
-    "Retuner",
-    "RetunerProcess",
-    "RetuningEvent",
-    "RetuningOrder",
-    "RetuningSettings",
-    "ShipFigures",
-    "SimulatedRetuner",
-    "Work",
-    "make_pulses",
-]
+from utank_hil.retuning.adaptive import AdaptiveController as AdaptiveController
+from utank_hil.retuning.answer import Answer as Answer
+from utank_hil.retuning.answer import Candidate as Candidate
+from utank_hil.retuning.answer import ModelSummary as ModelSummary
+from utank_hil.retuning.answer import Refusal as Refusal
+from utank_hil.retuning.desk import Desk as Desk
+from utank_hil.retuning.estimate import MotionEstimate as MotionEstimate
+from utank_hil.retuning.estimate import ShipFigures as ShipFigures
+from utank_hil.retuning.estimator import EstimateFigures as EstimateFigures
+from utank_hil.retuning.estimator import EstimateSettings as EstimateSettings
+from utank_hil.retuning.estimator import Estimator as Estimator
+from utank_hil.retuning.law_exchange import LawExchange as LawExchange
+from utank_hil.retuning.law_exchange import RetuningEvent as RetuningEvent
+from utank_hil.retuning.law_exchange import RetuningOrder as RetuningOrder
+from utank_hil.retuning.pulses import make_pulses as make_pulses
+from utank_hil.retuning.renewed_law import RenewedLaw as RenewedLaw
+from utank_hil.retuning.renewing import RenewingController as RenewingController
+from utank_hil.retuning.retuner import RetuneFunction as RetuneFunction
+from utank_hil.retuning.retuner import Retuner as Retuner
+from utank_hil.retuning.retuner import SimulatedRetuner as SimulatedRetuner
+from utank_hil.retuning.retuner import Work as Work
+from utank_hil.retuning.retuner_process import RetunerProcess as RetunerProcess
+from utank_hil.retuning.settings import RetuningSettings as RetuningSettings
