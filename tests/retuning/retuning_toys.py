@@ -128,6 +128,21 @@ class Rig:
             self.run(1)
             most -= 1
 
+    def retune_until(self, state: object, *, after: int = 300) -> None:
+        """Order a retuning after so many samples, and go on until a state."""
+        self.run(after)
+        self.press(retune=True)
+        self.run_until(state)
+
+    def answers_of_the_first_law(self) -> list[float]:
+        """Of the law that was configured, to the same roll after the same commands."""
+        law, answers = law_of(1e5).controller(), []
+        for k, before in enumerate([0.0, *self.commands[:-1]]):
+            if k:
+                law.applied(np.array([before]))
+            answers.append(float(law.step(np.array([self.roll(k, before)]))[0]))
+        return answers
+
     @property
     def reasons(self) -> str:
         return "; ".join(self.controller.events[-1].reasons)

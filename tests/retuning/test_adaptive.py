@@ -34,23 +34,15 @@ def candidate_with(**gains: FloatArray) -> Candidate:
 
 
 def test_without_an_order_it_is_the_law_it_was_given() -> None:
-    rig, alone = Rig(ToyRetuner()), law_of(1e5).controller()
+    rig = Rig(ToyRetuner())
     rig.run(200)
-    expected, applied = [], 0.0
-    for k in range(200):
-        if k:
-            alone.applied(np.array([applied]))
-        applied = float(alone.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
-        expected.append(applied)
-    assert rig.commands == expected
+    assert rig.commands == rig.answers_of_the_first_law()
     assert states(rig) == []
 
 
 def test_ordered_identified_designed_tried_and_kept() -> None:
     rig = Rig(ToyRetuner(candidate_of(9e4), looks=3))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(RETUNED)
+    rig.retune_until(RETUNED)
     assert states(rig) == [IDENTIFY, DESIGN, TRIAL, RETUNED]
     rig.run(50)
     assert states(rig)[-1] is RETUNED
@@ -60,9 +52,7 @@ def test_pulses_go_out_alone_and_their_record_holds_what_left_and_what_was_seen(
     retuner = ToyRetuner()
     rig = Rig(retuner)
     begin = 300
-    rig.run(begin)
-    rig.press(retune=True)
-    rig.run_until(DESIGN)
+    rig.retune_until(DESIGN, after=begin)
     count = len(rig.pulses_pa)
     (record,) = retuner.records
     assert rig.commands[begin : begin + count] == list(rig.pulses_pa)
@@ -99,17 +89,10 @@ def test_samples_that_were_not_measured_are_gaps_in_the_record() -> None:
 def test_new_law_takes_over_without_a_bump_from_a_memory_filled_with_the_past() -> None:
     # the candidate is the law in charge itself: nobody may notice that it was exchanged
     rig = Rig(ToyRetuner(candidate_of(1e5)))
-    rig.run(1200)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL, after=1200)
     at = rig.samples
     rig.run(100)
-    untouched = law_of(1e5).controller()
-    expected = []
-    for k in range(rig.samples):
-        if k:
-            untouched.applied(np.array([rig.commands[k - 1]]))
-        expected.append(float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0]))
+    expected = rig.answers_of_the_first_law()
     assert rig.commands[at:] == pytest.approx(expected[at:], rel=1e-9)
 
 
@@ -132,17 +115,10 @@ def test_memory_is_filled_a_piece_at_a_sample_and_the_answers_are_faded_over() -
 
 def test_refusal_is_passed_on_and_changes_nothing() -> None:
     rig = Rig(ToyRetuner(Refusal(("roll period 2.00 s is outside",))))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(REFUSED)
+    rig.retune_until(REFUSED)
     rig.run(30)
     assert rig.reasons == "roll period 2.00 s is outside"
-    untouched = law_of(1e5).controller()
-    for k in range(rig.samples):
-        if k:
-            untouched.applied(np.array([rig.commands[k - 1]]))
-        answer = float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
-    assert rig.commands[-1] == answer
+    assert rig.commands[-1] == rig.answers_of_the_first_law()[-1]
 
 
 def test_no_answer_in_time_is_a_refusal() -> None:
@@ -181,9 +157,7 @@ def test_candidate_is_looked_at_once_more_before_it_is_taken(candidate, word: st
 
 def test_identification_is_given_up_when_the_roll_is_above_its_limit() -> None:
     rig = Rig(ToyRetuner(), roll=lambda k, u: 0.4 if k == 320 else 0.01)
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(REFUSED)
+    rig.retune_until(REFUSED)
     assert "roll is above" in rig.reasons
     assert rig.samples < 325
 
@@ -198,9 +172,7 @@ def test_an_estimate_is_no_answer_to_a_request_for_a_law() -> None:
 @pytest.mark.parametrize("fresh_of", [0, 3, 10])
 def test_a_trial_that_can_not_be_judged_ends_in_half_as_long_again(fresh_of: int) -> None:
     rig = Rig(ToyRetuner(candidate_of(-3e5)))  # the roll would say that it is worse
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     begin = rig.samples
     rig.roll = lambda k, u: 0.25 * np.sin(0.1 * k) if rig.fresh else 0.02 * np.sin(0.1 * k)
     while rig.controller.state is TRIAL:

@@ -12,7 +12,6 @@ from retuning_toys import (
     Rig,
     ToyRetuner,
     candidate_of,
-    law_of,
     states,
 )
 
@@ -231,11 +230,6 @@ def test_dead_retuner_gets_no_pulses_until_it_lives_again() -> None:
     assert "no sign of life" in rig.reasons
     rig.press(retune=True)
     assert "ordered by the operator, but" in rig.reasons
-    untouched, applied = law_of(1e5).controller(), 0.0
-    for k in range(rig.samples):
-        if k:
-            untouched.applied(np.array([applied]))
-        applied = float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
-    assert rig.commands[-1] == applied
+    assert rig.commands == rig.answers_of_the_first_law()
     retuner.alive = True
     rig.run_until(IDENTIFY)

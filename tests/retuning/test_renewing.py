@@ -109,6 +109,12 @@ class Rig:
         while self.command_pa == 0.0:
             self.run(1)
 
+    def renew_until(self, state: RetuningState, told: MotionEstimate | None = None) -> None:
+        """Tell an estimate after a minute, and go on until a state."""
+        self.run(300)
+        self.controller.note(told or estimate())
+        self.run_until(state)
+
     @property
     def states(self) -> list[RetuningState]:
         return [event.state for event in self.controller.events]
@@ -136,9 +142,7 @@ def test_known_waves_bring_a_law_that_is_tried_and_kept() -> None:
 
 def test_the_same_waves_bring_nothing_and_others_a_law() -> None:
     rig = Rig(renewed())
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(RETUNED)
+    rig.renew_until(RETUNED)
     rig.controller.note(estimate(1 + 0.8 * SEA_DIFFERENCE))
     rig.run(300)
     assert rig.controller.state is RETUNED
@@ -149,9 +153,7 @@ def test_the_same_waves_bring_nothing_and_others_a_law() -> None:
 
 def test_a_longer_record_of_the_same_waves_brings_a_law() -> None:
     rig = Rig(renewed())
-    rig.run(300)
-    rig.controller.note(replace(estimate(), duration_s=600.0))
-    rig.run_until(RETUNED)
+    rig.renew_until(RETUNED, replace(estimate(), duration_s=600.0))
     rig.controller.note(estimate())
     rig.run_until(DESIGN, 2)
     assert "longer record, 20 minutes" in rig.reasons
@@ -159,9 +161,7 @@ def test_a_longer_record_of_the_same_waves_brings_a_law() -> None:
 
 def test_a_changed_ship_brings_a_law_for_her() -> None:
     rig = Rig(renewed())
-    rig.run(300)
-    rig.controller.note(estimate(ship=SHIP))
-    rig.run_until(RETUNED)
+    rig.renew_until(RETUNED, estimate(ship=SHIP))
     rig.controller.note(estimate(ship=SLOWER))
     rig.run(10)
     assert rig.controller.state is RETUNED  # once is not enough
@@ -200,9 +200,7 @@ def test_a_law_for_another_pump_or_other_signals_is_refused(
     answer = renewed()
     rig = Rig(replace(answer, law=dataclasses.replace(answer.law, **change)))  # type: ignore[arg-type]
     first = rig.controller.laws.accepted
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(REFUSED)
+    rig.renew_until(REFUSED)
     assert words in rig.reasons
     assert rig.controller.laws.active is first
 
@@ -219,9 +217,7 @@ def test_another_sample_time_or_another_answer_is_refused() -> None:
 
 def test_after_a_refusal_it_waits_ten_minutes() -> None:
     rig = Rig(Refusal(("no",)))
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(REFUSED)
+    rig.renew_until(REFUSED)
     rig.controller.note(estimate(2.0))
     wait = RETRY_NS // SAMPLE_NS
     rig.run(wait - 20)
@@ -241,9 +237,7 @@ def bad(gain: float) -> RenewedLaw:
 def test_a_bad_law_is_taken_back_and_the_one_before_is_in_charge() -> None:
     rig = Rig(bad(3.0))
     first = rig.controller.laws.accepted
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(REFUSED)
+    rig.renew_until(REFUSED)
     assert rig.states == [DESIGN, TRYING, REFUSED]
     assert "roll rose" in rig.reasons
     assert rig.controller.laws.active is first
@@ -251,9 +245,7 @@ def test_a_bad_law_is_taken_back_and_the_one_before_is_in_charge() -> None:
 
 def test_a_law_whose_answer_is_not_finite_is_dropped_at_once() -> None:
     rig = Rig(bad(np.nan))
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(REFUSED)
+    rig.renew_until(REFUSED)
     assert "not finite" in rig.reasons
     assert np.isfinite(rig.commands).all()
 
@@ -277,9 +269,7 @@ def test_a_growing_sea_takes_no_good_law_back_and_a_growing_roll_does() -> None:
 def test_undo_goes_back_and_stays_for_ten_minutes() -> None:
     rig = Rig(renewed())
     first = rig.controller.laws.accepted
-    rig.run(300)
-    rig.controller.note(estimate())
-    rig.run_until(RETUNED)
+    rig.renew_until(RETUNED)
     rig.run(1, RetuningOrder(undo=True))
     assert rig.controller.state is UNDONE
     assert rig.controller.laws.active is first

@@ -11,7 +11,6 @@ from retuning_toys import (
     Rig,
     ToyRetuner,
     candidate_of,
-    law_of,
     states,
 )
 
@@ -27,9 +26,7 @@ def test_law_that_rolls_more_is_taken_back_at_the_end_of_its_trial() -> None:
         ToyRetuner(candidate_of(9e4)),
         roll=lambda k, u: (0.028 if worse else 0.02) * np.sin(0.1 * k),
     )
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     worse.append(1)
     begin = rig.samples
     rig.run_until(REFUSED)
@@ -43,9 +40,7 @@ def test_law_that_rolls_much_more_is_taken_back_before() -> None:
         ToyRetuner(candidate_of(9e4)),
         roll=lambda k, u: (0.2 if worse else 0.02) * np.sin(0.1 * k),
     )
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     worse.append(1)
     begin = rig.samples
     rig.run_until(REFUSED)
@@ -54,9 +49,7 @@ def test_law_that_rolls_much_more_is_taken_back_before() -> None:
 
 def test_law_that_takes_much_more_pressure_is_taken_back() -> None:
     rig = Rig(ToyRetuner(candidate_of(1e6)))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(REFUSED)
+    rig.retune_until(REFUSED)
     assert "pressure rose" in rig.reasons
     rig.run(4 * FADE_SAMPLES)
     assert max(map(abs, rig.commands[-30:])) < 1.2 * max(map(abs, rig.commands[:300]))
@@ -84,9 +77,7 @@ def test_operator_takes_the_old_law_back(moment: RetuningState) -> None:
 @pytest.mark.parametrize("how", ["forbidden", "disarmed"])
 def test_forbidden_or_disarmed_it_gives_up_and_goes_back(moment: RetuningState, how: str) -> None:
     rig = Rig(ToyRetuner(candidate_of(1.5e5), looks=5))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(moment)
+    rig.retune_until(moment)
     if how == "forbidden":
         rig.order = QUIET._replace(forbid_retuning=True)
     else:
@@ -94,25 +85,16 @@ def test_forbidden_or_disarmed_it_gives_up_and_goes_back(moment: RetuningState, 
     rig.run(2)
     assert rig.controller.state is IDLE
     rig.run(100)
-    untouched = law_of(1e5).controller()
-    for k in range(rig.samples):
-        if k:
-            untouched.applied(np.array([rig.commands[k - 1]]))
-        answer = float(untouched.step(np.array([0.02 * np.sin(0.1 * k)]))[0])
-    assert rig.commands[-1] == pytest.approx(answer, rel=1e-9)
+    assert rig.commands[-1] == pytest.approx(rig.answers_of_the_first_law()[-1], rel=1e-9)
 
 
 @pytest.mark.parametrize("moment", [TRIAL, RETUNED])
 def test_undo_goes_back_even_while_the_next_identification_runs(moment: RetuningState) -> None:
     rig = Rig(ToyRetuner(candidate_of(1.5e5)))
     configured = rig.controller.laws.accepted
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(RETUNED)
+    rig.retune_until(RETUNED)
     first = rig.controller.laws.accepted
-    rig.run(200)
-    rig.press(retune=True)
-    rig.run_until(DESIGN)
+    rig.retune_until(DESIGN, after=200)
     if moment is TRIAL:
         rig.run_until(TRIAL)
         rig.press(undo=True)
@@ -140,9 +122,7 @@ def test_heel_does_not_hide_that_she_rolls_more() -> None:
         ToyRetuner(candidate_of(9e4)),
         roll=lambda k, u: 0.09 + (0.06 if worse else 0.02) * np.sin(0.1 * k),
     )
-    rig.run(600)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL, after=600)
     worse.append(1)
     rig.run_until(REFUSED)
     assert "roll rose" in rig.reasons
@@ -155,9 +135,7 @@ def test_heel_that_comes_on_trial_is_no_fault_of_the_law() -> None:
         replace(SETTINGS, effort_factor=100.0),
         roll=lambda k, u: (0.05 if heeled else 0.0) + 0.02 * np.sin(0.1 * k),
     )
-    rig.run(600)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL, after=600)
     heeled.append(1)
     rig.run_until(RETUNED)
 
@@ -165,9 +143,7 @@ def test_heel_that_comes_on_trial_is_no_fault_of_the_law() -> None:
 def test_law_that_leans_on_the_pump_is_taken_back() -> None:
     # as lively as the law before, but with 30 kPa on top: what that heels, no deviation tells
     rig = Rig(ToyRetuner(candidate_of(1e5)))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     law = rig.controller.laws.on_trial
     assert law is not None
     step = law.controller.step
@@ -197,9 +173,7 @@ def test_reset_while_on_trial_takes_the_law_back(after: str) -> None:
 
 def test_law_whose_answer_is_not_finite_is_dropped_before_anyone_hears_of_it() -> None:
     rig = Rig(ToyRetuner(candidate_of(9e4)))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     rig.run(5)
     law = rig.controller.laws.on_trial
     assert law is not None
@@ -212,9 +186,7 @@ def test_law_whose_answer_is_not_finite_is_dropped_before_anyone_hears_of_it() -
 
 def test_law_that_is_faded_from_is_cut_off_when_its_answer_is_not_finite() -> None:
     rig = Rig(ToyRetuner(candidate_of(9e4)))
-    rig.run(300)
-    rig.press(retune=True)
-    rig.run_until(TRIAL)
+    rig.retune_until(TRIAL)
     rig.run(60)
     law = rig.controller.laws.on_trial
     assert law is not None
