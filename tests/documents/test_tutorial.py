@@ -10,7 +10,7 @@ import pytest
 from pages import ROOT, blocks
 from test_how_to import commands, walk
 
-import utank_hil.telemetry
+from utank_hil.telemetry import viewer
 
 PAGE = ROOT / "docs" / "tutorial.md"
 BLOCKS = blocks(PAGE.read_text(encoding="utf-8"))
@@ -55,7 +55,7 @@ def test_its_quick_commands_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(utank_hil.telemetry, "open_viewer", ClosedAtOnce)
+    monkeypatch.setattr(viewer, "open_viewer", ClosedAtOnce)
     shown.clear()
     walk(PAGE, tmp_path, slow=True)
     printed = [table_rows(block.text) for block in BLOCKS if "│" in block.text]
