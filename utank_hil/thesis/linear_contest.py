@@ -36,6 +36,7 @@ ROLL_ONLY: Final = (PASSIVE, PD, GPC_ROLL, DPC_ROLL)
 WHOLE: Final = (PASSIVE, LQR, GPC_BOTH, DPC_BOTH)
 LQR_WEIGHT: Final = 1e14
 PD_SAMPLE_S: Final = 0.02
+STEP_S: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,6 @@ def regular_wave_run(
     moment_nm: float,
     wave_rad_s: float,
     duration_s: float,
-    step_s: float = 0.02,
 ) -> History:
     """Linear ship from rest in a moment M sin(w t); the law is on from the start.
 
@@ -157,20 +157,19 @@ def regular_wave_run(
     Parameters
     ----------
     entrant : Entrant or None
-        None for the passive tank. Its delay is none or one sample.
-    step_s : float
-        The sample time is a whole number of steps.
+        None for the passive tank. Its delay is none or one sample, and its sample time a whole
+        number of steps.
     """
-    a, b = transition_and_step(*state_matrices(ship, tank), step_s)
-    count = round(duration_s / step_s)
-    wave = moment_nm * np.sin(wave_rad_s * step_s * (np.arange(count) + 0.5))
+    a, b = transition_and_step(*state_matrices(ship, tank), STEP_S)
+    count = round(duration_s / STEP_S)
+    wave = moment_nm * np.sin(wave_rad_s * STEP_S * (np.arange(count) + 0.5))
     controller: Controller | None = None
     columns: list[int] = []
     every, late = count + 1, False
     if entrant is not None:
         controller = entrant.law.controller()
         columns = [STATES.index(name) for name in entrant.measured]
-        every, late = round(controller.sample_time_s / step_s), entrant.delay_s > 0
+        every, late = round(controller.sample_time_s / STEP_S), entrant.delay_s > 0
     state, states = np.zeros(len(STATES)), np.empty((count, len(STATES)))
     pressure, seen = np.zeros(count), np.zeros(len(columns))
     held = 0.0
@@ -182,5 +181,5 @@ def regular_wave_run(
             seen = now
         pressure[k] = held
         state = a @ state + b @ (held, wave[k])
-    time_s = np.arange(count, dtype=np.float64) * step_s
+    time_s = np.arange(count, dtype=np.float64) * STEP_S
     return History(time_s, states[:, 0], states[:, 2], pressure)

@@ -30,6 +30,7 @@ from utank_hil.dynamics.sampling import LinearModel, sample
 
 _ROLL, _LEVEL, _SPEED = (STATES.index(s) for s in ("roll_rad", "level_m", "level_rate_m_s"))
 _PRESSURE = len(STATES)  # the last state
+FASTEST_WATER_M_S = 4.0  # f; counts with a finite power limit only
 
 
 class NoHistoryError(ValueError):
@@ -60,11 +61,7 @@ class ClairvoyantRun:
 
 
 def clairvoyant_bound(
-    plant: DesignPlant,
-    wave_motion: FloatArray,
-    *,
-    sample_time_s: float = 0.2,
-    fastest_water_m_s: float = 4.0,
+    plant: DesignPlant, wave_motion: FloatArray, *, sample_time_s: float = 0.2
 ) -> ClairvoyantRun:
     """Least roll of the linear ship within the plant's limits, the waves known in advance.
 
@@ -74,8 +71,6 @@ def clairvoyant_bound(
         Its delay makes no difference where the whole record is known.
     wave_motion : ndarray, shape (N + 1, 4)
         `STATES` with the tank passive (`passive_motion`), at 0, Ts, ... N Ts.
-    sample_time_s, fastest_water_m_s
-        As `best_history` takes them.
 
     Raises
     ------
@@ -83,7 +78,7 @@ def clairvoyant_bound(
         If nothing keeps within the limits, or the solver fails.
     """
     model = pump_with_lag(plant, sample_time_s, delay_s=0.0)
-    return best_history(plant, model, wave_motion[1:], fastest_water_m_s=fastest_water_m_s)
+    return best_history(plant, model, wave_motion[1:])
 
 
 def pump_with_lag(plant: DesignPlant, sample_time_s: float, delay_s: float) -> LinearModel:
@@ -106,8 +101,6 @@ def best_history(
     waves: FloatArray,
     state_slope: FloatArray | None = None,
     command_slope: FloatArray | None = None,
-    *,
-    fastest_water_m_s: float = 4.0,
 ) -> ClairvoyantRun:
     """Least mean square of the roll plus the mean of linear terms, the waves known.
 
@@ -123,8 +116,6 @@ def best_history(
         c(k), of the model's states in rad^2 per unit.
     command_slope : ndarray, shape (N,), optional
         d(k), in rad^2 per Pa.
-    fastest_water_m_s : float
-        f; counts with a finite power limit only.
 
     Raises
     ------
@@ -163,7 +154,7 @@ def best_history(
         (of_output(unit_rows[_LEVEL]), waves[:, _LEVEL], limits.level_m),
     ]
     if math.isfinite(limits.power_w):
-        fastest, flow = fastest_water_m_s, limits.power_w / (plant.tank.reservoir_area_m2 * unit)
+        fastest, flow = FASTEST_WATER_M_S, limits.power_w / (plant.tank.reservoir_area_m2 * unit)
         cut = of_output(fastest * unit_rows[_PRESSURE] + unit_rows[_SPEED])
         bounded += [
             (cut, waves[:, _SPEED], flow + fastest),

@@ -5,7 +5,6 @@ limiter and drive run every tick, level gauges and level observer every `LEVEL_T
 controller at its own sample time. Their order within a tick is that of the controller node.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -99,7 +98,6 @@ def simulate_loop(
     pump_gain: float = 1.0,
     noise: SensorNoise | None = None,
     seed: int = 0,
-    progress: Callable[[float], None] | None = None,
 ) -> LoopRun:
     """Run a controller, armed from the start.
 
@@ -115,8 +113,6 @@ def simulate_loop(
         Pressure that a command of 1 Pa ends in.
     seed : int
         Of the noise.
-    progress : callable, optional
-        Told the finished share now and then.
 
     Raises
     ------
@@ -166,8 +162,6 @@ def simulate_loop(
         commands.append(limiter.limit(wish_pa, observer.level_m, observer.rate_m_s))
         memory[n + 1] = commands[k]
         memory[: n + 1] = advance.dot(memory)
-        if progress is not None and k % 10_000 == 0:
-            progress(k / count)
     return LoopRun(
         wave_motion + by_pump[:, :n], by_pump[:, n], np.array(commands[delay_ticks:]), wishes
     )

@@ -129,7 +129,6 @@ def self_tuned(
     plant: DesignPlant,
     sea: SlopeDensity,
     *,
-    noise: SensorNoise = SensorNoise(),  # noqa: B008 - frozen
     mean_power_w: float = math.inf,
     sample_time_s: float | None = None,
 ) -> SelfTuned:
@@ -141,8 +140,6 @@ def self_tuned(
         With the limits of its pump.
     sea : SlopeDensity
         Known, estimated or assumed.
-    noise : SensorNoise
-        Of the sensors, as measured.
     mean_power_w : float
         Budget of the predicted power; infinite for the greatest comfort.
     sample_time_s : float, optional
@@ -153,7 +150,7 @@ def self_tuned(
     NoLawError
         If no law has the margins, or the sea does not roll the ship.
     """
-    search, gentlest_w = _Search(plant, sea, noise, sample_time_s), math.inf
+    search, gentlest_w = _Search(plant, sea, sample_time_s), math.inf
     within: SelfTuned | None = None
     first = search.least_cost()
     for power in range(_MOST_STEPS + 1):
@@ -258,13 +255,8 @@ def unknown_sea(ship: RollShip) -> SeaModel:
 class _Search:
     """One ship in one sea: what is designed, predicted and judged again and again."""
 
-    def __init__(
-        self,
-        plant: DesignPlant,
-        sea: SlopeDensity,
-        noise: SensorNoise,
-        sample_time_s: float | None = None,
-    ) -> None:
+    def __init__(self, plant: DesignPlant, sea: SlopeDensity, sample_time_s: float | None) -> None:
+        noise = SensorNoise()
         self._plant, self._std = plant, (noise.roll_rad, noise.roll_rate_rad_s, noise.level_m)
         self._roll_rad = passive_roll_rad(plant, sea)
         if not (math.isfinite(self._roll_rad) and self._roll_rad > 0):
