@@ -15,12 +15,11 @@ from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.real_time_run import run_in_one_process
 from firmware_sim.run import Job
 from firmware_sim.scenario import Scenario
-from utank_hil.assembly import build_law
 from utank_hil.cli import app
 from utank_hil.configuration import load_config
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import ReplayResult, entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.replay import ReplayResult, replay_log
+from utank_hil.telemetry.replay_head import recorded_config
 
 STORM = Path("configs/scenarios/storm.yaml")
 
@@ -37,9 +36,9 @@ def replayed(file: Path) -> ReplayResult:
     log = FrameLog(file)
     assert log.head["about"]["seed"] == 3
     with recorded_config(log.head) as config:
-        law = build_law(config)
-        assert causes(log.head, config, law, file.parent) == []
-        return replay(entries_of(log.blocks()), config, law)
+        result, why = replay_log(log, config, file.parent)
+    assert why == []
+    return result
 
 
 @pytest.mark.parametrize(

@@ -11,13 +11,12 @@ from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.run import Job
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
-from utank_hil.assembly import build_law
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import EstimateSettings, estimating, renewing
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.replay import replay_log
+from utank_hil.telemetry.replay_head import recorded_config
 
 pytestmark = pytest.mark.slow
 
@@ -52,10 +51,8 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     np.testing.assert_array_equal(logged.rows, run_lockstep(job, Unwatched()).rows)
     log = FrameLog(file)
     with recorded_config(log.head) as config:
-        law = build_law(config)
-        result = replay(entries_of(log.blocks()), config, law, retuner=True, estimating=True)
-        assert causes(log.head, config, law, tmp_path) == []
-    assert (result.first, result.ticks) == (None, 24_000)
+        result, why = replay_log(log, config, tmp_path)
+    assert (result.first, result.ticks, why) == (None, 24_000, [])
 
 
 def test_in_a_swell_that_the_first_law_is_wrong_for_the_pump_rests_in_time(

@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Final
 
-from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
 from utank_hil.telemetry.frame_log import FrameLog, FrameLogError
-from utank_hil.telemetry.replay import entries_of, replay
-from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
+from utank_hil.telemetry.replay import replay_log
+from utank_hil.telemetry.replay_head import ReplayHeadError, recorded_config
 
 LOGS: Final = Path("tests/replay")
 
@@ -26,16 +25,7 @@ def compare(path: Path, changes: dict[str, object] | None = None) -> str:
         log = FrameLog(path)
         with recorded_config(log.head) as config:
             chosen: ControllerConfig = config.model_copy(update=changes or {})
-            law = build_law(chosen)
-            why = causes(log.head, chosen, law, path.parent)
-            result = replay(
-                entries_of(log.blocks()),
-                chosen,
-                law,
-                retuner=log.head["retuner"],
-                estimating=log.head.get("estimating", False),
-                commissioned=log.head.get("commissioned", True),
-            )
+            result, why = replay_log(log, chosen, path.parent)
     except (FrameLogError, ReplayHeadError) as error:
         return str(error)
     return "; ".join([str(result.first), *why]) if result.first is not None else ""

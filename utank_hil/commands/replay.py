@@ -23,9 +23,9 @@ from utank_hil.telemetry.bus_logs import (
     read_bus_log,
 )
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import ReplayResult, entries_of
+from utank_hil.telemetry.replay import ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
-from utank_hil.telemetry.replay_head import ReplayHeadError, causes, recorded_config
+from utank_hil.telemetry.replay_head import ReplayHeadError, recorded_config
 
 
 def replay(
@@ -63,16 +63,7 @@ def replay(
                     "not known: give the run's first part"
                 )
             with _configuration(config, recording.head) as chosen:
-                law = build_law(chosen)
-                why = causes(recording.head, chosen, law, log.parent)
-                result = run_replay(
-                    entries_of(recording.blocks()),
-                    chosen,
-                    law,
-                    retuner=recording.head["retuner"],
-                    estimating=recording.head.get("estimating", False),
-                    commissioned=recording.head.get("commissioned", True),
-                )
+                result, why = replay_log(recording, chosen, log.parent)
             cut = recording.cut
     except (OSError, ValueError) as error:
         fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)

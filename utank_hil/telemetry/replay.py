@@ -8,16 +8,19 @@ recorded one, byte by byte.
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 from utank_hil.arrays import FloatArray
-from utank_hil.assembly import build_controller_node
+from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning.answer import Answer, read_answer
 from utank_hil.runtime import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.replay_head import causes
 
 Entry: TypeAlias = tuple[int, int, int, int, int, bytes]
 """kind, length, spare, number, time in ns, data."""
@@ -135,6 +138,23 @@ def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
     for block in blocks:
         for number, data, kind, time_ns in LAYOUT.iter_unpack(block.tobytes()):
             yield kind, len(data), 0, number, time_ns, data
+
+
+def replay_log(
+    log: FrameLog, config: ControllerConfig, folder: Path
+) -> tuple[ReplayResult, list[str]]:
+    """`replay` to a controller that has what the log's head says, and `causes` of a difference."""
+    law = build_law(config)
+    why = causes(log.head, config, law, folder)
+    result = replay(
+        entries_of(log.blocks()),
+        config,
+        law,
+        retuner=log.head["retuner"],
+        estimating=log.head.get("estimating", False),
+        commissioned=log.head.get("commissioned", True),
+    )
+    return result, why
 
 
 def replay(
