@@ -11,9 +11,9 @@ with quietly_interruptible():
     from rich.console import Console
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.commands.extras import extras_named
+    from utank_hil.commands.failures import failures_named
 
-    with extras_named():
+    with failures_named():
         from firmware_sim.external_drive import ExternalDrive
         from firmware_sim.run import RECORD_NS, RECORD_S, SECOND_NS
         from firmware_sim.scenario import Scenario
@@ -159,5 +159,5 @@ def _figures(rows: FloatArray) -> tuple[RollStatistics, PumpStatistics]:
 
 def main() -> None:
     """Run the command line."""
-    with extras_named():
+    with failures_named():
         app()

@@ -17,7 +17,7 @@ from firmware_sim.run import COLUMNS, Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
-from utank_hil.commands.common import finite
+from utank_hil.commands.common import finite, why
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
@@ -144,7 +144,7 @@ def write_report(
         try:
             write(result, folder / file, about)
         except (OSError, ValueError) as error:
-            failures.append(f"the {name} could not be written: {error}")
+            failures.append(f"the {name} could not be written: {why(error)}")
         else:
             files[name] = folder / file
     return files, failures

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.extras import EXTRA_OF
+from utank_hil.commands.failures import EXTRA_OF
 from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow

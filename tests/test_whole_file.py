@@ -57,6 +57,20 @@ def test_what_does_not_fit_is_named_and_not_left_in_half(
     assert not path.exists()
 
 
+def test_a_file_that_must_not_be_written_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_path: Path, _content: bytes) -> int:
+        raise PermissionError(13, "Permission denied")
+
+    path = tmp_path / "page.html"
+    path.write_text("mine")
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    with pytest.raises(PermissionError, match=str(path)):
+        write_whole(path, "text")
+    assert path.read_text() == "mine"
+
+
 def test_a_full_device_stays_and_is_named() -> None:
     with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
         write_whole(Path("/dev/full"), "text")

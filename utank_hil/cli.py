@@ -16,7 +16,7 @@ with quietly_interruptible():
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.commands.common import Version, new_app
-    from utank_hil.commands.extras import extras_named
+    from utank_hil.commands.failures import failures_named
 
 GROUP = "utank_hil.commands"
 
@@ -59,5 +59,5 @@ def _utank_hil(version: Version = False) -> None:
 
 def main() -> None:
     """Run the command line."""
-    with extras_named():
+    with failures_named():
         app()

@@ -1,5 +1,8 @@
 """Files that are there whole or not at all."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -18,9 +21,25 @@ def write_whole(path: Path, content: bytes | str) -> None:
     OSError
         If it can't be written, with its name.
     """
-    try:
+    with left_whole(path):
         path.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as error:
-        if path.is_file():
+
+
+@contextmanager
+def left_whole(path: Path) -> Iterator[None]:
+    """While a file is written: whatever ends that, no half of it is left.
+
+    Raises
+    ------
+    OSError
+        If it can't be written, with its name.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if path.is_file() and not isinstance(error, PermissionError):
             path.unlink()
-        raise OSError(error.errno, error.strerror, str(path)) from error
+        if isinstance(error, OSError):
+            reason = os.strerror(error.errno) if error.errno else str(error)
+            raise OSError(error.errno, reason, str(path)) from error
+        raise

@@ -18,6 +18,7 @@ from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out,
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import ControllerConfig
 from utank_hil.provenance import describe
+from utank_hil.whole_file import write_whole
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint
@@ -89,7 +90,7 @@ def controller(
         **_as_json(result),
         "files": {name: str(path) for name, path in files.items()},
     }
-    files["figures"].write_text(json.dumps(figures, indent=2) + "\n")
+    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
     if json_:
         print_json(figures)
         return

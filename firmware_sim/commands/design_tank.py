@@ -17,6 +17,7 @@ from utank_hil.commands.tables import new_table, print_table
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import Tank
 from utank_hil.provenance import describe
+from utank_hil.whole_file import write_whole
 
 if TYPE_CHECKING:
     from firmware_sim.scenario import Scenario
@@ -100,7 +101,7 @@ def tank(
         "sweep": sweep_json(points),
         "files": {key: str(file) for key, file in files.items()},
     }
-    files["figures"].write_text(json.dumps(figures, indent=2) + "\n")
+    write_whole(files["figures"], json.dumps(figures, indent=2) + "\n")
     if json_:
         print_json(figures)
         return

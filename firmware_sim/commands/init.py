@@ -16,6 +16,7 @@ from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, p
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.parameters import ParameterError
+from utank_hil.whole_file import write_whole
 
 if TYPE_CHECKING:
     from firmware_sim.starter import StarterProject
@@ -142,7 +143,7 @@ def init(
     prepare_out(folder, ())  # not before: a refusal leaves nothing behind
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
-        path.write_text(project.texts[file], encoding="utf-8")
+        write_whole(path, project.texts[file])
     little = _little_help(project)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}

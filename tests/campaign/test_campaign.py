@@ -211,9 +211,9 @@ def test_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch):
 
 
 def test_without_dask_the_remedy_is_named(monkeypatch, capsys):
-    from utank_hil.commands.extras import extras_named
+    from utank_hil.commands.failures import failures_named
 
-    with pytest.raises(SystemExit), extras_named():
+    with pytest.raises(SystemExit), failures_named():
         raise ModuleNotFoundError("No module named 'distributed'", name="distributed")
     assert "pip install 'utank-hil[bench]'" in capsys.readouterr().err.replace("\n", "")
 

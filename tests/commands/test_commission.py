@@ -113,7 +113,7 @@ def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Pat
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"passed": true}', "\x00"])
 def test_a_file_that_is_no_record_does_not_admit(file: Path, content: str) -> None:
     record_path(file).write_text(content)
-    assert "is no record of a commissioning" in reason(file)
+    assert "is no record of a commissioning that can be read; run" in reason(file)
 
 
 def test_an_emulated_bus_asks_only_for_a_record_that_was_named(file: Path, tmp_path: Path) -> None:

@@ -126,8 +126,8 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
         on_bus = str(record["bus"])
     except FileNotFoundError:
         return f"{path}: there is no record of a commissioning; {remedy}"
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        return f"{path}: is no record of a commissioning ({error}); {remedy}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return f"{path}: is no record of a commissioning that can be read; {remedy}"
     changed = _differences(stands_for, json.loads(json.dumps(commissioned_for(config))))
     if changed:
         return f"{path}: since {date} these changed: {', '.join(changed)}; {remedy}"

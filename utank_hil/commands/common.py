@@ -91,9 +91,16 @@ def new_app(
     )
 
 
+def why(error: object) -> str:
+    """What an error says: of one of the system its file and its reason, without Python's words."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
 def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     """Print an error and end."""
-    notes.print("[red]error:[/red]", escape(str(message)), soft_wrap=True)
+    notes.print("[red]error:[/red]", escape(why(message)), soft_wrap=True)
     raise typer.Exit(code)
 
 

@@ -57,7 +57,7 @@ class ExitCode(IntEnum):
     )
     INTERRUPTED = (
         130,
-        "`bench`, `commission`, `faults`, `firmware-sim`",
-        "`bench`, `faults`: Ctrl-C before the end; results hold what there is. `commission`: "
-        "Ctrl-C before all was checked. `firmware-sim`: Ctrl-C before the first sample.",
+        "all but `run`, `panel`, `monitor`",
+        "Ctrl-C before the end; of `firmware-sim`, before the first sample. `bench`, `campaign` "
+        "and `faults` keep what there is.",
     )

@@ -14,6 +14,7 @@ from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, print
 from utank_hil.commands.tables import new_table, print_table
 from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
+from utank_hil.whole_file import write_whole
 
 PAGE: Final = "gallery.html"
 NUMBERS: Final = "figures.json"
@@ -55,7 +56,7 @@ def reproduce(
             for entry in entries
         ]
     }
-    files["numbers"].write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_whole(files["numbers"], json.dumps(result, indent=1) + "\n")
     if json_:
         print_json(result)
         return

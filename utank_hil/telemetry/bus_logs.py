@@ -23,6 +23,7 @@ from utank_hil.canbus import (
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.replay import Entry
 from utank_hil.tick import TICK_NS
+from utank_hil.whole_file import left_whole
 
 if TYPE_CHECKING:
     import can
@@ -54,8 +55,9 @@ def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
     """
     from can import Message
 
-    count, begin_ns = 0, None
-    with _writer(path) as writer:
+    suffix, count, begin_ns = path.suffix.lower(), 0, None
+    mode = "wb" if suffix == ".blf" else "w"
+    with left_whole(path), path.open(mode) as content, _writer(content, suffix) as writer:
         for kind, _, _, number, time_ns, data in entries:
             begin_ns = time_ns if begin_ns is None else begin_ns
             if kind not in (Kind.RECEIVED, Kind.SENT):
@@ -164,15 +166,15 @@ def _messages(path: Path) -> Iterator["can.Message"]:
                 count += 1
         except Exception as error:  # the readers let out whatever a wrong byte makes them meet
             raise BusLogError(
-                f"{path}: can't be read as {suffix[1:]} after {count} frames: {error}"
+                f"{path}: can't be read as {suffix[1:]} after {count} frames"
             ) from error
     if not count:
         raise BusLogError(f"{path}: no frames in it")
 
 
-def _writer(path: Path) -> Any:
+def _writer(content: Any, suffix: str) -> Any:
     from can import ASCWriter, BLFWriter, CanutilsLogWriter
 
-    if path.suffix.lower() == ".log":
-        return CanutilsLogWriter(path, channel="can0")
-    return (ASCWriter if path.suffix.lower() == ".asc" else BLFWriter)(path)
+    if suffix == ".log":
+        return CanutilsLogWriter(content, channel="can0")
+    return (ASCWriter if suffix == ".asc" else BLFWriter)(content)

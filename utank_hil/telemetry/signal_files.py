@@ -20,6 +20,7 @@ from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import entries_of
 from utank_hil.telemetry.signal_table import signal_table
 from utank_hil.telemetry.units import column_of
+from utank_hil.whole_file import left_whole
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
 SUFFIXES: Final = (".rrd", SUFFIX, *BUS_SUFFIXES, *TABLE_SUFFIXES)
@@ -59,9 +60,10 @@ def read_signals(path: Path) -> dict[str, Columns]:
     ValueError
         If it can't be read, with its name, the line where there is one, and the remedy.
     OSError
-        If there is no such file.
+        If it can't be opened.
     """
     suffix = path.suffix.lower()
+    path.open("rb").close()  # who reads it may say less of why it can't be
     if suffix == ".rrd":
         from utank_hil.telemetry.recording import read_recording  # here: Rerun
 
@@ -90,9 +92,10 @@ def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
         from pyarrow import parquet
 
         arrays = {name: pyarrow.array(values, from_pandas=True) for name, values in columns.items()}
-        parquet.write_table(pyarrow.table(arrays), path)
+        with left_whole(path):
+            parquet.write_table(pyarrow.table(arrays), path)
         return
-    with path.open("w", newline="", encoding="utf-8") as content:
+    with left_whole(path), path.open("w", newline="", encoding="utf-8") as content:
         writer = csv.writer(content)
         writer.writerow(columns)
         for row in zip(*(values.tolist() for values in columns.values()), strict=True):
@@ -232,7 +235,7 @@ def _read_csv(path: Path) -> Columns:
             _check_names(path, names)
             rows = list(_numbers(path, names, lines))
     except (csv.Error, UnicodeDecodeError) as error:
-        raise SignalFileError(f"{path}: is no table of text: {error}") from error
+        raise SignalFileError(f"{path}: is no table of text in UTF-8") from error
     if not rows:
         raise SignalFileError(f"{path}: has a line of names and no rows")
     table = np.array(rows)
@@ -287,7 +290,7 @@ def _read_parquet(path: Path) -> Columns:
     try:
         table = parquet.read_table(path)
     except pyarrow.ArrowException as error:
-        raise SignalFileError(f"{path}: is no Parquet file: {error}") from error
+        raise SignalFileError(f"{path}: is no Parquet file") from error
     columns: Columns = {}
     for name in table.column_names:
         column = table.column(name)

@@ -1,10 +1,15 @@
-"""Commands of an installation of the controller alone: what is missing for one is said by name."""
+"""What no command goes on without, said by name: a package, a file, room on a disk."""
 
+import errno
+import io
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from utank_hil.commands.common import notes
+from rich.markup import escape
+
+from utank_hil.commands.common import notes, why
 from utank_hil.commands.exit_codes import ExitCode
 
 EXTRA_OF: Final = {
@@ -23,8 +28,13 @@ EXTRA_OF: Final = {
 
 
 @contextmanager
-def extras_named() -> Iterator[None]:
-    """End with the remedy where a package of an extra is not installed."""
+def failures_named() -> Iterator[None]:
+    """End in words where a package of an extra is not installed or a file can't be used.
+
+    Signs that the terminal's encoding lacks become question marks.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
     try:
         yield
     except ModuleNotFoundError as error:
@@ -36,4 +46,9 @@ def extras_named() -> Iterator[None]:
             f"pip install 'utank-hil\\[{EXTRA_OF[name]}]'",
             soft_wrap=True,
         )
+        raise SystemExit(ExitCode.USAGE) from None
+    except OSError as error:
+        if error.filename is None and error.errno != errno.ENOSPC:
+            raise
+        notes.print("[red]error:[/red]", escape(why(error)), soft_wrap=True)
         raise SystemExit(ExitCode.USAGE) from None

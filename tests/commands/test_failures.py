@@ -1,0 +1,108 @@
+"""What a command says of files, folders and terminals that can't be used: the file, the reason."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_whole_file import little_room
+from typer.testing import CliRunner
+
+from utank_hil.cli import app
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.failures import failures_named
+
+GPC = "configs/controllers/gpc.yaml"
+LOG = Path("tests/replay/every-mode.frames")
+PYTHONS_OWN = ("Errno", "Traceback", "codec", "unpack", "could not convert", "os error")
+
+
+def refused(*words: object) -> str:
+    """What a command says that ends with the code of a wrong file."""
+    result = CliRunner(env={"COLUMNS": "300"}).invoke(app, [str(word) for word in words])
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == ExitCode.USAGE
+    assert result.stdout == ""
+    for word in PYTHONS_OWN:
+        assert word not in result.stderr
+    return str(result.stderr).strip()
+
+
+def commands_for(file: Path) -> list[tuple[object, ...]]:
+    """The commands that read a recording, by its ending."""
+    words: list[tuple[object, ...]] = [("export", file, "--to", file.parent / "to.csv")]
+    if file.suffix in (".frames", ".log"):
+        words.append(("replay", file, "--config", GPC))
+    if file.suffix in (".rrd", ".csv"):
+        words.append(("identify", file, GPC, "--out", file.parent / "out"))
+    return words
+
+
+@pytest.mark.parametrize("suffix", [".rrd", ".frames", ".log", ".asc", ".blf", ".csv", ".parquet"])
+def test_a_recording_that_can_not_be_read_is_named_with_the_reason(
+    tmp_path: Path, suffix: str
+) -> None:
+    missing, folder, binary = (tmp_path / f"{name}{suffix}" for name in ("no", "folder", "bytes"))
+    folder.mkdir()
+    binary.write_bytes(b"\xff\xfe\x00\x01" + bytes(range(256)))
+    for words in commands_for(missing):
+        assert refused(*words) == f"error: {missing}: No such file or directory"
+    for words in commands_for(folder):
+        assert refused(*words) == f"error: {folder}: Is a directory"
+    for words in commands_for(binary):
+        assert str(binary) in refused(*words)
+
+
+@pytest.mark.parametrize("suffix", [".log", ".asc", ".blf", ".csv", ".parquet"])
+def test_an_export_that_can_not_be_written_is_named_and_not_left_in_half(
+    tmp_path: Path, suffix: str
+) -> None:
+    file = tmp_path / f"to{suffix}"
+    with little_room():
+        assert refused("export", LOG, "--to", file) == f"error: {file}: File too large"
+    assert not file.exists()
+    nowhere = tmp_path / "no" / file.name
+    said = refused("export", LOG, "--to", nowhere)
+    assert said == f"error: {nowhere}: No such file or directory"
+
+
+def test_a_results_file_that_does_not_fit_ends_any_command_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with little_room(), pytest.raises(SystemExit) as ended, failures_named():
+        app(["reproduce", "2.7", "--out", str(tmp_path)], standalone_mode=False)
+    assert ended.value.code == ExitCode.USAGE
+    assert capsys.readouterr().err.split() == f"error: {tmp_path}/2.7.png: File too large".split()
+
+
+def test_other_errors_are_those_of_the_program() -> None:
+    with pytest.raises(OSError, match="reset"), failures_named():
+        raise OSError(errno.ECONNRESET, "reset")
+
+
+@pytest.mark.parametrize("words", [("check", GPC), ("reproduce", "--list", "--json")])
+def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = started(words, stdout=full)
+    assert done.returncode == ExitCode.USAGE
+    assert done.stderr == "error: No space left on device\n"
+
+
+def test_a_terminal_that_lacks_a_sign_gets_a_question_mark() -> None:
+    done = started(("check", GPC), stdout=subprocess.PIPE, encoding="ascii")
+    assert done.returncode == ExitCode.OK, done.stderr
+    assert "m?/s" in done.stdout
+
+
+def started(words: tuple[str, ...], stdout: object, encoding: str = "utf-8") -> Any:
+    return subprocess.run(
+        [sys.executable, "-c", "from utank_hil.cli import main; main()", *words],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONIOENCODING": encoding, "COLUMNS": "200"},
+        check=False,
+    )
