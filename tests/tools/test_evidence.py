@@ -40,6 +40,12 @@ def test_every_part_is_of_a_module_that_is_there_and_every_result_of_a_part() ->
     assert {file.stem for file in record.FOLDER.iterdir()} <= {part.name for part in PARTS}
 
 
+@pytest.mark.slow
+def test_a_part_may_be_a_command_of_the_product() -> None:
+    (part,) = (part for part in PARTS if "firmware_sim" in part.command)
+    assert record.sources(part)
+
+
 def test_every_study_benchmark_and_comparison_is_a_part() -> None:
     commands = " ".join(part.command for part in PARTS)
     for pattern in ("studies/*", "thesis/*", "benchmarks/*", "peers/compare_*"):

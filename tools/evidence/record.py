@@ -54,7 +54,7 @@ def sources(part: Part) -> str:
 
     Tests run the installed commands: all of both packages counts.
     """
-    module = re.search(r"-m (tools\.\S+)", part.command)
+    module = re.search(r"-m ((?:tools|firmware_sim)\.\S+)", part.command)
     assert module, part.command
     start = {ROOT / (module[1].replace(".", "/") + ".py")}
     if module[1] == "tools.evidence.pytest_part":
