@@ -42,7 +42,11 @@ def test_without_an_order_it_is_the_law_it_was_given() -> None:
 
 def test_ordered_identified_designed_tried_and_kept() -> None:
     rig = Rig(ToyRetuner(candidate_of(9e4), looks=3))
-    rig.retune_until(RETUNED)
+    assert not rig.controller.excused
+    rig.retune_until(IDENTIFY)
+    assert rig.controller.excused  # the pulses roll the ship
+    rig.run_until(RETUNED)
+    assert not rig.controller.excused
     assert states(rig) == [IDENTIFY, DESIGN, TRIAL, RETUNED]
     rig.run(50)
     assert states(rig)[-1] is RETUNED
