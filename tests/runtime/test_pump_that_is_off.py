@@ -75,6 +75,12 @@ def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset()
     assert table.node.supervisor.reset_refused_by is CODE
 
 
+def test_a_ship_without_a_pump_has_no_drive_that_stays_on() -> None:
+    table = ControllerBench(pump=False)
+    table.run(1500)
+    assert Fault.DRIVE_FAULT not in table.node.alarms.codes
+
+
 @pytest.mark.parametrize("state", [DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE])
 def test_a_drive_that_no_quick_stop_takes_out_of_operation_is_told_to_be_off(
     state: DriveState,

@@ -98,8 +98,8 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "starboard_m) <= 2 * self._most_level_m and abs(port_m + starboard_m) < "
         "self._most_sum_m and (self._gates is None or self._gates.levels_pass(port_m, "
         "starboard_m, now_ns)):": _A_MARGIN,
-        "Inbox._count_cycles: if since_ns > self._tank_gap_ns: -> "
-        "if since_ns >= self._tank_gap_ns:": _A_NANOSECOND,
+        "Inbox._count_cycles: if behind_ns > self._tank_patience_ns: -> "
+        "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
         ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
@@ -254,6 +254,7 @@ TARGETS = (
         (
             "tests/runtime/test_alarms.py",
             "tests/runtime/test_valve_command.py",
+            "tests/runtime/test_pump_that_is_off.py",
             "tests/runtime/test_law_that_starts_anew.py",
             "tests/runtime/test_estimates_on_the_bus.py",
             *_NODE,
