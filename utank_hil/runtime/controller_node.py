@@ -351,12 +351,13 @@ class ControllerNode:
         seen.law_failed, seen.command_pa = self._law_failed, self.command_pa
         seen.drive_stays_on = self._pump and self._drive_sequence.ignored
         if self.monitors is not None:
-            excused = False
+            excused, rate_m_s, valve = False, self._level.rate_m_s, self._valve
+            held_pa = 0.0 if valve is None else valve.held_pa(self.inbox, rate_m_s)
             if self._retuning is not None:
                 excused = self._retuning.excused
                 self.monitors.follow(self._retuning.laws.active.found)
             seen.found = self.monitors.update(
-                now_ns, self.inbox, seen, self._level.rate_m_s, excused=excused
+                now_ns, self.inbox, seen, rate_m_s, excused=excused, held_pa=held_pa
             )
         if seen.reset_edge:
             self._drive_sequence.request_reset()

@@ -50,6 +50,7 @@ MOST_DAMPING_RATIO: Final = 1.0
 
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
+_WATER_SIGN: Final = int(Finding.WATER_SIGN)
 
 
 class Monitors:
@@ -101,13 +102,15 @@ class Monitors:
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
         self._ship, self._tank = ship, tank
         self._followed: ModelSummary | ShipFigures | None = None
-        # a valve's loss stands neither in the tank's equation here nor in the twin
+        # what a valve that is nearly shut holds back is uncertain: only a wrong sign is told then
         self._water_free = plant.valve is None
+        self._told_by_water = ~0 if self._water_free else _WATER_SIGN
         self._compares = compares and self._water_free
         gates = self.gates.motions if second_motion else (None, None)
         first, second = [
             SensorEvidence(
-                MotionWatch(thresholds, gate), TankEquation(ship, tank, thresholds, LONG_S)
+                MotionWatch(thresholds, gate),
+                TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free),
             )
             for gate in gates
         ]
@@ -178,6 +181,7 @@ class Monitors:
         level_rate_m_s: float,
         *,
         excused: bool,
+        held_pa: float = 0.0,
     ) -> int:
         """Look at one tick.
 
@@ -192,6 +196,8 @@ class Monitors:
             As estimated.
         excused : bool
             The law in charge is not to be judged by the roll, see `LawExchange.excused`.
+        held_pa : float
+            Pressure that a valve takes from the water.
 
         Returns
         -------
@@ -223,7 +229,7 @@ class Monitors:
         elif phase == 2 or phase == 7:
             self._look_at_twin(inbox, level_rate_m_s, excused=excused)
         elif phase == 3:
-            self._look_at_water(now_ns, inbox, seen)
+            self._look_at_water(now_ns, inbox, seen, held_pa)
         elif phase == 4:
             if seen.tank_age_ms <= STALE_MS:
                 self._of_volume = self.volume.update(
@@ -291,27 +297,31 @@ class Monitors:
         twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
 
-    def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
+    def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations, held_pa: float) -> None:
         late_s = (now_ns - self._round_ns) * 1e-9
         self._round_ns = now_ns
         oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
-        if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S or not self._water_free:
+        if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S:
             self._used.restart_water()
             if self._spare is not None:
                 self._spare.restart_water()
             self._level_stuck.restart()
             self._of_level = 0
             return
-        roll_rad, level_m, pressure_pa = inbox.roll_rad, inbox.level_m, inbox.pressure_pa
-        self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
-        self._used.water = self._used.equation.update(roll_rad, level_m, pressure_pa)
+        roll_rad, level_m = inbox.roll_rad, inbox.level_m
+        pressure_pa = inbox.pressure_pa - held_pa
+        if self._water_free:
+            self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
+        told = self._told_by_water
+        self._used.water = self._used.equation.update(roll_rad, level_m, pressure_pa) & told
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
             return
         if seen.motion_spare_age_ms > STALE_MS:
             spare.restart_water()
         else:
-            spare.water = spare.equation.update(motions.spare.roll_rad, level_m, pressure_pa)
+            spare_rad = motions.spare.roll_rad
+            spare.water = spare.equation.update(spare_rad, level_m, pressure_pa) & told
         self._leave_accused(inbox, motions, seen, spare)
 
 

@@ -41,7 +41,8 @@ STILL_PUSHES: Final = 4.0
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LEAST_SHARE: Final = 0.06
-"""Of a push beside the other one."""
+VALVE_SHARE: Final = 0.2
+"""Of a push beside the other one; with what a valve holds back in that one."""
 FULL_SHARE: Final = 0.9
 """Of the tank's height: beyond, roof and bottom push too."""
 
@@ -115,6 +116,8 @@ class TankEquation:
     thresholds : MonitorThresholds
     period_s : float
         Time between two updates.
+    valve : bool
+        Whether the pressure holds what a valve takes, as it is estimated.
 
     Attributes
     ----------
@@ -125,8 +128,15 @@ class TankEquation:
     """
 
     def __init__(
-        self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
+        self,
+        ship: RollShip,
+        tank: Tank,
+        thresholds: MonitorThresholds,
+        period_s: float,
+        *,
+        valve: bool = False,
     ) -> None:
+        self._least_share = (VALVE_SHARE if valve else LEAST_SHARE) ** 2
         mass, _, stiffness = coupled_matrices(ship, tank)
         density = tank.density_kg_m3
         water_kg_m = density * tank.reservoir_area_m2
@@ -213,7 +223,7 @@ class TankEquation:
 
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
         found = 0
-        share = LEAST_SHARE * LEAST_SHARE
+        share = self._least_share
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
         if xx > self._least_xx and xx > share * pp:
             self.roll_gain = gain = self._rest_x / xx

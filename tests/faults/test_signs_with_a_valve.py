@@ -1,0 +1,38 @@
+"""A motion sensor with the wrong sign on a ship with a valve, which hides a part of the water."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from pydantic import TypeAdapter
+
+from firmware_sim.fault_injection.kinds import AnyFault
+from firmware_sim.faulty_bench import FaultyBench
+from firmware_sim.scenario import Scenario
+from utank_hil.assembly import build_law
+from utank_hil.canbus import Fault, Mode
+from utank_hil.configuration import load_config
+from utank_hil.runtime.panel import Action, TimedAction
+
+SECOND = 1_000_000_000
+FLIPPED = {"kind": "sign", "message": "SENSOR_MOTION", "signals": ["roll_rad", "roll_rate_rad_s"]}
+
+
+@cache
+def scenario() -> Scenario:
+    return load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
+
+
+@pytest.mark.parametrize("controller", ["pump_with_valve", "on_off"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_both_signs_wrong_are_told_by_water_that_a_valve_holds_back(
+    controller: str, flipped: bool
+) -> None:
+    config = scenario().controllers[controller]
+    script = (TimedAction(1.0, Action.ARM),)
+    bench = FaultyBench(scenario(), config, build_law(config), seed=1, script=script)
+    if flipped:
+        bench.place([TypeAdapter(AnyFault).validate_python(FLIPPED)])
+    bench.run(16 * SECOND)
+    told = Fault.MOTION_SIGN_FLIP if flipped else Fault.NONE
+    assert (bench.node.mode is Mode.FAULT, bench.node.fault) == (flipped, told)
