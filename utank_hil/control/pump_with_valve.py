@@ -18,29 +18,23 @@ import numpy as np
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
-from utank_hil.control.semi_active import FLOW, built_pump_law, throttled, valve_range
-from utank_hil.dynamics.valves import ValveRange
+from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, LawDesign
+from utank_hil.control.semi_active import (
+    FLOW,
+    ClippedValve,
+    built_pump_law,
+    on_pump_law,
+    throttled,
+    valve_range,
+)
 from utank_hil.parameters import ParameterError
 
 
-class PumpWithValve:
+class PumpWithValve(ClippedValve):
     """A pump law whose pressure pump and valve make together.
 
-    Parameters
-    ----------
-    pump : Controller
-        One input. Its `applied` gets the pressure that both really made.
-    measured : int
-        How many of the measurements, the last of which is the level rate, are the pump law's own.
+    The law's `applied` gets the pressure that both really made.
     """
-
-    def __init__(self, valve: ValveRange, pump: Controller, measured: int) -> None:
-        self.sample_time_s = pump.sample_time_s
-        self._valve = valve
-        self._pump = pump
-        self._measured = measured
-        self._flow = 0.0
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure and loss, shape (2,), for the pump law's measurements and the level rate."""
@@ -55,11 +49,6 @@ class PumpWithValve:
     def applied(self, u: FloatArray) -> None:
         """Tell the pump's law the pressure that pump and valve made together."""
         self._pump.applied(np.array([float(u[0]) - float(u[1]) * self._flow]))
-
-    def reset(self) -> None:
-        """Forget the past."""
-        self._flow = 0.0
-        self._pump.reset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +71,8 @@ class PumpWithValveDesign:
             raise ParameterError("", [("pump.kind", "must be of a linear law, as lqg or gpc")])
         return replace(
             pump,
-            controller=partial(_together, valve, pump),
+            controller=partial(on_pump_law, PumpWithValve, valve, pump),
             measured=(*pump.measured, FLOW),
             commands=(PRESSURE, VALVE),
             at_rest=True,
         )
-
-
-def _together(valve: ValveRange, pump: BuiltLaw) -> Controller:
-    """A new controller; a function of the module, so that it can go to another process."""
-    return PumpWithValve(valve, pump.controller(), len(pump.measured))

@@ -163,13 +163,13 @@ class ClippedValveDesign:
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design both laws for a plant."""
         valve, pump = valve_range(plant), built_pump_law(self.pump, plant)
-        make = partial(_clipped, valve, pump)
+        make = partial(on_pump_law, ClippedValve, valve, pump)
         return BuiltLaw(make, (*pump.measured, FLOW), commands=(VALVE,))
 
 
-def _clipped(valve: ValveRange, pump: BuiltLaw) -> Controller:
+def on_pump_law(kind: type[ClippedValve], valve: ValveRange, pump: BuiltLaw) -> Controller:
     """A new controller; a function of the module, so that it can go to another process."""
-    return ClippedValve(valve, pump.controller(), len(pump.measured))
+    return kind(valve, pump.controller(), len(pump.measured))
 
 
 def built_pump_law(design: LawDesign, plant: DesignPlant) -> BuiltLaw:
