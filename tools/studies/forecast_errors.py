@@ -158,7 +158,6 @@ def factor_model(name: str) -> Model:
         DesignPlant(vessel.ship, vessel.tank, delay_s=0.0, lag_s=0.0),
         pressure_noise_pa_rt_s=shipped_law.pressure_noise_pa_rt_s,
         slope_noise_rad_rt_s=shipped_law.slope_noise_rad_rt_s,
-        heel_std_rad=0.0,
         heel_time_s=shipped_law.heel_time_s,
         sample_time_s=shipped_law.sample_time_s,
     )

@@ -23,8 +23,6 @@ def plant_of(model: SeaModel, heel_std_rad: float = 0.0):
     return sea_plant(
         model,
         DesignPlant(SHIP, TANK),
-        pressure_noise_pa_rt_s=0.0,
-        slope_noise_rad_rt_s=0.0,
         heel_std_rad=heel_std_rad,
         heel_time_s=1e4,
         sample_time_s=TS,

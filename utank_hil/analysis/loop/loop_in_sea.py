@@ -79,15 +79,7 @@ class LoopInSea:
         pump_gain: float = 1.0,
         forecast: FloatArray | None = None,
     ) -> None:
-        whole, process = sea_plant(
-            sea,
-            plant,
-            pressure_noise_pa_rt_s=0.0,
-            slope_noise_rad_rt_s=0.0,
-            heel_std_rad=0.0,
-            heel_time_s=1.0,
-            sample_time_s=law.sample_time_s,
-        )
+        whole, process = sea_plant(sea, plant, sample_time_s=law.sample_time_s)
         unit = plant.limits.pressure_pa
         size = pump_units(whole, sea, unit)
         true = _scaled(whole, size, unit)

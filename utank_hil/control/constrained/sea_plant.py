@@ -17,11 +17,11 @@ def sea_plant(
     sea: SeaModel,
     plant: DesignPlant,
     *,
-    pressure_noise_pa_rt_s: float,
-    slope_noise_rad_rt_s: float,
-    heel_std_rad: float,
-    heel_time_s: float,
     sample_time_s: float,
+    pressure_noise_pa_rt_s: float = 0.0,
+    slope_noise_rad_rt_s: float = 0.0,
+    heel_std_rad: float = 0.0,
+    heel_time_s: float = 1.0,
 ) -> tuple[LinearModel, FloatArray]:
     """Sampled model of ship, tank, drive, waves and a slowly varying heeling moment.
 
