@@ -72,10 +72,6 @@ def _simulated(friction: float) -> tuple[FloatArray, FloatArray]:
     return found[0], found[1]
 
 
-def _label(friction: float) -> str:
-    return f"friction {friction:g}"
-
-
 def _agreement(simulated: FloatArray, amplitude: FloatArray, phase_rad: FloatArray) -> str:
     exact = amplitude * np.exp(1j * phase_rad)
     worst = float(np.max(np.abs(simulated - exact) / np.abs(exact)))
@@ -100,16 +96,7 @@ def figure_2_3() -> Figure:
         _METHOD,
         _OPEN,
         (
-            Panel(
-                "Roll by the pump",
-                _X,
-                "Roll per P0/k_hh",
-                tuple(
-                    Curve(_label(each), _RATIO, y)
-                    for each, y in zip(FRICTIONS, family, strict=True)
-                ),
-                log_y=True,
-            ),
+            _family_panel("Roll by the pump", "Roll per P0/k_hh", family, log_y=True),
             Panel(
                 f"Friction {SIMULATED:g}: closed form and simulation",
                 _X,
@@ -196,7 +183,7 @@ def figure_2_4() -> Figure:
     return Figure(
         _METHOD,
         _OPEN,
-        (_phase_panel("Roll by the pump", family),),
+        (_family_panel("Roll by the pump", "Phase (°)", family),),
         checks=(
             Check(
                 "two degrees of freedom at low friction, one at high friction",
@@ -222,18 +209,7 @@ def figure_2_5() -> Figure:
     return Figure(
         _METHOD,
         _OPEN,
-        (
-            Panel(
-                "Tank angle by the pump",
-                _X,
-                "Tank angle per P0/k_hh",
-                tuple(
-                    Curve(_label(each), _RATIO, y)
-                    for each, y in zip(FRICTIONS, family, strict=True)
-                ),
-                log_y=True,
-            ),
-        ),
+        (_family_panel("Tank angle by the pump", "Tank angle per P0/k_hh", family, log_y=True),),
         checks=(
             _two_to_one("the water", family),
             Check(
@@ -256,7 +232,7 @@ def figure_2_6() -> Figure:
     return Figure(
         _METHOD,
         _OPEN,
-        (_phase_panel("Tank angle by the pump", family),),
+        (_family_panel("Tank angle by the pump", "Phase (°)", family),),
         checks=(
             Check(
                 "two degrees of freedom at low friction, one at high friction",
@@ -275,10 +251,11 @@ def figure_2_6() -> Figure:
     )
 
 
-def _phase_panel(title: str, family: list[FloatArray]) -> Panel:
-    return Panel(
-        title,
-        _X,
-        "Phase (°)",
-        tuple(Curve(_label(each), _RATIO, y) for each, y in zip(FRICTIONS, family, strict=True)),
+def _family_panel(
+    title: str, y_label: str, family: list[FloatArray], *, log_y: bool = False
+) -> Panel:
+    """A curve for each friction."""
+    curves = (
+        Curve(f"friction {each:g}", _RATIO, y) for each, y in zip(FRICTIONS, family, strict=True)
     )
+    return Panel(title, _X, y_label, tuple(curves), log_y=log_y)
