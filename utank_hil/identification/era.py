@@ -62,10 +62,6 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
     order : int or None
         Number of states; None: `order_from_singular_values`.
 
-    Returns
-    -------
-    control.StateSpace
-
     Raises
     ------
     ValueError
@@ -132,10 +128,6 @@ def era_dc(markov: FloatArray, order: int | None = None, *, sample_time_s: float
     ----------
     markov, order, sample_time_s
         See `era`.
-
-    Returns
-    -------
-    control.StateSpace
 
     Raises
     ------

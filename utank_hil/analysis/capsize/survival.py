@@ -78,10 +78,6 @@ def controlled_run(
     each_step : callable, optional
         Called with time, state and command at every sample.
 
-    Returns
-    -------
-    Survival
-
     Raises
     ------
     ValueError
