@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tools.printing import command_line, show
+from tools.printing import print_tables
 from tools.studies.trial_setup import entrant, shipped
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import Margins, margins
@@ -205,11 +205,7 @@ TABLES: dict[str, Callable[[], Rows]] = {
 
 def main() -> None:
     """Print the tables that were asked for."""
-    parser = command_line(__doc__)
-    parser.add_argument("table", nargs="?", choices=TABLES, help="all if left out")
-    arguments = parser.parse_args()
-    wanted = [arguments.table] if arguments.table else list(TABLES)
-    show({name: TABLES[name]() for name in wanted}, arguments)
+    print_tables(__doc__, TABLES)
 
 
 if __name__ == "__main__":

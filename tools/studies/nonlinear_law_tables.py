@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from tools.printing import command_line, show
+from tools.printing import print_tables
 from tools.studies.trial_setup import STORM_HOUR, measured_hour, shipped
 from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.analysis.capsize.survival import controlled_run
@@ -247,11 +247,7 @@ TABLES: dict[str, Callable[[], Rows]] = {
 
 def main() -> None:
     """Print the tables that were asked for."""
-    parser = command_line(__doc__)
-    parser.add_argument("table", nargs="?", choices=TABLES, help="all if left out")
-    arguments = parser.parse_args()
-    wanted = [arguments.table] if arguments.table else list(TABLES)
-    show({name: TABLES[name]() for name in wanted}, arguments)
+    print_tables(__doc__, TABLES)
 
 
 if __name__ == "__main__":
