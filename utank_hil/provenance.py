@@ -77,8 +77,6 @@ def describe(
 
     Parameters
     ----------
-    command : str
-        Name of the command.
     configuration : BaseModel
         What it ran with, as loaded.
     folder : Path

@@ -180,26 +180,18 @@ def simulate_batch(
 ) -> BatchResult:
     """Simulate many ships on all cores; the result does not depend on the number of cores.
 
-    Models, initial states, seas and inputs are each given once for all ships, or once per ship.
+    Models, initial states, seas and inputs are each given once for all ships, or once per ship; the
+    rest, and the errors, are those of `simulate`.
 
     Parameters
     ----------
-    duration_s : float
-        A whole number of steps.
     initial : array_like, shape (4,) or (n, 4)
     wave : WaveMoment
         With arrays of shape (m,) or (n, m).
     pressure_pa, valve_loss_pa_per_m2_s2 : array_like, shape (), (k,) or (n, k)
         Samples, each held for `hold_s`, the last one to the end.
-    hold_s : float, optional
-        A whole number of steps; one step if not given.
     record_every : int, optional
         Steps between recorded states; nothing is recorded if not given.
-
-    Raises
-    ------
-    ValueError
-        If a duration is not a whole number of steps, or shapes do not match.
     """
     from utank_hil.dynamics import kernels
 

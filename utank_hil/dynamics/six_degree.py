@@ -224,10 +224,8 @@ def simulate_six_degree(
     initial : ndarray, shape (14,)
     pressure_pa, force : callable
         Functions of time in s; `force` is in body axes, shape (6,).
-    samples : int
-        Number of equally spaced output times, both ends included.
-    tolerance : float
-        Relative; the absolute one is a hundredth of it in SI units.
+    samples, tolerance
+        As in `simulate_reference`.
 
     Returns
     -------

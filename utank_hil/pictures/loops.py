@@ -83,13 +83,8 @@ def draw_nyquist(
     """Nyquist plot of the open-loop transfer functions, opened at the pump.
 
     Drawn as -L with the critical point -1, as for negative feedback. Inside the circle around it
-    the sensitivity is above `PEAK_SENSITIVITY`; a law that enters it is refused. Arguments as for
-    `draw_bode`.
-
-    Raises
-    ------
-    ValueError
-        If there are no laws, or more than there are colours.
+    the sensitivity is above `PEAK_SENSITIVITY`; a law that enters it is refused. Arguments and
+    errors as for `draw_bode`.
     """
     _check_number(loops)
     angle = np.linspace(0, 2 * np.pi, 361)

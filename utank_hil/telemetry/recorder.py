@@ -79,8 +79,6 @@ def record_ring(
 
     Parameters
     ----------
-    ring : str
-        Name of the ring.
     file : Path
         The `.rrd` file; overwritten.
     events : str, optional
@@ -153,8 +151,6 @@ class FrameRecording(Closing):
 
     Parameters
     ----------
-    ring : str
-        Its name.
     file : Path
         The recording beside which the log is written.
 

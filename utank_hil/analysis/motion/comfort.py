@@ -129,11 +129,7 @@ def apparent_gravity(
 ) -> tuple[FloatArray, FloatArray]:
     """Lateral and vertical apparent gravity, by the equation of the module docstring.
 
-    Parameters
-    ----------
-    roll_rad, roll_rate_rad_s : ndarray, shape (n,)
-    height_m, starboard_m : float
-        As for `comfort`.
+    Arguments as for `comfort`.
 
     Returns
     -------
