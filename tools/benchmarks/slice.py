@@ -13,41 +13,14 @@ from statistics import median
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
+from tools.timed_node import TimedNode
 from utank_hil.assembly import build_controller_node
-from utank_hil.canbus import Frame
 from utank_hil.compiled import in_use
 from utank_hil.configuration import load_config
 from utank_hil.runtime import Lockstep
-from utank_hil.runtime.controller_node import ControllerNode
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
 WARM_UP_S = 10
-
-
-class Timed:
-    """The controller node with its work measured."""
-
-    def __init__(self, node: ControllerNode) -> None:
-        self.name, self.period_ns = node.name, node.period_ns
-        self._node = node
-        self._heard_ns = 0
-        self.ticks_ns: list[int] = []
-        self.frames_ns: list[int] = []
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame, on the next tick's account."""
-        begin = time.perf_counter_ns()
-        self._node.receive(frame, now_ns)
-        self.frames_ns.append(time.perf_counter_ns() - begin)
-        self._heard_ns += self.frames_ns[-1]
-
-    def tick(self, now_ns: int) -> list[Frame]:
-        """Tick and note what this and the frames before it cost."""
-        begin = time.perf_counter_ns()
-        frames = list(self._node.tick(now_ns))
-        self.ticks_ns.append(time.perf_counter_ns() - begin + self._heard_ns)
-        self._heard_ns = 0
-        return frames
 
 
 def slice_speed(scenario: Scenario, seconds: int) -> float:
@@ -64,9 +37,8 @@ def slice_speed(scenario: Scenario, seconds: int) -> float:
 def controller_costs_us(scenario: Scenario, seconds: int) -> tuple[list[float], list[float]]:
     """Cost of each controller tick, the frames it heard before included, and of each frame."""
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
-    timed = Timed(
-        build_controller_node(next(iter(scenario.controllers.values())), commissioned=True)
-    )
+    node = build_controller_node(next(iter(scenario.controllers.values())), commissioned=True)
+    timed = TimedNode(node, time.perf_counter_ns)
     lockstep = Lockstep([*ship.nodes, timed])
     lockstep.run_until(WARM_UP_S * 10**9)
     timed.ticks_ns.clear()

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Final
@@ -23,13 +23,12 @@ import numpy as np
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
+from tools.timed_node import TimedNode
 from utank_hil.assembly import build_controller_node
-from utank_hil.canbus import Frame
 from utank_hil.commands.recording import RECORD_TICKS, RunRecording
 from utank_hil.configuration import load_config
 from utank_hil.provenance import describe
 from utank_hil.runtime import Lockstep
-from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.recording import read_recording, write_recording
@@ -84,38 +83,16 @@ def recording() -> dict[str, float]:
     return {"write_s": write_s, "read_s": read_s, "size_mb": size}
 
 
-class _Timed:
-    """A node whose ticks are timed, with the frames before each."""
-
-    def __init__(self, node: ControllerNode | NodeTap) -> None:
-        self.name, self.period_ns, self._node = node.name, node.period_ns, node
-        self._heard_ns = 0
-        self.ticks_ns: list[int] = []
-
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame."""
-        begin = time.thread_time_ns()
-        self._node.receive(frame, now_ns)
-        self._heard_ns += time.thread_time_ns() - begin
-
-    def tick(self, now_ns: int) -> Iterable[Frame]:
-        """Do one tick."""
-        begin = time.thread_time_ns()
-        frames = self._node.tick(now_ns)
-        self.ticks_ns.append(time.thread_time_ns() - begin + self._heard_ns)
-        self._heard_ns = 0
-        return frames
-
-
-def _slice(recording: RunRecording | None) -> tuple[Lockstep, _Timed]:
+def _slice(recording: RunRecording | None) -> tuple[Lockstep, TimedNode]:
     """The storm with the scenario's last law; with its telemetry taken, or without."""
     scenario = load_config(STORM, Scenario)
     config = list(scenario.controllers.values())[-1]
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
     sink = None if recording is None else recording.write
     node = build_controller_node(config, sink=sink, commissioned=True)
-    timed = _Timed(
-        node if recording is None else NodeTap(node, recording.write_records, every=RECORD_TICKS)
+    timed = TimedNode(
+        node if recording is None else NodeTap(node, recording.write_records, every=RECORD_TICKS),
+        time.thread_time_ns,
     )
     return Lockstep([*ship.nodes, timed]), timed
 
@@ -161,7 +138,7 @@ def loop(seconds: int) -> dict[str, dict[str, float]]:
     return found
 
 
-def _in_turns(pairs: Sequence[tuple[Lockstep, _Timed]], seconds: int) -> list[list[float]]:
+def _in_turns(pairs: Sequence[tuple[Lockstep, TimedNode]], seconds: int) -> list[list[float]]:
     """Costs of the ticks of each, in microseconds; the first of all warm up."""
     for turn in range(seconds + 1):
         for lockstep, timed in pairs:
