@@ -7,6 +7,7 @@ saturation makes these laws unstable (docs/controllers.md). A limited pump gets 
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -113,28 +114,20 @@ def law_factory(law: str, *, unlimited: bool) -> Callable[[], Controller]:
     brake, stiffness = level_brake(PATTI_B, 0.5), PATTI_B.ship.stiffness_nm_rad
     ranges = (np.pi / 6, np.pi / 6, 1.0, 1.0)  # (4.26)
     slow, fast = ErrorDynamics(0.59, 0.5, 2.5), ErrorDynamics(1.5, 0.7, 2.5)
+    linearization = partial(
+        FeedbackLinearization,
+        ship=PATTI_B.ship,
+        tank=PATTI_B.tank,
+        frequency_rad_s=0.59,
+        sample_time_s=SAMPLE_S,
+    )
     if law in ("no tank", "passive"):
         return lambda: PassiveController(sample_time_s=SAMPLE_S)
     if law == "feedback linearization (4.11)":  # without level brake, as printed
-        return FeedbackLinearization(
-            ship=PATTI_B.ship,
-            tank=PATTI_B.tank,
-            frequency_rad_s=0.59,
-            damping_ratio=1.0,
-            soft_level_m=1e3,
-            hard_level_m=2e3,
-            sample_time_s=SAMPLE_S,
-        ).controller
+        return linearization(damping_ratio=1.0, soft_level_m=1e3, hard_level_m=2e3).controller
     if law == "feedback linearization, level braked":
-        return FeedbackLinearization(
-            ship=PATTI_B.ship,
-            tank=PATTI_B.tank,
-            frequency_rad_s=0.59,
-            damping_ratio=0.5,
-            soft_level_m=1.7,
-            hard_level_m=1.98,
-            level_damping_ratio=0.4,
-            sample_time_s=SAMPLE_S,
+        return linearization(
+            damping_ratio=0.5, soft_level_m=1.7, hard_level_m=1.98, level_damping_ratio=0.4
         ).controller
     if law == "fuzzy (4.20)":
         return SmallGainFuzzy(
