@@ -57,25 +57,17 @@ def test_one_estimate_alone_is_no_change() -> None:
         assert (monitor.change > 1) == expected
 
 
-def test_a_change_is_forgotten_when_estimates_are_outdated() -> None:
+@pytest.mark.parametrize("how", ["estimates are outdated", "restart"])
+def test_a_change_is_forgotten(how: str) -> None:
     monitor = ChangeMonitor(DESIGNED)
     estimate = MotionEstimate(Verdict.GOOD, Verdict.GOOD, replace(FOUND, stiffness_nm_rad=9e8))
     monitor.watch(estimate)
     monitor.watch(estimate)
     assert monitor.change > 1.3
-    monitor.watch(MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED))
-    assert monitor.change == 1.0
-    monitor.watch(estimate)
-    assert monitor.change == 1.0
-
-
-def test_restart_takes_the_present_ship_for_the_laws_own() -> None:
-    monitor = ChangeMonitor(DESIGNED)
-    estimate = MotionEstimate(Verdict.GOOD, Verdict.GOOD, replace(FOUND, stiffness_nm_rad=9e8))
-    monitor.watch(estimate)
-    monitor.watch(estimate)
-    assert monitor.change > 1.3
-    monitor.restart()
+    if how == "restart":  # the present ship is then the law's own
+        monitor.restart()
+    else:
+        monitor.watch(MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED))
     assert monitor.change == 1.0
     monitor.watch(estimate)
     assert monitor.change == 1.0
