@@ -12,10 +12,11 @@ from PIL import Image
 from playwright.sync_api import Browser
 
 from tools.documents import screenshot
-from utank_hil.canbus.enumerations import Mode
+from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.commands.monitor import LOOKS
+from utank_hil.runtime.faults import fault_text
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.telemetry.blueprint import _PALETTE
+from utank_hil.telemetry.blueprint import _PALETTE, MOST_SHADES, WATCH_SHARES
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.scene import HULL, LIMIT, SEA, WATER
 from utank_hil.telemetry.viewer import open_viewer
@@ -133,3 +134,38 @@ def test_the_viewers_own_window_shows_the_watch(
     with Image.open(picture) as image:
         assert image.size == (width, height)
         shows_the_watch(np.asarray(image.convert("RGB")).astype(int))
+
+
+def words_seen(file: Path, ships: int, height: int) -> int:
+    """Pixels of bright text in the words of the watch, 1280 wide."""
+    picture = file.with_suffix(".png")
+    assert screenshot.main(str(file), str(picture), f"1280x{height}") == 0
+    top, bottom = 66, height - 32  # of the tab
+    above, below = np.cumsum(WATCH_SHARES[ships])[:2] / sum(WATCH_SHARES[ships])
+    rows = slice(*(round(top + part * (bottom - top)) + 4 for part in (above, below)))
+    with Image.open(picture) as image:
+        shown = np.asarray(image.convert("RGB"))[rows, : 640 if ships == 1 else 1280]
+    return int((shown.min(axis=-1) > 150).sum())
+
+
+@pytest.mark.parametrize("ships", [1, MOST_SHADES])
+def test_the_longest_words_of_faults_are_not_cut(
+    browser: Browser, tmp_path: Path, ships: int
+) -> None:
+    assert browser  # it brings the renderer
+    longest = sorted(Fault, key=lambda fault: len(fault_text(fault)))[-ships:]
+    runs = {}
+    for number, fault in enumerate(longest):
+        rows = np.zeros((40, len(SIGNALS)))
+        for name, values in (
+            ("time_s", np.arange(40) / 20),
+            ("mode", Mode.FAULT),
+            ("fault", fault),
+            ("roll_rms_rad", 0.1),
+            ("twin_roll_rms_rad", 0.2),
+        ):
+            rows[:, SIGNALS.index(name)] = values
+        runs[f"run {number}"] = rows
+    file = tmp_path / "faults.rrd"
+    write_recording(file, SIGNALS, runs, about={"configuration": {"vessel": VESSEL}})
+    assert words_seen(file, ships, 800) == pytest.approx(words_seen(file, ships, 1200), rel=0.01)

@@ -41,7 +41,8 @@ def main(source: str, picture: str, size: str = "1600x1000") -> int:
     try:
         client = _connected(viewer, port)
         path, before = Path(picture).absolute(), Path(f"{picture}.before").absolute()
-        path.unlink(missing_ok=True)
+        for left in (path, before):
+            left.unlink(missing_ok=True)
         while not (before.exists() and filecmp.cmp(path, before, shallow=False)):
             if path.exists():
                 path.replace(before)

@@ -27,6 +27,8 @@ from utank_hil.telemetry.viewer import TIMELINE
 HALF_WINDOW_S: Final = 60.0
 MOST_SHADES: Final = 4
 """In one plot; of several runs, so many ships are shown side by side."""
+WATCH_SHARES: Final = {1: (5, 4), MOST_SHADES: (5, 7, 4)}
+"""Heights of ships, words and plot, for one ship and for several: no remedy of a fault is cut."""
 
 _ROLL: Final = ("Roll, °", ("roll_rad", "twin_roll_rad", "true_roll_rad"))
 _LEVEL: Final = ("Tank level, m", ("port_level_m", "starboard_level_m", "true_level_m"))
@@ -183,13 +185,13 @@ def _watch(
             _plot(title, [field_of(name) for name in names], runs, range(1), axis)
             for title, names in WATCHED
         ]
-        ship = rrb.Vertical(*scenes, *words, row_shares=[3, 2])
+        ship = rrb.Vertical(*scenes, *words, row_shares=WATCH_SHARES[1])
         return rrb.Horizontal(ship, rrb.Vertical(*plots), column_shares=[1, 1], name="Watch")
     return rrb.Vertical(
         rrb.Horizontal(*scenes),
         rrb.Horizontal(*words),
         _plot(WATCHED[0][0], [field_of("roll_rad")], runs, range(len(shown)), axis),
-        row_shares=[4, 2, 4],
+        row_shares=WATCH_SHARES[MOST_SHADES],
         name="Watch",
     )
 

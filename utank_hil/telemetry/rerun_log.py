@@ -111,7 +111,7 @@ class RunLog:
         size = scene_size(columns, about)
         self._pictures: list[Scene | MotionFigures] = []
         if size is not None:
-            self._pictures.append(Scene(recording, path, columns, size, batch_s))
+            self._pictures.append(Scene(recording, path, columns, size, batch_s, beside[1] == 1))
         if set(NEEDED) <= set(columns):
             self._pictures.append(MotionFigures(recording, path, columns, color, batch_s, beside))
         self._path = path

@@ -154,6 +154,8 @@ class Scene:
     batch_s : float
         Pictures are sent when there are so many seconds of them, the last ones by `close`: a chunk
         of few costs a file more than its content.
+    alone : bool
+        Whether no other ship is shown beside, so that there is room for larger words.
     """
 
     def __init__(
@@ -163,8 +165,10 @@ class Scene:
         columns: Sequence[str],
         size: SceneSize,
         batch_s: float,
+        alone: bool,
     ) -> None:
         self._recording, self._path, self._size = recording, path, size
+        self._large = "#### " if alone else ""
         self._at = {name: columns.index(name) for name in columns}
         self._held: list[FloatArray] = []
         self._most_held = batch_s / PERIOD_S
@@ -258,16 +262,20 @@ class Scene:
         mode, fault = int(row[self._at["mode"]]), int(row[self._at["fault"]])
         lines = [f"# {Mode(mode).name if mode in set(Mode) else mode}"]
         if fault != Fault.NONE:
-            lines.append(f"## {fault_text(Fault(fault)) if fault in set(Fault) else fault}")
+            name, _, remedy = (
+                fault_text(Fault(fault)) if fault in set(Fault) else str(fault)
+            ).partition(": ")
+            lines += [f"## {name}", f"{self._large}{remedy}"]
         if "twin_roll_rms_rad" in self._at:
             roll, twin = (
                 np.degrees(row[self._at[name]]) for name in ("roll_rms_rad", "twin_roll_rms_rad")
             )
             if np.isfinite(roll + twin):
-                lines.append(f"Roll **{roll:.2f}°** RMS; without the pump **{twin:.2f}°**")
+                said = f"Roll **{roll:.2f}°** RMS; without the pump **{twin:.2f}°**"
                 share = 1 - roll / twin if twin > 0.05 else 0.0
                 if abs(share) >= 0.005:
-                    lines.append(f"**{abs(share):.0%} {'less' if share >= 0 else 'more'}**")
+                    said += f": **{abs(share):.0%} {'less' if share >= 0 else 'more'}**"
+                lines.append(said)
         return "\n\n".join(lines)
 
 
