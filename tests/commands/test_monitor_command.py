@@ -1,4 +1,4 @@
-"""What `utank-hil monitor` says where it can't show: a port in use, no display, no driver."""
+"""What `monitor` and `--view` say where they can't show: a port in use, no display, no driver."""
 
 import os
 import signal
@@ -6,13 +6,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
+from utank_hil.commands import run
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
@@ -36,17 +39,18 @@ def taken() -> Iterator[int]:
         yield other.getsockname()[1]
 
 
-def monitor(*arguments: str) -> str:
-    """What it says before it ends, refused."""
-    result = CliRunner().invoke(app, ["monitor", *arguments])
+def refused(*words: str) -> str:
+    """What a command says before it ends, refused."""
+    result = CliRunner().invoke(app, words)
     assert result.exit_code == ExitCode.USAGE
     assert isinstance(result.exception, SystemExit)  # no traceback
     return " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize("which", [0, 1], ids=["data", "page"])
+@pytest.mark.parametrize("command", ["monitor", "bench --duration 1 --view --json --out"])
 def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
-    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: int, which: int
+    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: int, which: int, command: str
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
@@ -54,9 +58,12 @@ def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
     ports = [free(), free()]
     ports[which] = taken
     monkeypatch.setattr(viewer, "free_tcp_port", lambda: ports.pop(0))
-    said = monitor(str(recording))
+    bench = command != "monitor"
+    said = refused(*command.split(), str(recording.parent if bench else recording))
     assert "the viewer failed" in said
-    assert "if a port was in use, start it again: it takes another" in said
+    shown = recording.parent / "bench.rrd" if bench else recording
+    assert f"if a port was in use, utank-hil monitor {shown} takes another" in said
+    assert shown.exists()  # not for the viewer to lose
 
 
 def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
@@ -65,8 +72,26 @@ def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
     monkeypatch.setattr(live, "free_tcp_port", lambda: taken)
     monkeypatch.setattr(os, "nice", lambda by: by)  # of the tests
     with RingWriter(SIGNALS):
-        said = monitor(str(os.getpid()))
+        said = refused("monitor", str(os.getpid()))
     assert f"port {taken} of this machine was taken; start it again: it takes another" in said
+
+
+def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], taken: int
+) -> None:
+    live_taken = f"from utank_hil.telemetry import live; live.free_tcp_port = lambda: {taken}; "
+    monkeypatch.setattr(run, "_COMMAND_LINE", live_taken + run._COMMAND_LINE)
+    started, popen = [], subprocess.Popen
+
+    def start(*words: Any, **options: Any) -> "subprocess.Popen[bytes]":
+        started.append(popen(*words, **options))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    with RingWriter(SIGNALS), ExitStack() as stack:
+        run._show(stack)  # and does not wait for it
+        assert started[0].wait() == ExitCode.USAGE
+    assert f"port {taken} of this machine was taken" in " ".join(capfd.readouterr().err.split())
 
 
 def test_where_no_window_can_be_the_page_and_the_remedy_are_named(recording: Path) -> None:

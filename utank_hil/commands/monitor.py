@@ -75,9 +75,12 @@ def watch(
             if not viewer.failed:
                 return
             if viewer.url is not None:
+                again = (
+                    f"utank-hil monitor {source}" if isinstance(source, Path) else "another start"
+                )
                 fail(
                     "the viewer failed; what it says is above; "
-                    "if a port was in use, start it again: it takes another"
+                    f"if a port was in use, {again} takes another"
                 )
             notes.print(
                 "[yellow]no window:[/yellow] the reason is above; a graphics driver for any "
