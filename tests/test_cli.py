@@ -21,6 +21,8 @@ from utank_hil.telemetry.recording import read_recording
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
 BIN = Path(sys.executable).parent
+RESULTS = ("out/bench.rrd", "out/gpc.frames")
+"""Of `utank-hil bench --frames`, for the examples."""
 PLAIN = {"TERM": "dumb", "COLUMNS": "200", "NO_COLOR": "1"}
 
 
@@ -56,8 +58,10 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
                         said(result).split("╭")[0])  # fmt: skip
     assert example, said(result)
     for word in example[1].split():
-        if word.startswith("configs/"):
+        if word.endswith(".yaml"):
             assert Path(word).is_file()
+        if word.endswith((".rrd", ".frames")):
+            assert word in RESULTS
         if word.startswith("--"):
             assert word in said(result).replace(example[0], "")
 

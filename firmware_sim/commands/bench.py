@@ -149,7 +149,7 @@ def bench(
             )
         for name, path in files.items():
             console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
-        lead_on(console, f"bench {shown(scenario)} --view", "run CONTROLLER.yaml --bus can0")
+        lead_on(console, f"monitor {shown(out)}", "run CONTROLLER.yaml --bus can0")
     if failures:
         fail("; ".join(failures))
     if view:

@@ -34,7 +34,7 @@ def compare(
 ) -> None:
     """Compare runs, recordings or campaigns with the first: differences with 95 % intervals.
 
-    **Example:** utank-hil compare out/before out/after
+    **Example:** utank-hil compare out out/seed7
 
     Where the waves are the same, values are compared pair by pair: cases of campaigns, and pieces
     of recordings of the same seed and sea.

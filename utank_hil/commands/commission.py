@@ -51,7 +51,7 @@ def commission(
     to 2 degrees. Stop and disarm act as always. What is wrong is named with its remedy. Without a
     record that it was passed, utank-hil run refuses to arm (docs/commissioning.md).
 
-    **Example:** utank-hil commission controller.yaml --bus can0
+    **Example:** utank-hil commission configs/controllers/gpc.yaml --bus can0
     """
     loaded = load(config, ControllerConfig)
     path = record or record_path(config)

@@ -40,7 +40,7 @@ def export(
 
     Signals have one row a tick, SI units, and the unit in each column's name.
 
-    **Example:** utank-hil export out/run-20261122T093000Z.frames --to storm.blf
+    **Example:** utank-hil export out/gpc.frames --to gpc.blf
     """
     kind = to.suffix.lower()
     if kind not in (*BUS_SUFFIXES, *TABLE_SUFFIXES):

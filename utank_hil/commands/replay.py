@@ -47,7 +47,7 @@ def replay(
     difference is printed with its tick, message and signal, and what may be its cause. 2: the log
     or an option is wrong.
 
-    **Example:** utank-hil replay out/run-20261122T093000Z.frames
+    **Example:** utank-hil replay out/gpc.frames
     """
     cut = ""
     try:
