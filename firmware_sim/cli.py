@@ -66,7 +66,7 @@ def firmware_sim(
         typer.Option(
             metavar="NODES",
             help="Emulated nodes to leave out, with hardware in their place: some of "
-            f"{','.join(NODE_NAMES)}.",
+            f"{', '.join(NODE_NAMES)}.",
         ),
     ] = "",
     json_: Json = False,

@@ -64,6 +64,8 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
             assert word in RESULTS
         if word.startswith("--"):
             assert word in said(result).replace(example[0], "")
+    narrow = CliRunner(env=PLAIN | {"COLUMNS": "80"}).invoke(application, [*words, "--help"])
+    assert "…" not in narrow.stdout  # cut
 
 
 @pytest.mark.slow
