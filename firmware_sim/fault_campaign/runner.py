@@ -116,8 +116,12 @@ def run_rows(
             time.sleep(POLL_S)
             failed = any(each.done() and each.exception() for each in futures)
             stop.value = stopped() or failed
+            if stop.value:  # a task that begins all the same first builds its setup
+                for future in futures:
+                    future.cancel()
             progress(done.value)
-        outcomes = [each for future in futures for each in future.result()]
+        ended = (future for future in futures if not future.cancelled())
+        outcomes = [each for future in ended for each in future.result()]
     found: dict[str, list[Outcome]] = {row.id: [] for row in rows}
     for each in sorted(outcomes, key=lambda each: seeds.index(each.seed)):
         found[each.row].append(each)

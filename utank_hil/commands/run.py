@@ -161,13 +161,15 @@ def run(
                 ended, None if duration is None else round(duration * 1e9)
             )
         manager.stopping()
-    if announcer is not None and announcer.error is not None:
-        notes.print(f"[red]events were not logged:[/red] {escape(announcer.error)}", soft_wrap=True)
     kept = None if out is None else recording.summary
-    if json_:
-        print_json(_as_json(node, statistics, kept, refused))
-    else:
-        _print_summary(loaded.name, node, statistics, kept)
+    with suppress(OSError):  # a full disk behind the output: the exit code tells how the run ended
+        if announcer is not None and announcer.error is not None:
+            said = escape(announcer.error)
+            notes.print(f"[red]events were not logged:[/red] {said}", soft_wrap=True)
+        if json_:
+            print_json(_as_json(node, statistics, kept, refused))
+        else:
+            _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))
 
 
