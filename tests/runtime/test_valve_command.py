@@ -29,8 +29,11 @@ from utank_hil.canbus import (
     ValveStatus,
 )
 from utank_hil.configuration import Vessel, load_config
+from utank_hil.control import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.dynamics.valves import Valve
+from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.valve_command import ValveCommander
 from utank_hil.tick import TICK_S
 
@@ -347,3 +350,18 @@ def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> Non
     valve_law(bench).answer_pa, valve_law(bench).loss = 0.0, math.nan
     bench.run(300)
     assert bench.node.law_error == "its answer is inf Pa"
+
+
+def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = ValveBench()
+    monitors = Monitors(DesignPlant(VESSEL.ship, TANK), 0.35, SensorFigures(), 250_000)
+    held: list[float] = []
+    monkeypatch.setattr(monitors, "update", lambda *_, held_pa, **__: held.append(held_pa) or 0)
+    bench.node.monitors = monitors
+    bench.opening, bench.moves = 0.2, False
+    monkeypatch.setattr(bench.node, "_estimate", lambda _: None)
+    bench.level.rate_m_s = 0.5
+    bench.tick()
+    commander = ValveCommander(DUCT, TANK, CATALOGUE, 0.05)
+    assert held == [commander.held_pa(bench.node.inbox, 0.5)]
+    assert held[0] > 0.0
