@@ -190,7 +190,8 @@ def test_a_recording_that_can_not_be_is_said_with_the_extra_and_the_controller_r
 def test_a_command_whose_extra_is_missing_names_it_and_shows_no_traceback(
     module: str, words: tuple[str, ...], package: str, tmp_path: Path
 ) -> None:
-    done = without_extras(module, *words)
+    (tmp_path / "x.rrd").touch()
+    done = without_extras(module, *(str(tmp_path / w) if w == "x.rrd" else w for w in words))
     assert done.returncode == ExitCode.USAGE
     told = done.stderr.splitlines()[0]
     extra = EXTRA_OF[package]

@@ -162,7 +162,7 @@ def test_a_full_disk_is_said_with_the_page_and_leaves_no_half_of_it(
     done = CliRunner().invoke(app, ["report", str(recording), "--out", "/dev/full"])
     assert done.exit_code == 2
     assert isinstance(done.exception, SystemExit)
-    assert "No space left on device: '/dev/full'" in done.output
+    assert "/dev/full: No space left on device" in done.output
     assert Path("/dev/full").exists()
 
     def half(path: Path, *_arguments: object, **_more: object) -> None:

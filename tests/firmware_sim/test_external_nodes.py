@@ -217,7 +217,13 @@ def test_a_valve_of_another_maker_throttles_the_emulated_tank() -> None:
     scenario = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
     ship = build_ship_side(scenario, 1, (TimedAction(2.0, Action.ARM),))
     losses: list[float] = []
-    ship.plant.set_valve_loss = losses.append  # type: ignore[method-assign]
+    throttle = ship.plant.set_valve_loss
+
+    def noted(loss: float) -> None:
+        losses.append(loss)
+        throttle(loss)
+
+    ship.plant.set_valve_loss = noted  # type: ignore[method-assign]
     foreign = ForeignValve("valve")
     foreign.versions = (load_catalogue().version, scenario.vessel.version)
     controller = build_controller_node(scenario.controllers["on_off"], commissioned=True)

@@ -32,6 +32,8 @@ from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
+VALVE_SIGN_GAIN: Final = -0.5
+"""The same behind a valve: one that holds back half as much again as configured makes it -0.38."""
 SETTLED: Final = 10.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
@@ -137,6 +139,7 @@ class TankEquation:
         valve: bool = False,
     ) -> None:
         self._least_share = (VALVE_SHARE if valve else LEAST_SHARE) ** 2
+        self._sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
         mass, _, stiffness = coupled_matrices(ship, tank)
         density = tank.density_kg_m3
         water_kg_m = density * tank.reservoir_area_m2
@@ -227,15 +230,15 @@ class TankEquation:
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
         if xx > self._least_xx and xx > share * pp:
             self.roll_gain = gain = self._rest_x / xx
-            if gain < SIGN_GAIN:
+            if gain < self._sign_gain:
                 found = _WATER_SIGN
         if pp > self._least_pp and pp > share * xx:
             self.pump_gain = gain = self._rest_p / pp
-            if gain < SIGN_GAIN:
+            if gain < self._sign_gain:
                 found |= _PUMP_SIGN
         if both > self._least_xx + self._least_pp:
             self.level_gain = gain = self._level_both / both
-            if gain < SIGN_GAIN:
+            if gain < self._sign_gain:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
