@@ -22,8 +22,11 @@ TOY = Part("toy", "python -m tools.thesis.derive_tank_forces --json", "nothing",
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of results of its own."""
-    monkeypatch.setattr(record, "FOLDER", tmp_path)
-    return tmp_path
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    monkeypatch.setattr(record, "FOLDER", folder)
+    monkeypatch.setattr(record, "PRINTED", tmp_path / "printed")
+    return folder
 
 
 def keep(part: Part, result: object) -> None:
@@ -42,7 +45,7 @@ def test_every_part_is_of_a_module_that_is_there_and_every_result_of_a_part() ->
 
 @pytest.mark.slow
 def test_a_part_may_be_a_command_of_the_product() -> None:
-    (part,) = (part for part in PARTS if "firmware_sim" in part.command)
+    part = next(part for part in PARTS if "firmware_sim" in part.command)
     assert record.sources(part)
 
 
@@ -99,12 +102,15 @@ def test_code_of_a_part_is_what_its_tool_imports_and_no_more() -> None:
         ("python -m tools.benchmarks.codec --nonsense", "exit code 2"),
     ],
 )
-def test_part_that_fails_keeps_what_was_there(folder: Path, command: str, reason: str) -> None:
+def test_part_that_fails_keeps_what_was_there_and_what_it_printed(
+    folder: Path, command: str, reason: str
+) -> None:
     part = replace(TOY, command=command)
     keep(part, "old")
     with pytest.raises(record.PartError, match=reason):
         record.run(part)
     assert [record.read(part)["result"], *folder.iterdir()] == ["old", record.file_of(part)]
+    assert (record.PRINTED / f"{part.name}.out").exists()
 
 
 @pytest.mark.slow

@@ -18,6 +18,8 @@ from tools.evidence.sources import ROOT, digest_of, imported
 from tools.mutation.targets import TARGETS
 
 FOLDER = ROOT / "docs" / "evidence"
+PRINTED = ROOT / ".cache" / "evidence"
+"""What parts printed that failed: it may be hours of work, and says why."""
 State = Literal["not run yet", "other command", "other code", "current"]
 Record = dict[str, Any]
 
@@ -96,12 +98,16 @@ def run(part: Part) -> Record:
     }
     done = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     made["seconds"] = round(time.monotonic() - begin, 1)
-    if done.returncode:
-        raise PartError(f"exit code {done.returncode} of: {part.command}")
+    wrong = f"exit code {done.returncode}" if done.returncode else ""
     try:
         made["result"] = json.loads(done.stdout)
     except ValueError as error:
-        raise PartError(f"printed no JSON object ({error}): {part.command}") from error
+        wrong = wrong or f"printed no JSON object ({error})"
+    if wrong:
+        PRINTED.mkdir(parents=True, exist_ok=True)
+        printed = PRINTED / f"{part.name}.out"
+        printed.write_text(done.stdout, encoding="utf-8")
+        raise PartError(f"{wrong}: {part.command}; what it printed is in {printed}")
     _write(file_of(part), made)
     return made
 
