@@ -333,6 +333,24 @@ def february_hours(result: dict[str, Any]) -> Rows:
     return rows
 
 
+def fault_times(result: dict[str, Any]) -> Rows:
+    """When each fault was found and the pump at zero, a row a fault."""
+    times = ("found_ms", "limit_ms", "zero_ms", "zero_limit_ms")
+    return [
+        ["row", "found, ms", "limit", "zero, ms", "limit",
+         "roll variance over the passive ship's", "called"],
+        *(
+            [
+                f"`{row['id']}`",
+                *(number(row[name], ".0f") for name in times),
+                number(row["roll_ratio"], ".2f"),
+                " ".join(row["codes"]),
+            ]
+            for row in result["rows"]
+        ),
+    ]  # fmt: skip
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -346,6 +364,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "voyage stages": ("renewed_voyage", voyage_stages),
     "stiffness by loading": ("sea_estimates", stiffness_by_loading),
     "february hours": ("february_hours", february_hours),
+    "fault times": ("fault_campaign", fault_times),
     "shipped scenarios": ("shipped_scenarios", scenarios),
     "errata terms": ("thesis_derivation", errata_terms),
     "thesis figures": ("thesis_figures", thesis_figures),

@@ -127,14 +127,20 @@ PARTS = (
     Part(
         "false_alarms",
         "python -m tools.studies.false_alarms --hours 50 --json",
-        "how often the monitors would cry wolf: every law, calm to storm, voyages and retuning",
+        "rate of false alarms of the monitors: every law, calm to storm, voyages and retuning",
         1200,
     ),
     Part(
         "fault_campaign",
         "python -m firmware_sim.commands.faults --seeds 100 --json",
-        "every fault of the table in a hundred seas: found in time, zero in time, roll",
-        60,
+        "every fault of the table in a hundred seas: found in time, zero in time",
+        20,
+    ),
+    Part(
+        "fault_campaign_roll",
+        "python -m firmware_sim.commands.faults --seeds 10 --full --json",
+        "every fault of the table in ten seas, with those that take minutes: roll over 600 s",
+        20,
     ),
     Part(
         "monitor_margins",

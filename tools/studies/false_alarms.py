@@ -1,4 +1,4 @@
-"""How often the monitors would cry wolf: every shipped law in calm, ordinary and storm seas.
+"""Rate of false alarms of the monitors: every shipped law in calm, ordinary and storm seas.
 
     python -m tools.studies.false_alarms [--hours 50] [--json]
 
