@@ -23,6 +23,8 @@ OPTIONS = (
     ),  # no graphics card
 )
 DESK, WIDE, PHONE = 1280, 1920, 390
+PATIENCE_MS = 120_000
+"""A page that is drawn without a graphics card, beside other tests, is slow."""
 A4_PX = 680
 """Width between margins of 15 mm, at 96 pixels an inch."""
 
@@ -106,6 +108,7 @@ def launched() -> Iterator[Browser]:
 def opened(browser: Browser, url: str, width: int, height: int = 900) -> Iterator[Opened]:
     """A page in a window of its own."""
     page = browser.new_page(viewport={"width": width, "height": height})
+    page.set_default_timeout(PATIENCE_MS)
     seen = Opened(page)
     page.on("request", lambda request: seen.asked.append(request.url))
     page.on("pageerror", lambda error: seen.complaints.append(str(error)))

@@ -91,7 +91,7 @@ def shows_the_watch(image: np.ndarray) -> None:
     assert of_color(top, BACKGROUND, 12).mean() > 0.8  # the colours are for a dark ground
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def shown(browser: Browser, recording: Path) -> Iterator[Opened]:
     """The page of the recording, once Rerun has drawn it."""
     with pytest.MonkeyPatch.context() as patch:
@@ -99,7 +99,7 @@ def shown(browser: Browser, recording: Path) -> Iterator[Opened]:
             patch.delenv(name, raising=False)
         viewer = open_viewer(recording)
     with viewer, opened(browser, f"{viewer.url}{LOOKS}", *SIZES[0]) as seen:
-        seen.page.locator("canvas.visible").wait_for(timeout=120_000)
+        seen.page.locator("canvas.visible").wait_for()
         yield seen
 
 
