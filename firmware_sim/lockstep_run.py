@@ -5,7 +5,6 @@ from typing import Final
 from firmware_sim.faulty_bench import FaultyBench, Tap
 from firmware_sim.run import (
     RECORD_NS,
-    RECORD_TICKS,
     SECOND_NS,
     Job,
     Run,
@@ -23,7 +22,7 @@ from utank_hil.assembly import works_of
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime import Lockstep, SimulatedBus
 from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 from utank_hil.tick import TICK_NS
@@ -55,12 +54,12 @@ def run_lockstep(job: Job, watch: Watch | None = None) -> Run:
 
 def _run_with_faults(job: Job, watch: Watch | None, desks: Tapped, tapped: Tap) -> Run:
     """A run in which the scenario's faults happen."""
-    log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+    log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
     bench = FaultyBench(
         job.scenario, job.controller, job.law, seed=job.seed, script=job.script, sink=log.write,
-        sink_every=RECORD_TICKS, retuner=desks.retuner, estimating=desks.estimating, tapped=tapped,
+        sink_every=ROW_TICKS, retuner=desks.retuner, estimating=desks.estimating, tapped=tapped,
     )  # fmt: skip
-    truth_log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    truth_log = MemoryLog(len(TRUTH), -(-job.ticks // ROW_TICKS))
     truth = TruthRecorder(bench.ship.plant, truth_log, RECORD_NS)
     bench.place(job.scenario.faults)
     bench.join([truth])

@@ -25,7 +25,7 @@ from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime import LoopStatistics, SchedulingReport
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
@@ -34,9 +34,7 @@ from utank_hil.telemetry.ring import RingWriter
 from utank_hil.tick import TICK_NS
 
 SECOND_NS: Final = 1_000_000_000
-RECORD_TICKS: Final = 5
-"""Of the controller's ticks, every fifth is kept: 20 Hz, ample for a ship."""
-RECORD_NS: Final = RECORD_TICKS * TICK_NS
+RECORD_NS: Final = ROW_TICKS * TICK_NS
 RECORD_S: Final = RECORD_NS / SECOND_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 
@@ -170,7 +168,7 @@ def roll_without_tank(scenario: Scenario, seed: int, count: int) -> tuple[FloatA
 def ship_of(job: Job) -> tuple[ShipSide, TruthRecorder, MemoryLog]:
     """The ship's side of a run, and what records the truth."""
     ship = build_ship_side(job.scenario, job.seed, job.script)
-    log = MemoryLog(len(TRUTH), -(-job.ticks // RECORD_TICKS))
+    log = MemoryLog(len(TRUTH), -(-job.ticks // ROW_TICKS))
     return ship, TruthRecorder(ship.plant, log, RECORD_NS), log
 
 
@@ -181,7 +179,7 @@ def controller_of(
     ring: RingWriter | None = None,
 ) -> tuple[ControllerNode, MemoryLog]:
     """The controller of a run, and its rows; a ring gets them too."""
-    log = MemoryLog(len(SIGNALS), -(-job.ticks // RECORD_TICKS))
+    log = MemoryLog(len(SIGNALS), -(-job.ticks // ROW_TICKS))
 
     def shown(row: FloatArray) -> None:
         log.write(row)
@@ -195,7 +193,7 @@ def controller_of(
         estimating=desks.estimating,
         statistics=statistics,
         sink=shown,
-        sink_every=RECORD_TICKS,
+        sink_every=ROW_TICKS,
         commissioned=True,
     )
     return node, log

@@ -12,7 +12,7 @@ from firmware_sim.bench import run_in_turn
 from firmware_sim.figures import LEAST_ROLL_RAD, figures
 from firmware_sim.plant import Plant
 from firmware_sim.report_tables import NO_TANK
-from firmware_sim.run import RECORD_S, RECORD_TICKS, roll_without_tank
+from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
@@ -29,6 +29,7 @@ from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.control.interface import PRESSURE
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES
+from utank_hil.runtime.signals import ROW_TICKS
 from utank_hil.tick import TICK_NS, TICK_S
 
 Row = dict[str, str | float]
@@ -171,8 +172,8 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
         at_rest,
         at_rest,
     )
-    passive = passive_motion(ship, tank, moment, TICK_S, count * RECORD_TICKS)
-    shown = slice(None, None, RECORD_TICKS)
+    passive = passive_motion(ship, tank, moment, TICK_S, count * ROW_TICKS)
+    shown = slice(None, None, ROW_TICKS)
     yield _Record(PASSIVE, passive[shown, 0], passive[shown, _LEVEL], at_rest, at_rest)
     errors = scenario.sensors
     noise = SensorNoise(
@@ -219,10 +220,10 @@ def _sailed(name: str, scenario: Scenario, seed: int, command: Callable[[Plant],
     )
     count = round(scenario.duration_s / RECORD_S)
     rows = np.empty((count, 4))
-    for tick in range(count * RECORD_TICKS):
+    for tick in range(count * ROW_TICKS):
         plant.advance(tick * TICK_NS)
-        if tick % RECORD_TICKS == 0:
-            rows[tick // RECORD_TICKS] = (
+        if tick % ROW_TICKS == 0:
+            rows[tick // ROW_TICKS] = (
                 plant.roll_rad, plant.level_m, plant.pressure_pa, plant.pump_power_w
             )  # fmt: skip
         plant.drive_pump(command(plant), enabled=True)

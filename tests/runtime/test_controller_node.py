@@ -200,7 +200,8 @@ def test_telemetry_tells_what_was_heard_commanded_and_decided() -> None:
     assert row["mode"] == Mode.ACTIVE
     assert row["fault"] == Fault.NONE
     assert row["bus_load"] > 0
-    assert (row["wakeup_lateness_s"], row["tick_duration_s"]) == pytest.approx((2e-3, 3e-4))
+    assert bench.column("wakeup_lateness_s")[0] == pytest.approx(2e-3)
+    assert bench.column("tick_duration_s")[0] == pytest.approx(3e-4)
     assert (row["overruns"], row["retuning"]) == (4, RetuningState.IDLE)
     assert len(bench.rows) == round(bench.ms / 10)
     np.testing.assert_allclose(np.diff(bench.column("time_s")), 0.01, atol=1e-9)
@@ -582,6 +583,14 @@ def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("every", [1, 4])
 def test_telemetry_has_a_row_of_so_many_ticks(every: int) -> None:
-    bench = ControllerBench(START_NS, sink_every=every)
-    bench.run(200)
+    statistics = LoopStatistics()
+    bench = ControllerBench(START_NS, statistics=statistics, sink_every=every)
+    for tick in range(20):
+        statistics.lateness.add(1000 * (20 - tick))  # the longest is never the latest of a row
+        statistics.duration.add(1000 if tick % every else 5000)
+        bench.run(10)
     assert np.diff(bench.column("time_s")) == pytest.approx([every * 0.01] * (20 // every - 1))
+    # in each row the longest since the last one
+    longest_us = [20, *range(19, 0, -every)][: 20 // every]
+    assert 1e6 * bench.column("wakeup_lateness_s") == pytest.approx(longest_us)
+    assert 1e6 * bench.column("tick_duration_s") == pytest.approx(5.0)

@@ -26,10 +26,13 @@ def test_percentile_is_never_below_the_true_one_and_at_most_a_32nd_above(values,
 
 
 @given(durations)
-def test_nothing_is_lost_and_maximum_and_latest_are_exact(values):
+def test_nothing_is_lost_and_the_longest_of_all_and_of_late_are_exact(values):
     histogram = histogram_of(values)
     assert histogram.counts.sum() == len(values)
-    assert (histogram.max_ns, histogram.last_s) == (max(values), values[-1] * 1e-9)
+    assert histogram.recent_ns == histogram.max_ns == max(values)
+    histogram.recent_ns = 0
+    histogram.add(values[0])
+    assert (histogram.max_ns, histogram.recent_s) == (max(values), values[0] * 1e-9)
 
 
 def test_values_below_32_are_exact_and_bins_have_no_gaps():

@@ -25,11 +25,11 @@ from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from tools.timed_node import TimedNode
 from utank_hil.assembly import build_controller_node
-from utank_hil.commands.recording import RECORD_TICKS, RunRecording
+from utank_hil.commands.recording import RunRecording
 from utank_hil.configuration import load_config
 from utank_hil.provenance import describe
 from utank_hil.runtime import Lockstep
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.recording import read_recording, write_recording
 from utank_hil.telemetry.ring import RingReader, RingWriter
@@ -89,9 +89,9 @@ def _slice(recording: RunRecording | None) -> tuple[Lockstep, TimedNode]:
     config = list(scenario.controllers.values())[-1]
     ship = build_ship_side(scenario, scenario.seed, scenario.operator)
     sink = None if recording is None else recording.write
-    node = build_controller_node(config, sink=sink, commissioned=True)
+    node = build_controller_node(config, sink=sink, sink_every=ROW_TICKS, commissioned=True)
     timed = TimedNode(
-        node if recording is None else NodeTap(node, recording.write_records, every=RECORD_TICKS),
+        node if recording is None else NodeTap(node, recording.write_records, every=ROW_TICKS),
         time.thread_time_ns,
     )
     return Lockstep([*ship.nodes, timed]), timed

@@ -20,10 +20,7 @@ NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
 """A recording goes on in another file after so long: 60 MB."""
-RECORD_TICKS: Final = 5
-"""Ticks whose rows and frames leave together: a controller that is killed loses them."""
 RING_SLOTS: Final = 1640  # 82 s: a recorder that sleeps less loses nothing
-_WAITING_BYTES: Final = RECORD_TICKS * len(SIGNALS) * 8
 
 
 @dataclass(slots=True)
@@ -88,12 +85,11 @@ class RunRecording:
         keep_bytes: int | None = None,
     ) -> None:
         self.summary = RecordingSummary()
-        self._waiting = bytearray()
         self._ring: RingWriter | None = None
         self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
         try:
-            self._ring = RingWriter(SIGNALS, RING_SLOTS, about=about, rows=RECORD_TICKS)
+            self._ring = RingWriter(SIGNALS, RING_SLOTS, about=about)
         except OSError as error:
             self.summary.error = str(error)
             return
@@ -132,14 +128,8 @@ class RunRecording:
 
     def write(self, row: FloatArray) -> None:
         """Take one row of telemetry; never waits."""
-        self._waiting += row.tobytes()
-        if len(self._waiting) == _WAITING_BYTES:
-            self._hand_on()
-
-    def _hand_on(self) -> None:
-        if self._ring is not None and self._waiting:
-            self._ring.write(self._waiting)
-        self._waiting.clear()
+        if self._ring is not None:
+            self._ring.write(row)
 
     @property
     def recorder_pid(self) -> int | None:
@@ -157,11 +147,10 @@ class RunRecording:
             self._records.write(records)
 
     def stop(self) -> None:
-        """Have the last rows written and the summary completed; idempotent."""
+        """Have the summary completed; idempotent."""
         records, self._records = self._records, None
         if records is not None:
             records.close()  # before the other, whose end is what ends the recorder
-        self._hand_on()
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()

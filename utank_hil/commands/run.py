@@ -33,7 +33,7 @@ from utank_hil.commands.common import (
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
-from utank_hil.commands.recording import RECORD_TICKS, RecordingSummary, RunRecording
+from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.commands.tables import print_table
@@ -52,6 +52,7 @@ from utank_hil.runtime import (
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
+from utank_hil.runtime.signals import ROW_TICKS
 from utank_hil.telemetry.event_ring import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
@@ -139,12 +140,13 @@ def run(
             estimating=desks.estimating,
             statistics=statistics,
             sink=recording.write,
+            sink_every=ROW_TICKS,
             event_sink=announce,
             commissioned=commissioned,
         )
         on_bus: Node = node
         if recording.keeps_records:
-            on_bus = NodeTap(node, recording.write_records, desks.taps, RECORD_TICKS)
+            on_bus = NodeTap(node, recording.write_records, desks.taps, ROW_TICKS)
 
         def ended() -> bool:
             manager.progress(statistics.ticks)

@@ -547,4 +547,5 @@ class ControllerNode:
                 self._all_due = False
                 put_slow(self._row, self)
             self._sink(self._row)
+            self.statistics.begin_row()
         self._ticks_to_row -= 1

@@ -18,8 +18,8 @@ _SOURCES: Final = {
     "valve_opening": "inbox.valve_opening",
     "mode": "supervisor.mode",
     "fault": "fault",
-    "wakeup_lateness_s": "statistics.lateness.last_s",
-    "tick_duration_s": "statistics.duration.last_s",
+    "wakeup_lateness_s": "statistics.lateness.recent_s",
+    "tick_duration_s": "statistics.duration.recent_s",
     "twin_roll_rad": "twin_roll_rad",
     "bus_load": "seen.bus_load",
     "overruns": "statistics.overruns",
@@ -43,6 +43,9 @@ _SOURCES: Final = {
 
 A new signal is one line here. Its unit gives it its plot, see `utank_hil.telemetry.units`.
 """
+
+ROW_TICKS: Final = 5
+"""Of the controller's ticks, every fifth has a row: 20 Hz, ample for a ship."""
 
 SIGNALS: Final = tuple(_SOURCES)
 """Columns of a telemetry row."""

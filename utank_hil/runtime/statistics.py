@@ -39,25 +39,30 @@ class Histogram:
     ----------
     counts : ndarray of int64, shape (bins,)
         Durations in each bin.
-    last_s : float
-        Latest duration; 0 if there is none.
+    recent_ns : int
+        Longest duration since it was last set to zero.
     max_ns : int
         Longest duration; 0 if there is none.
     """
 
-    __slots__ = ("counts", "last_s", "max_ns")
+    __slots__ = ("counts", "max_ns", "recent_ns")
 
     def __init__(self) -> None:
         self.counts: npt.NDArray[np.int64] = np.zeros(_BINS, dtype=np.int64)
-        self.last_s = 0.0
-        self.max_ns = 0
+        self.max_ns = self.recent_ns = 0
 
     def add(self, value_ns: int) -> None:
         """Count one duration, 0 ns or more."""
         self.counts[_bin_of(value_ns)] += 1
-        self.last_s = value_ns * 1e-9
-        if value_ns > self.max_ns:
-            self.max_ns = value_ns
+        if value_ns > self.recent_ns:
+            self.recent_ns = value_ns
+            if value_ns > self.max_ns:
+                self.max_ns = value_ns
+
+    @property
+    def recent_s(self) -> float:
+        """`recent_ns` in seconds."""
+        return self.recent_ns * 1e-9
 
     def percentile_ns(self, fraction: float) -> int:
         """Return the quantile for a fraction of 0 to 1; 0 if nothing was counted."""
@@ -113,6 +118,10 @@ class LoopStatistics:
     send_errors: int = 0
     receive_errors: int = 0
     real_time: bool = False
+
+    def begin_row(self) -> None:
+        """Look at the ticks from here on for the next row of telemetry."""
+        self.lateness.recent_ns = self.duration.recent_ns = 0
 
     def summary(self) -> dict[str, Any]:
         """Return every counter and the summaries of both histograms, ready for JSON."""
