@@ -60,11 +60,16 @@ def test_its_commands_give_its_figures(tmp_path: Path, monkeypatch: pytest.Monke
     walk(PAGE, tmp_path, slow=True)
     printed = [table_rows(block.text) for block in BLOCKS if "│" in block.text]
     assert [len(table) for table in printed] == [3, 3]
+    page = " ".join(PAGE.read_text(encoding="utf-8").split())
     for folder, table in zip(("out", "narrow"), printed, strict=True):
         report = json.loads((tmp_path / "patrol" / folder / "bench.json").read_text())
         rolls = {run["name"]: math.degrees(run["roll"]["rms_rad"]) for run in report["runs"]}
         rolls["no tank"] = math.degrees(report["no_tank"]["rms_rad"])
         assert {name: round(roll, 2) for name, roll in rolls.items()} == table
+        passive, active = report["runs"]
+        assert f"tank takes {100 * passive['roll_below_no_tank']:.1f} % of the roll" in page
+        if folder == "out":
+            assert f"the pump {100 * active['roll_below_passive']:.1f} % of the rest" in page
     watched, faulty = shown
     assert watched[0] == "patrol/out/bench.rrd"
     assert faulty == ("patrol/faulty/bench.rrd", pytest.approx(100.4, abs=0.06))
