@@ -7,7 +7,17 @@ from controller_bench import CATALOGUE, ControllerBench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus import Alarm, AlarmState, DriveFault, Fault, Frame, Mode, Switch
+from utank_hil.canbus import (
+    Alarm,
+    AlarmState,
+    DriveFault,
+    DriveStatus1,
+    Fault,
+    Frame,
+    Mode,
+    SensorMotion,
+    Switch,
+)
 from utank_hil.runtime.alarms import GONE_NS, AlarmEvent, AlarmList
 
 SECOND_NS = 1_000_000_000
@@ -165,6 +175,25 @@ def test_a_quiet_start_alarms_of_nothing_and_a_long_wait_of_what_is_missing() ->
     assert codes(bench) == {Fault.NONE}
     bench.run(1000)
     assert codes(bench) == {Fault.TANK_SILENT}
+
+
+def test_while_it_waits_for_one_thing_what_is_dangerous_alarms_all_the_same() -> None:
+    bench = ControllerBench()
+    bench.silent.add(SensorMotion)
+    bench.run(10_500)
+    assert bench.node.mode is Mode.INIT
+    assert codes(bench) == {Fault.MOTION_SILENT}
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.drive_fault = DriveFault.OVERCURRENT
+    bench.run(300)
+    assert codes(bench) == {Fault.MOTION_SILENT, HIGH, Fault.DRIVE_FAULT}
+
+
+def test_of_several_things_that_are_awaited_one_alarms() -> None:
+    bench = ControllerBench()
+    bench.silent = {SensorMotion, DriveStatus1}
+    bench.run(10_500)
+    assert codes(bench) == {Fault.MOTION_SILENT}
 
 
 def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted() -> None:

@@ -149,12 +149,12 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
-    what cuts it at once counts wherever the controller is ready. While it is not, in INIT, what
-    ends PASSIVE, too, and the reason count; the reason counts where arming was refused, too.
+    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. The
+    reason counts where arming was refused, too.
     """
     mode, limits = supervisor.mode, supervisor.limits
     if mode is Mode.INIT:
-        found = judging.all_ending_passive(seen, limits)
+        found = judging.all_stopping_unawaited(seen, limits)
     elif mode in (Mode.ACTIVE, Mode.FAULT):
         found = judging.all_harming(seen, limits)
     else:

@@ -56,8 +56,7 @@ class Condition:
     findings : Finding
         Those of the monitors any of which is this condition, if it is one of theirs.
     ends_passive : bool
-        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled, and it is an alarm
-        in INIT.
+        With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled.
     """
 
     reaction: Reaction

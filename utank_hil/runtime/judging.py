@@ -57,8 +57,7 @@ _AWAITED: Final = sorted(
 )
 
 first_stopping: Final = _first_of(_STOPPING)
-_ENDING_PASSIVE: Final = tuple(coded for coded in _STOPPING if coded[1].ends_passive)
-first_ending_passive: Final = _first_of(_ENDING_PASSIVE)
+first_ending_passive: Final = _first_of(tuple(c for c in _STOPPING if c[1].ends_passive))
 first_ending: Final = _first_of(_ENDING)
 soonest_ramp: Final = _first_of(
     tuple(sorted(_with(Reaction.RAMP), key=lambda coded: coded[1].zero_within_ms))
@@ -70,6 +69,6 @@ first_giving_up: Final = _first_of(_with(Reaction.GIVE_UP))
 first_halving: Final = _first_of(_with(Reaction.HALVE))
 first_awaited: Final = _first_of(tuple(_AWAITED))
 all_stopping: Final = _all_of(_STOPPING)
-all_ending_passive: Final = _all_of(_ENDING_PASSIVE)
+all_stopping_unawaited: Final = _all_of(tuple(c for c in _STOPPING if c[1].awaited is None))
 all_warning: Final = _all_of(_with(Reaction.WARN))
 all_harming: Final = _all_of(_ENDING + _with(Reaction.HALVE))
