@@ -2,11 +2,9 @@
 
 import math
 import multiprocessing
-import signal
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnContext
 from pathlib import Path
@@ -17,6 +15,7 @@ from firmware_sim.real_time_run import join, run_controller, run_in_one_process,
 from firmware_sim.run import RECORD_S, Job, Run, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
+from firmware_sim.worker_pool import WorkerPool, shared
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
@@ -150,29 +149,8 @@ class _Watch:
         return int(board.begin_ns.value)
 
 
-# what the processes of the pool inherit: shared values can't be sent along with a job
-_boards: list[_Board] = []
-
-
-def _prepare(board: _Board) -> None:
-    # Ctrl-C reaches the whole process group; the parent alone decides what it means
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    _boards[:] = [board]
-
-
-@contextmanager
-def interrupts_waiting() -> Iterator[None]:
-    """Let processes start with Ctrl-C held back: it must not end them while they import."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _call(function: Callable[..., Any], index: int, *arguments: object) -> Any:
-    return function(*arguments, _Watch(_boards[0], index))
+    return function(*arguments, _Watch(shared(), index))
 
 
 def jobs_of(
@@ -229,13 +207,10 @@ def run_bench(
     if options.frames is not None:
         jobs = [replace(job, frames=options.frames / frames_name(job.name)) for job in jobs]
     started = time.monotonic()
-    context = multiprocessing.get_context("spawn")
     workers = 2 if options.channel is not None or not options.real_time else 1
     with stop_on_signals() as stopped:
-        board = _Board(context, len(jobs))
-        with ProcessPoolExecutor(
-            workers, mp_context=context, initializer=_prepare, initargs=(board,)
-        ) as pool:
+        board = _Board(multiprocessing.get_context("spawn"), len(jobs))
+        with WorkerPool(workers, board) as pool:
             runs = list(_run_all(pool, jobs, options, board, stopped, progress))
         interrupted = stopped()
     if not runs or len(runs[0].rows) == 0:
@@ -303,7 +278,7 @@ def window_s(runs: tuple[Run, ...], settle_s: float) -> tuple[float, float]:
 
 
 def _run_all(
-    pool: ProcessPoolExecutor,
+    pool: WorkerPool,
     jobs: list[Job],
     options: BenchOptions,
     board: _Board,
@@ -311,8 +286,7 @@ def _run_all(
     progress: Progress,
 ) -> Iterable[Run]:
     def start(function: Callable[..., Any], index: int, *arguments: object) -> Future[Any]:
-        with interrupts_waiting():
-            return pool.submit(_call, function, index, *arguments)
+        return pool.submit(_call, function, index, *arguments)
 
     def wait(futures: list[Future[Any]]) -> list[Any]:
         while not all(future.done() for future in futures):

@@ -108,6 +108,7 @@ def test_unit_is_in_step_with_the_program() -> None:
     assert value("Type") == "notify"
     assert value("Restart") == "on-failure"
     assert value("RestartPreventExitStatus") == str(int(ExitCode.USAGE))
+    assert value("SuccessExitStatus") == str(int(ExitCode.INTERRUPTED))
     assert int(value("LimitRTPRIO")) >= PRIORITY
     assert value("LimitMEMLOCK") == "infinity"
     assert value("CapabilityBoundingSet") == value("AmbientCapabilities") == ""

@@ -4,7 +4,7 @@ A command's module is imported when the command is named, so ``run`` starts with
 package beside this one adds commands of its own.
 """
 
-from utank_hil.commands.interruptible import quietly_interruptible
+from utank_hil.commands.interruptible import end_as_by_ctrl_c, quietly_interruptible
 
 with quietly_interruptible():
     from functools import cache
@@ -59,5 +59,6 @@ def _utank_hil(version: Version = False) -> None:
 
 def main() -> None:
     """Run the command line."""
+    end_as_by_ctrl_c()
     with failures_named():
         app()

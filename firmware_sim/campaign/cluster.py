@@ -10,8 +10,8 @@ from typing import Final
 import dask
 from distributed import Client, LocalCluster, Status
 
-from firmware_sim.bench import interrupts_waiting
 from utank_hil.one_thread import one_thread_each
+from utank_hil.runtime.stopping import signals_waiting
 
 LOOPBACK: Final = "127.0.0.1"
 MOST_DEATHS: Final = 10
@@ -49,7 +49,7 @@ def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
     }
     resource_tracker.ensure_running()  # its start would let Ctrl-C through again
     with one_thread_each(), dask.config.set(settings):
-        with interrupts_waiting():  # Ctrl-C reaches all of the process group: the driver decides
+        with signals_waiting():  # Ctrl-C reaches all of the process group: the driver decides
             cluster = LocalCluster(
                 n_workers=count or len(os.sched_getaffinity(0)),
                 threads_per_worker=1,

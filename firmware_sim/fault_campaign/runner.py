@@ -2,17 +2,18 @@
 
 import multiprocessing
 import os
-import signal
 import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.sharedctypes import Synchronized
 from typing import Any, Final
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window
+from firmware_sim.worker_pool import WorkerPool, shared
 from utank_hil.assembly import build_law
 from utank_hil.control import BuiltLaw
 
@@ -35,35 +36,29 @@ class _Shared:
     stop: Any  # a plain value without a lock
 
 
-_shared: list[_Shared] = []
 _laws: dict[str, BuiltLaw] = {}
-
-
-def _prepare(shared: _Shared) -> None:
-    # Ctrl-C reaches the whole process group; the parent alone decides what it means
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _shared[:] = [shared]
 
 
 def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcome]:
     """Rows of one setup in one sea, in a process of the pool."""
-    shared = _shared[0]
-    setup = shared.campaign.setups[setup_name]
+    ours: _Shared = shared()
+    setup = ours.campaign.setups[setup_name]
     if setup_name not in _laws:
         _laws[setup_name] = build_law(setup.config)
-    recorded = shared.recorded and first
-    sea = Sea(shared.campaign, setup, _laws[setup_name], seed, shared.window, recorded=recorded)
-    sea.prepare(rows)
+    sea = Sea(
+        ours.campaign, setup, _laws[setup_name], seed, ours.window,
+        recorded=ours.recorded and first, stopped=lambda: bool(ours.stop.value),
+    )  # fmt: skip
     outcomes = []
-    for row in rows:
-        if shared.stop.value:
-            break
-        try:
-            outcomes.append(sea.outcome(row))
-        except RuntimeError as error:
-            outcomes.append(Outcome(row.id, seed, error=str(error).strip().splitlines()[-1]))
-        with shared.done.get_lock():
-            shared.done.value += 1
+    with suppress(InterruptedError):
+        sea.prepare(rows)
+        for row in rows:
+            try:
+                outcomes.append(sea.outcome(row))
+            except RuntimeError as error:
+                outcomes.append(Outcome(row.id, seed, error=str(error).strip().splitlines()[-1]))
+            with ours.done.get_lock():
+                ours.done.value += 1
     return outcomes
 
 
@@ -103,8 +98,7 @@ def run_rows(
         by_setup[row.setup].append(row)
     workers = workers or len(os.sched_getaffinity(0))
     futures: list[Future[list[Outcome]]] = []
-    shared = _Shared(campaign, window, recorded, done, stop)
-    with ProcessPoolExecutor(workers, context, _prepare, (shared,)) as pool:
+    with WorkerPool(workers, _Shared(campaign, window, recorded, done, stop)) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():
                 tasks = -(-len(its) // ROWS_A_TASK)
@@ -114,7 +108,9 @@ def run_rows(
                 ]
         while not all(future.done() for future in futures):
             time.sleep(POLL_S)
-            failed = any(each.done() and each.exception() for each in futures)
+            failed = any(
+                each.done() and not each.cancelled() and each.exception() for each in futures
+            )
             stop.value = stopped() or failed
             if stop.value:  # a task that begins all the same first builds its setup
                 for future in futures:

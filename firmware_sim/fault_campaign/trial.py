@@ -7,6 +7,8 @@ once, and each row goes on from there in a copy of the process.
 import math
 import os
 import pickle
+import select
+import signal
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,6 +38,7 @@ SAMPLE_TICKS: Final = 5
 """Of the roll, for its variance, where the ship alone is integrated; and of a recording."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
+_LOOK_S: Final = 0.1
 RECORDED_S: Final = 10.0
 """Before the fault."""
 
@@ -140,6 +143,8 @@ class Sea:
         Of the setup's controller.
     recorded : bool
         Whether the outcomes hold recordings.
+    stopped : callable
+        Whether to end early, with an `InterruptedError`.
     """
 
     def __init__(
@@ -151,7 +156,9 @@ class Sea:
         window: Window,
         *,
         recorded: bool = False,
+        stopped: Callable[[], bool] = lambda: False,
     ) -> None:
+        self._stopped = stopped
         self._campaign, self._setup, self._law = campaign, setup, law
         self._seed, self._window, self._recorded = seed, window, recorded
         self._fault_ns = round(campaign.fault_s * SECOND_NS)
@@ -184,7 +191,7 @@ class Sea:
         followed_s = max((row.followed_s for row in rows if row.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
         log = self._underway.log
-        log.frames += in_a_copy(lambda: self._frames_until(end_ns))
+        log.frames += in_a_copy(lambda: self._frames_until(end_ns), self._stopped)
         self._underway.reference, log.frames = (
             log.frames,
             [each for each in log.frames if each[0] < self._fault_ns],
@@ -196,7 +203,8 @@ class Sea:
         )
         for enabled in (False, True):
             self._passive[enabled] = in_a_copy(
-                lambda enabled=enabled: self._passive_roll(longest_s, enabled=enabled)  # type: ignore[misc]
+                lambda enabled=enabled: self._passive_roll(longest_s, enabled=enabled),  # type: ignore[misc]
+                self._stopped,
             )
 
     def _frames_until(self, end_ns: int) -> list[Heard]:
@@ -219,7 +227,7 @@ class Sea:
 
     def outcome(self, row: Row) -> Outcome:
         """Do a row, in a copy of this process."""
-        return in_a_copy(lambda: self._outcome(row))
+        return in_a_copy(lambda: self._outcome(row), self._stopped)
 
     def _outcome(self, row: Row) -> Outcome:
         underway = self._start() if row.from_start else self._underway
@@ -343,11 +351,13 @@ def _words(there: Heard | None, here: Heard | None, start_ns: int) -> str:
     return f"{frame(here)} instead of {frame(there)}"
 
 
-def in_a_copy(work: Callable[[], T]) -> T:
+def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False) -> T:
     """Do something in a copy of this process and return what it returned.
 
     Raises
     ------
+    InterruptedError
+        If `stopped` came before its end.
     RuntimeError
         With the traceback, if it failed.
     """
@@ -365,6 +375,11 @@ def in_a_copy(work: Callable[[], T]) -> T:
             os._exit(0)
     os.close(writing)
     with os.fdopen(reading, "rb") as pipe:
+        while not select.select([pipe], [], [], _LOOK_S)[0]:
+            if stopped():
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
+                raise InterruptedError
         told = pipe.read()
     os.waitpid(child, 0)
     done, answer = pickle.loads(told) if told else (False, "the process ended without an answer")

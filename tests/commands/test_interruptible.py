@@ -4,6 +4,8 @@ import signal
 import subprocess
 import sys
 
+import pytest
+
 from utank_hil.commands.interruptible import quietly_interruptible
 
 LOADING = """
@@ -30,6 +32,34 @@ def test_interrupt_ends_it_at_once_and_without_a_traceback() -> None:
         _, errors = process.communicate(timeout=30)
     assert process.returncode == -signal.SIGINT
     assert errors == ""
+
+
+TERMINATED = (
+    LOADING.replace(
+        "with quietly_interruptible():\n",
+        "from utank_hil.commands.interruptible import end_as_by_ctrl_c\nend_as_by_ctrl_c()\ntry:\n",
+    )
+    + """
+except KeyboardInterrupt:
+    print("closing", flush=True)
+    time.sleep(0.5)
+    print("closed")
+"""
+)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_closed_terminal_and_a_stopped_service_end_it_as_ctrl_c_and_once(number: int) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "loading\n"
+        process.send_signal(number)
+        assert process.stdout.readline() == "closing\n"
+        process.send_signal(number)
+        assert process.communicate()[0] == "closed\n"
+    assert process.returncode == 0
 
 
 def test_handlers_are_as_before_and_others_are_left_alone() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -152,6 +153,8 @@ def test_a_copy_of_the_process_hands_back_what_it_did_and_changes_nothing() -> N
     assert not kept
     with pytest.raises(RuntimeError, match="ZeroDivisionError"):
         in_a_copy(lambda: 1 / 0)
+    with pytest.raises(InterruptedError):
+        in_a_copy(lambda: time.sleep(3600), lambda: True)
 
 
 @pytest.mark.slow

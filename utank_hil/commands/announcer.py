@@ -9,7 +9,6 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -23,12 +22,12 @@ from utank_hil.commands.common import notes, shown
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.retuning import RetuningEvent
+from utank_hil.runtime.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5
 _START_S: Final = 30.0
-_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _END_S: Final = 10.0
 
 
@@ -66,7 +65,7 @@ class Announcer:
         with heard:
             try:
                 process = context.Process(target=announce, args=(self.ring, ships, log, says))
-                with _signals_waiting():
+                with signals_waiting():
                     process.start()
             except OSError as error:
                 self.error = str(error)
@@ -116,7 +115,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
         ready.close()
         # what ends it is the end of the ring, not Ctrl-C, a closed terminal or a stopped service
         os.setsid()
-        for number in _SIGNALS:
+        for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         os.nice(_NICENESS)
         while True:
@@ -139,16 +138,6 @@ def _ready(heard: Connection) -> bool:
         return heard.poll(_START_S) and bool(heard.recv_bytes())
     except EOFError:
         return False
-
-
-@contextlib.contextmanager
-def _signals_waiting() -> Iterator[None]:
-    """Have a process start with these signals held back: they must not end it as it imports."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _log(events: EventLog, event: Event, start_ns: int) -> None:

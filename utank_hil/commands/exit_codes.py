@@ -57,7 +57,7 @@ class ExitCode(IntEnum):
     )
     INTERRUPTED = (
         130,
-        "all but `run`, `panel`, `monitor`",
-        "Ctrl-C before the end; of `firmware-sim`, before the first sample. `bench`, `campaign` "
-        "and `faults` keep what there is.",
+        "all but `panel`, `monitor`",
+        "Ctrl-C or SIGTERM before the end; of `run`, before the loop; of `firmware-sim`, before "
+        "the first sample. `bench`, `campaign` and `faults` keep what there is.",
     )

@@ -1,9 +1,10 @@
-"""What surrounds the imports of a command line, which take seconds on a busy machine."""
+"""Signals that end a command, while it loads and where it has no loop that looks for them."""
 
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 
 
 @contextmanager
@@ -25,3 +26,18 @@ def quietly_interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
+
+
+def end_as_by_ctrl_c() -> None:
+    """Let SIGTERM, and SIGHUP unless it is ignored, end the process as Ctrl-C does.
+
+    Files are left whole and processes ended. A second one does not disturb that.
+    """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _interrupt)
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
-_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
@@ -21,9 +21,19 @@ def stop_on_signals() -> Iterator[Callable[[], bool]]:
         nonlocal stopped
         stopped = True
 
-    found = {number: signal.signal(number, note) for number in _SIGNALS}
+    found = {number: signal.signal(number, note) for number in SIGNALS}
     try:
         yield lambda: stopped
     finally:
         for number, handler in found.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def signals_waiting() -> Iterator[None]:
+    """Let processes start with `SIGNALS` held back: they must not end them as they import."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
