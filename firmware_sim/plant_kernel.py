@@ -7,9 +7,9 @@ between through four ticks' values; for a wave at 3 rad/s that is exact to 2e-8 
 """
 
 import numpy as np
-from numba import njit
 
 from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import (
     CAPSIZED_S,
     DAMPED_AROUND,
@@ -48,7 +48,7 @@ FREE, DRIVEN, IMPOSED, ABSENT = 0, 1, 2, 3
 
 CAPSIZE_RAD = np.pi / 2
 
-pump_step, pump_coast = compile_pump(njit(cache=True))
+pump_step, pump_coast = compile_pump(njit())
 
 
 def interpolation_weights() -> FloatArray:
@@ -62,7 +62,7 @@ def interpolation_weights() -> FloatArray:
     return weights
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def advance_tick(
     state: FloatArray,
     row: FloatArray,
@@ -162,7 +162,7 @@ def advance_tick(
     moments[3] = turned_sum(phasors, rotations)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def turned_sum(phasors: ComplexArray, rotations: ComplexArray) -> float:
     """Turn all wave components by one tick, in place, and return their sum."""
     total: float = 0.0
@@ -172,14 +172,14 @@ def turned_sum(phasors: ComplexArray, rotations: ComplexArray) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _interpolated(weights: FloatArray, row: int, moments: FloatArray) -> float:
     # written out: a product of four numbers is not worth a call of the linear algebra library
     w, m = weights[row], moments
     return float(w[0] * m[0] + w[1] * m[1] + w[2] * m[2] + w[3] * m[3])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _linear_step(
     model: FloatArray, x: State, moments: tuple[float, float, float], pressure_pa: float
 ) -> State:
@@ -196,7 +196,7 @@ def _linear_step(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _rates(
     model: FloatArray, x: State, slope: State, time_s: float, pressure_pa: float, moment_nm: float
 ) -> State:

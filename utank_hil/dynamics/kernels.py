@@ -12,9 +12,10 @@ impulse is applied, and the rest of the step follows.
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from utank_hil.arrays import FloatArray
+from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import RollCoefficients
 from utank_hil.dynamics.reference import INSIDE_M, REST_M_S
 
@@ -30,7 +31,7 @@ FAST = {"reassoc", "contract", "nsz", "arcp"}
 State = tuple[float, float, float, float]
 
 
-@njit(cache=True, fastmath=FAST, error_model="numpy")
+@njit(fastmath=FAST, error_model="numpy")
 def sine_cosine(angle: float) -> tuple[float, float]:
     """Sine and cosine together, to 2e-16 for angles of a few turns.
 
@@ -54,7 +55,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     return (-sin, -cos) if turn & 2 else (sin, cos)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def unpacked(row: FloatArray) -> RollCoefficients:
     """The coefficients from an array."""
     return RollCoefficients(
@@ -64,7 +65,7 @@ def unpacked(row: FloatArray) -> RollCoefficients:
 
 
 # inline: handing its coefficients over four times a step costs a third of the step
-@njit(cache=True, fastmath=FAST, error_model="numpy", inline="always")
+@njit(fastmath=FAST, error_model="numpy", inline="always")
 def accelerations(
     c: RollCoefficients,
     per_piece: float,
@@ -112,7 +113,7 @@ def accelerations(
     return (c.level_inertia * roll_moment - c.coupling * level_force) * scale, h_ddot
 
 
-@njit(cache=True, fastmath=FAST, error_model="numpy")
+@njit(fastmath=FAST, error_model="numpy")
 def rk4(
     c: RollCoefficients,
     per_piece: float,
@@ -146,7 +147,7 @@ def rk4(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
     """Power that damping of the ship, losses of the tank and the valve take."""
     _, v, _, w = state
@@ -155,7 +156,7 @@ def damping_w(c: RollCoefficients, state: State, valve: float) -> float:
     return float(ship * v * v + water * w * w)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _moments_within(
     moments: tuple[float, float, float], begin: float, end: float
 ) -> tuple[float, float, float]:
@@ -170,12 +171,12 @@ def _moments_within(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _damped_j(c: RollCoefficients, before: State, after: State, valve: float, time: float) -> float:
     return (damping_w(c, before, valve) + damping_w(c, after, valve)) / 2 * time
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def step_with_impacts(
     c: RollCoefficients,
     per_piece: float,
@@ -244,7 +245,7 @@ def step_with_impacts(
     return x, v, math.copysign(min(abs(h), limit), h), w
 
 
-@njit(cache=True, fastmath=FAST, error_model="numpy")
+@njit(fastmath=FAST, error_model="numpy")
 def advance(
     row: FloatArray,
     per_piece: float,
@@ -334,7 +335,7 @@ def advance(
         state[k] = now[k]
 
 
-@njit(cache=True, fastmath=FAST, parallel=True, error_model="numpy")
+@njit(fastmath=FAST, parallel=True, error_model="numpy")
 def advance_batch(
     rows: FloatArray,
     per_piece: FloatArray,

@@ -319,8 +319,8 @@ def compile_pump(compiler: Callable[[Any], Any]) -> tuple[Callable[..., Any], Ca
     Parameters
     ----------
     compiler : callable
-        For example ``numba.njit(cache=True)``. The functions are compiled in a namespace of their
-        own, callees first.
+        For example `utank_hil.dynamics.jit.njit`'s. The functions are compiled in a namespace of
+        their own, callees first.
     """
     scope = dict(globals())
     for function in (pump_pressure, pump_load, pump_speed, pump_step, pump_coast):
