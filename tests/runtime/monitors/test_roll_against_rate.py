@@ -3,6 +3,7 @@ import math
 import pytest
 from moving_ship import THRESHOLDS, MovingShip
 
+from utank_hil.runtime.commissioning.checks import RATE_ZERO_DEG_S
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.motion import RollAgainstRate
 
@@ -31,15 +32,18 @@ def test_a_ship_that_rolls_in_health_is_left_alone() -> None:
         assert not found_after(lambda _, *sample: sample, 600.0, roll_deg)
 
 
-def test_constant_bias_of_the_gyroscope_is_learned() -> None:
+@pytest.mark.parametrize("share", [-1.0, 0.4, 1.0])
+def test_a_bias_of_the_gyroscope_that_passes_a_commissioning_is_learned(share: float) -> None:
+    bias_rad_s = share * math.radians(RATE_ZERO_DEG_S)
     monitor, ship = RollAgainstRate(THRESHOLDS), MovingShip()
     late = 0
     for k in range(12_000):
         t = k * STEP_S
-        turned = ship.turned_rad(t, STEP_S) + 2e-4 * STEP_S  # 0.7 degrees a minute
-        found = monitor.update(ship.roll_rad(t), ship.rate_rad_s(t), turned, STEP_S)
-        assert not found & (Finding.DRIFT_LASTS | Finding.MOTION_SIGN)
-        late |= found if t > 120 else 0
+        turned = ship.turned_rad(t, STEP_S) + bias_rad_s * STEP_S
+        rate_rad_s = ship.rate_rad_s(t) + bias_rad_s
+        found = monitor.update(ship.roll_rad(t), rate_rad_s, turned, STEP_S)
+        assert not found & Finding.MOTION_SIGN
+        late |= found if t > 240 else 0
     assert not late
 
 

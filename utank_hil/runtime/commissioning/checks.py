@@ -11,7 +11,8 @@ from utank_hil.runtime.commissioning.pulses import PulsePlan, ValveStroke
 from utank_hil.runtime.observations import VALVE_OFF
 
 ROLL_ZERO_DEG: Final = 1.0
-RATE_ZERO_DEG_S: Final = 0.15
+RATE_ZERO_DEG_S: Final = 0.03
+"""The monitors learn so much; twice as much would be DRIFT for good, and arming refused."""
 PRESSURE_ZERO: Final = 0.02
 """Share of the pressure limit."""
 
