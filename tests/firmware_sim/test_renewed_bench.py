@@ -55,6 +55,22 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     assert (result.first, result.ticks, why) == (None, 24_000, [])
 
 
+def test_a_peak_of_the_waves_is_not_taken_for_a_ship_of_twice_the_stiffness() -> None:
+    """Patti-B in mild waves looked 2.5 times as stiff; the law for that capsized her."""
+    scenario = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)
+    sea = scenario.sea
+    mild = replace(sea.effective_slope, coefficient=sea.effective_slope.coefficient / 2)
+    scenario = scenario.model_copy(update={"sea": sea.model_copy(update={"effective_slope": mild})})
+    jobs = jobs_of(scenario, scenario.seed, 640.0)
+    passive, law = (run_lockstep(jobs[k], Unwatched()) for k in (0, -1))
+    assert law.retuning[1].state is TRIAL
+    assert "roll period 10.70 s" in law.retuning[1].reasons[0]
+    tried = law.between(law.retuning[1].time_ns * 1e-9 + 10.0, 640.0)
+    assert set(law.column("mode")[tried]) == {Mode.ACTIVE}
+    roll, without = (run.column("true_roll_rad")[tried].std() for run in (law, passive))
+    assert roll < 0.7 * without
+
+
 def test_in_a_swell_that_the_first_law_is_wrong_for_the_pump_rests_in_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

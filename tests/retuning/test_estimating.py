@@ -1,5 +1,7 @@
 """The estimator's work: what it tells of a record, and when it says that it can't."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rolling_ship import PLANT, SAMPLE_TIME_S, SHIP, loaded, motion_in, wave_moment_nm
@@ -32,6 +34,14 @@ def test_ship_and_sea_are_told_while_the_pump_works():
     assert found.hs_m == pytest.approx(4.0 * factor, rel=0.15)
     assert found.tp_s == pytest.approx(10.0, rel=0.15)
     assert found.duration_s == pytest.approx(1200.0)
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.3, Verdict.GOOD), (1.6, Verdict.UNCERTAIN)])
+def test_a_ship_farther_off_than_loading_makes_her_is_not_told(factor: float, verdict: Verdict):
+    motion, configured = motion_in(MOMENT_NM, loaded(14.4))[500:], loaded(14.4 / factor)
+    task = replace(TASK, plant=replace(PLANT, ship=configured))
+    found = estimate(request(motion, configured), task)
+    assert (found.of_sea, found.of_ship) == (verdict, verdict)
 
 
 def test_a_ship_loaded_within_the_record_is_the_present_one():

@@ -163,6 +163,7 @@ def test_a_changed_ship_brings_a_law_for_her() -> None:
     rig = Rig(renewed())
     rig.renew_until(RETUNED, estimate(ship=SHIP))
     rig.controller.note(estimate(ship=SLOWER))
+    assert rig.controller._latest is None  # nor is a law made for waves that were seen with her
     rig.run(10)
     assert rig.controller.state is RETUNED  # once is not enough
     rig.controller.note(estimate(ship=SLOWER))
@@ -248,6 +249,17 @@ def test_a_law_whose_answer_is_not_finite_is_dropped_at_once() -> None:
     rig.renew_until(REFUSED)
     assert "not finite" in rig.reasons
     assert np.isfinite(rig.commands).all()
+
+
+def test_a_law_that_rolls_her_away_is_dropped_at_once() -> None:
+    for times, at_once in ((3.5, False), (8.0, True)):
+        rig = Rig(renewed())
+        rig.renew_until(TRYING)
+        begin = rig.samples
+        rig.wave = lambda k, times=times: times  # type: ignore[misc]
+        rig.run_until(REFUSED)
+        assert ("from her heel on trial" in rig.reasons) is at_once
+        assert (rig.samples - begin < 15) is at_once  # three seconds
 
 
 def test_a_growing_sea_takes_no_good_law_back_and_a_growing_roll_does() -> None:

@@ -46,8 +46,8 @@ class ChangeMonitor:
         if estimate.of_ship is not Verdict.GOOD or now is None:
             return
         self._latest = now
-        if before is not None and _factor(now, before) == 1:
-            self.change = _factor(now, self._ship)
+        if before is not None and ship_factor(now, before) == 1:
+            self.change = ship_factor(now, self._ship)
 
     def restart(self) -> None:
         """Take the latest ship for the law's own."""
@@ -55,7 +55,7 @@ class ChangeMonitor:
         self.change = 1.0
 
 
-def _factor(now: ShipFigures, then: ShipFigures) -> float:
+def ship_factor(now: ShipFigures, then: ShipFigures) -> float:
     """Factor, 1 or more, by which two ships differ; 1 if that is not significant."""
     by_period = _significant(
         now.roll_period_s / then.roll_period_s,

@@ -24,6 +24,10 @@ PERIOD_DEVIATION: Final = 0.05
 """Largest relative deviations for the ship to count as identified. With less to go by, waves
 are taken for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
 """
+FARTHEST: Final = 1.45
+"""Largest factor between the roll period found and the configured ship's: loading changes it by
+30 % or so. Where the pump works little, a peak of the waves looks like a ship farther off.
+"""
 SEA_DEVIATION: Final = 0.2
 """Largest relative deviation of the moment's root mean square, for the sea to count as known."""
 CONTRADICTED: Final = 20.0
@@ -76,9 +80,9 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
     half = motion[len(motion) // 2 :]
     if len(half) >= least:
         late = fit_motion(half, task.plant, task.sample_time_s)
-        if _told(late) and (_apart(late, fit) or not _told(fit)):
+        if _told(late, task) and (_apart(late, fit) or not _told(fit, task)):
             fit, motion = late, half
-    of_ship = Verdict.GOOD if _told(fit) else Verdict.UNCERTAIN
+    of_ship = Verdict.GOOD if _told(fit, task) else Verdict.UNCERTAIN
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
@@ -116,9 +120,12 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
 _MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
-def _told(fit: MotionFit) -> bool:
-    return bool(fit.deviation[0] <= STIFFNESS_DEVIATION) and (
-        fit.period_deviation <= PERIOD_DEVIATION
+def _told(fit: MotionFit, task: EstimateTask) -> bool:
+    factor = fit.ship.natural_frequency_rad_s / task.plant.ship.natural_frequency_rad_s
+    return bool(
+        fit.deviation[0] <= STIFFNESS_DEVIATION
+        and fit.period_deviation <= PERIOD_DEVIATION
+        and abs(np.log(factor)) <= np.log(FARTHEST)
     )
 
 

@@ -154,6 +154,7 @@ class LawExchange(ABC):
         # the accepted law, engaged without interruption and without pulses; and the law on trial
         self._accepted_window, self._trial_window = MovingWindow(trial), MovingWindow(trial)
         self._baseline: WindowStatistics = self._accepted_window.statistics
+        self._heel_rad = 0.0
         self._request_number = 0
         self._requested = False
         self._now_ns = self._submitted_ns = self._trial_since_ns = self._not_before_ns = 0
@@ -281,6 +282,7 @@ class LawExchange(ABC):
             )
             return
         self._baseline = self._accepted_window.statistics
+        self._heel_rad = self._accepted_window.heel_rad
         self._accepted_window.clear()
         self._begin(reason)
 

@@ -21,7 +21,7 @@ from utank_hil.control.constrained.law import ConstrainedController, Constrained
 from utank_hil.control.limits import PumpLimits
 from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
 from utank_hil.retuning.answer import Answer
-from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.change_monitor import ChangeMonitor, ship_factor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.law_bank import MonitoredLaw
 from utank_hil.retuning.law_exchange import RETRY_NS, LawExchange
@@ -46,6 +46,12 @@ LOSING_PERIODS: Final = 4.0
 """Roll periods that this is judged by, once half of them have passed."""
 LEAST_ROLL_RAD: Final = math.radians(0.25)
 """Root mean square of the roll below which nothing is judged."""
+AWAY: Final = 5.0
+"""Times the roll before, or the passive ship's if that is more, at which a trial ends at once.
+
+A law that is unstable on the ship doubles her roll in a second or two. A great heel that comes on
+trial ends it, too; the law is tried again later.
+"""
 _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
 
 
@@ -90,6 +96,7 @@ class RenewingController(LawExchange):
         self._lately = MovingWindow(samples)
         self._rests_until_ns = 0
         self._latest: MotionEstimate | None = None
+        self._seen: ShipFigures | None = None
         self._due = ""
         self._asked: MotionEstimate | None = None
         self.renewed: RenewedLaw | None = None
@@ -148,7 +155,13 @@ class RenewingController(LawExchange):
             self._latest, self._due = None, ""  # no law is made for waves that have passed
             return
         if estimate.of_ship is Verdict.GOOD:
-            self._ship = estimate.ship
+            now, before, self._seen = estimate.ship, self._seen, estimate.ship
+            known = [ship for ship in (self._ship, before) if ship is not None]
+            if all(ship_factor(now, ship) > SHIP_DIFFERENCE for ship in known):
+                # no law is made for another ship, nor for waves seen with it, until seen twice
+                self._latest, self._due = None, ""
+                return
+            self._ship = now
         self._latest = dataclasses.replace(estimate, ship=self._ship)
         self._due = _reason(self._latest, self.laws.active)
 
@@ -188,6 +201,17 @@ class RenewingController(LawExchange):
         found = None if ship is self._configured else ship
         service = MonitoredLaw(controller, ChangeMonitor(ship), found, self._asked)
         return WarmUp(service, self._history, controller.observe)
+
+    def _check_trial(self) -> None:
+        before, now = self._baseline, self._trial_window.statistics
+        passive_rad = max(before.passive_roll_rad, now.passive_roll_rad)
+        usual_rad = max(LEAST_ROLL_RAD, before.roll_rad, passive_rad)
+        away_rad = abs(self._roll_rad - self._heel_rad)
+        if away_rad > AWAY * usual_rad:
+            away = f"{math.degrees(away_rad):.1f} degrees from her heel on trial"
+            self._refuse((f"she is {away}, {away_rad / usual_rad:.1f} times the roll before, RMS",))
+            return
+        super()._check_trial()
 
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
         """What the law before would have had in the waves of the trial.

@@ -71,6 +71,11 @@ class MovingWindow:
         self.samples += 1
 
     @property
+    def heel_rad(self) -> float:
+        """Mean roll of the samples in the window; zero if there are none."""
+        return self._roll / max(1, min(self.samples, len(self._rows)))
+
+    @property
     def full(self) -> bool:
         """Whether the window is full."""
         return self.samples >= len(self._rows)
