@@ -18,7 +18,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-here test-retuning test-bus test-fast evidence search check format benchmark peers site sbom docs lock clean
+.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers site sbom docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -67,14 +67,11 @@ check: setup
 
 test: setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
-	$(MAKE) --no-print-directory --jobs=3 test-here test-retuning test-bus
+	$(PARALLEL) -m "not socketcan and not evidence"
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-retuning test-bus
 	$(PYTHON) -m tools.mutation.run --not-judged --within 60
 
-# those in the kernels mostly wait, and go first when they do not
-test-here:
-	nice $(PARALLEL) -m "not socketcan and not evidence"
-
-# each in a kernel of its own
+# they mostly wait, each in a kernel of its own on a core of its own
 test-retuning:
 	$(ON_VCAN) $(LONG_ON_VCAN)
 
