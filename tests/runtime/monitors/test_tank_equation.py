@@ -5,7 +5,7 @@ from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
 
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.level_stuck import LevelStuck
-from utank_hil.runtime.monitors.tank_equation import TankEquation
+from utank_hil.runtime.monitors.tank_equation import TankEquation, roll_push_at_natural_frequency
 
 STEP_S = 0.1
 FAULT_S = 60.0
@@ -121,6 +121,23 @@ def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
 
     assert found_after(ship, late(2.0))[Finding.MOTION_LATE] <= 2 * T
     assert not found_after(ship, late(0.1))
+
+
+def test_no_delay_is_judged_by_little_more_than_the_least_push() -> None:
+    """In calm seas the sensors' noise looked like one in the course of an hour."""
+    w0 = TANK.natural_frequency_rad_s
+    least_rad = THRESHOLDS.least_roll_push_m2_s2 / roll_push_at_natural_frequency(SHIP, TANK)
+    for times, judged in ((1.6, False), (3.0, True)):  # the filters take a fifth
+        ship, equation = (
+            MovingShip(times * least_rad, 0.0, w0),
+            TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+        )
+        late = []
+        for k in range(1200):
+            t = k * STEP_S
+            equation.update(ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+            late.append(equation.late_s)
+        assert math.isfinite(late[-1]) is judged
 
 
 def test_restart_forgets() -> None:

@@ -42,6 +42,8 @@ STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
+LATE_PUSHES: Final = 1.75
+"""Of the least push: with less, noise looked like a delay in healthy hours of calm sea."""
 LEAST_SHARE: Final = 0.06
 VALVE_SHARE: Final = 0.2
 """Of a push beside the other one; with what a valve holds back in that one."""
@@ -162,7 +164,7 @@ class TankEquation:
         # sums of so many squares of the least push
         self._least_xx = thresholds.least_roll_push_m2_s2**2 / (1 - self._keep)
         self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
-        late_share = thresholds.least_roll_push_m2_s2 * frequency_rad_s
+        late_share = LATE_PUSHES * thresholds.least_roll_push_m2_s2 * frequency_rad_s
         self._least_dd = late_share**2 / (1 - self._late_keep)
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.roll_period_s / period_s)
