@@ -19,7 +19,7 @@ from utank_hil.telemetry.rotation import Rotation
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
-"""A recording goes on in another file after so long: 60 MB."""
+"""A recording goes on in another file after so long."""
 RING_SLOTS: Final = 1640  # 82 s: a recorder that sleeps less loses nothing
 
 
