@@ -270,16 +270,12 @@ class Sea:
 
     def _measured(self, row: Row, watch: Watch, log: BusLog, start_ns: int) -> Outcome:
         zero_ns = watch.pressed_ns + TICK_NS
-        begin_ns: int | None = start_ns
-        if row.from_start:
+        begin_ns = start_ns
+        if row.from_start and watch.active_ns is not None:
             begin_ns = watch.active_ns
-        elif row.counts_from:
-            begin_ns = watch.over_ns
-            # what was found before is counted from the fault
-            if begin_ns is not None and watch.found_ns is not None and watch.found_ns < begin_ns:
-                begin_ns = start_ns
-        if begin_ns is None:
-            begin_ns = start_ns
+        if row.counts_from:  # what was found before is in time
+            over_ns = watch.found_ns if watch.over_ns is None else watch.over_ns
+            begin_ns = max(begin_ns, over_ns or begin_ns)
 
         def after(time_ns: int | None) -> float | None:
             return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)

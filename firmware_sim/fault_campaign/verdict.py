@@ -7,11 +7,17 @@ from typing import Any, Final
 
 from firmware_sim.fault_campaign.campaign import Row, Setup
 from firmware_sim.fault_campaign.trial import Outcome
+from utank_hil.runtime.faults import FAULTS, Reaction
 
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""
 RAMP_ZERO_MS: Final = 1040.0
 """And after a ramp began: a second, a cycle of the command and a tick of the drive."""
+STOPS: Final = {
+    row.code.name
+    for row in FAULTS
+    if any(condition.reaction is Reaction.STOP for condition in row.conditions)
+}
 RATE_SHARE: Final = 1.001
 
 
@@ -89,11 +95,10 @@ def judged(row: Row, setup: Setup, requirement: str, outcomes: Sequence[Outcome]
     found = [_reaction_ms(row, each) for each in sound]
     ends = row.reaction in ("stop", "ramp", "drive") and not row.hardwired_stop
     zero = [each.zero_ms for each in sound] if ends else []
-    after_ms = STOP_ZERO_MS if row.reaction == "stop" else RAMP_ZERO_MS
     zero_limit_ms = row.zero_within_ms
     if zero_limit_ms is None and ends and row.reaction != "drive":
-        known = [each for each in found if each is not None]
-        zero_limit_ms = max(known) + after_ms if known else None
+        limits = (_zero_limit_ms(row, each) for each in sound)
+        zero_limit_ms = max((limit for limit in limits if limit is not None), default=None)
     roll = sum(each.roll_variance for each in sound)
     passive = sum(each.passive_variance for each in sound)
     problems = [f"seed {each.seed}: {each.error}" for each in outcomes if each.error]
@@ -123,7 +128,9 @@ def _worst(times_ms: Sequence[float | None]) -> float | None:
 
 
 def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
-    """When the reaction began that the row asks for."""
+    """When the reaction began that the row asks for; at once where nobody could arm."""
+    if row.from_start and row.reaction in ("stop", "ramp") and not outcome.was_active:
+        return 0.0 if outcome.code != "NONE" else None
     return {
         "stop": outcome.found_ms,
         "ramp": outcome.found_ms,
@@ -134,6 +141,21 @@ def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
         "none": None,
         "refuse": None,
     }[row.reaction]
+
+
+def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
+    """When the pressure is to be zero, of a row that latches; None where nothing was found.
+
+    A stop that another fault's ramp comes before has the time that it would have had.
+    """
+    found_ms = _reaction_ms(row, outcome)
+    if row.zero_within_ms is not None or found_ms is None:
+        return row.zero_within_ms
+    if row.reaction != "stop":
+        return found_ms + RAMP_ZERO_MS
+    if outcome.code not in STOPS:
+        found_ms = max(found_ms, row.within_ms or 0.0)
+    return found_ms + STOP_ZERO_MS
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
@@ -153,10 +175,8 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         yield "in charge again in the end"
     if latched and found_ms is not None and not row.hardwired_stop:
         zero_ms = math.inf if outcome.zero_ms is None else outcome.zero_ms
-        limit_ms = row.zero_within_ms
-        if limit_ms is None:
-            limit_ms = found_ms + (STOP_ZERO_MS if row.reaction == "stop" else RAMP_ZERO_MS)
-        if zero_ms > limit_ms:
+        limit_ms = _zero_limit_ms(row, outcome)
+        if limit_ms is not None and zero_ms > limit_ms:
             yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
     if row.reaction in ("halve", "alarm", "note", "none") and outcome.mode != "ACTIVE":
         yield f"ended in {outcome.mode}, {outcome.code}"

@@ -134,7 +134,8 @@ class Watch:
         if name == "over_roll_rad":
             return abs(plant.roll_rad)
         if name == "pressure_pa":
-            return abs(plant.pressure_pa - drive.setpoint_pa) if drive is not None else 0.0
+            measured_pa = self._bench.node.inbox.pressure_pa
+            return abs(measured_pa - drive.setpoint_pa) if drive is not None else 0.0
         return abs(float(getattr(self._bench.node.inbox, name)) - float(getattr(plant, name)))
 
     def tick(self, now_ns: int) -> Iterable[Frame]:

@@ -50,7 +50,7 @@ def test_every_shipped_ship_passes_with_room_to_spare(name: str) -> None:
     assert node.stage is Stage.DONE
     assert not node.ended
     checks = node.checks()
-    assert len(checks) == (17 if name == "pump_with_valve" else 15)
+    assert len(checks) == (18 if name == "pump_with_valve" else 16)
     for check in checks:
         assert abs(check.measured - check.expected) <= 0.5 * check.tolerance, check
 
@@ -90,11 +90,15 @@ def swapped(record: Record) -> Record:
                                         "roll"}, "exchange its sides"),
         (scaled(("pressure_pa",), 0.5), {"pressure", "port_level", "starboard_level", "roll"},
          "correct the pressure sensor's scaling"),
-        (shifted("port_level_m", 0.05), {"port_level_zero"}, "Set the port gauge's zero"),
-        (shifted("roll_rad", 0.03), {"roll_zero", "port_level_zero", "starboard_level_zero"},
+        (shifted("port_level_m", 0.05), {"port_level_zero", "water_heel"},
+         "Set the port gauge's zero"),
+        (shifted("roll_rad", 0.03), {"roll_zero", "port_level_zero", "starboard_level_zero",
+                                    "water_heel"},
          "mount the motion sensor level"),
         (shifted("roll_rate_rad_s", 0.01), {"roll_rate_zero"}, "zero of the gyroscope"),
-        (shifted("pressure_pa", 900), {"pressure_zero"}, "Set the pressure sensor's zero"),
+        (shifted("roll_rad", 0.005), {"water_heel"}, "zeros of motion sensor, gauges and pressure"),
+        (shifted("pressure_pa", 900), {"pressure_zero", "water_heel"},
+         "Set the pressure sensor's zero"),
         (shifted("high_level", 1.0), {"high_level_switches"}, "Check the switches"),
     ],
 )  # fmt: skip

@@ -91,6 +91,7 @@ def verdict(row: str, *outcomes: Outcome) -> Result:
         ({"found_ms": 1001.0}, "found after 1001 ms, 1000 allowed"),
         ({"found_ms": None}, "was not found"),
         ({"zero_ms": 751.0}, "pressure at zero after 751 ms, 750 allowed"),
+        ({"code": "DRIFT", "zero_ms": 1251.0}, "pressure at zero after 1251 ms, 1250 allowed"),
         ({"mode": "ACTIVE"}, "in charge again"),
         ({"armed_again": True}, "armed again"),
         ({"code": "OVERRUN"}, "called OVERRUN"),
@@ -130,6 +131,20 @@ def test_each_reaction_asks_for_its_own() -> None:
     refused = replace(calm, was_active=False, mode="STANDBY")
     assert verdict("held-arm-bit", refused).passed
     assert not verdict("held-arm-bit", replace(refused, was_active=True)).passed
+
+
+def test_a_ramp_that_comes_before_the_stop_has_the_stops_time() -> None:
+    ramp = replace(GOOD, code="DRIFT", found_ms=100.0, zero_ms=1200.0)
+    assert verdict("roll-sign-flipped", ramp).passed
+    assert verdict("roll-sign-flipped", ramp).zero_limit_ms == 1250.0
+    assert verdict("roll-sign-flipped", GOOD).zero_limit_ms == 750.0
+
+
+def test_a_fault_that_refuses_arming_is_found() -> None:
+    refused = replace(GOOD, found_ms=None, zero_ms=0.0, mode="STANDBY", was_active=False)
+    assert verdict("both-signs-from-start", refused).passed
+    assert not verdict("both-signs-from-start", replace(refused, code="NONE")).passed
+    assert not verdict("both-signs-flipped", refused).passed
 
 
 def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:

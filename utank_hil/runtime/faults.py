@@ -455,7 +455,7 @@ FAULTS: Final = (
         "configuration.",
         _found(
             Reaction.HALVE,
-            "five times the noise of the section `sensors`, four times for levels, over 0.7 s",
+            "five times the noise of the section `sensors`, three times for levels, over 0.7 s",
             Finding.NOISE,
         ),
     ),

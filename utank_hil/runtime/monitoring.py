@@ -48,6 +48,7 @@ MOST_CHANGE: Final = 10.0
 MOST_DAMPING_RATIO: Final = 1.0
 """Of ship and tank, as identified."""
 
+_NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
 _WATER_SIGN: Final = int(Finding.WATER_SIGN)
@@ -243,7 +244,8 @@ class Monitors:
             self._of_saturation = self._saturation.update(
                 seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
             )
-            if self._spikes.update(self.gates.discarded, LONG_S):
+            noisy = (self._used.watch.found | self._of_volume) & _NOISE
+            if self._spikes.update(self.gates.discarded, LONG_S) and not noisy:
                 self._of_saturation |= _SPIKES
         used = self._used
         self.found = found = (

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import pytest
 from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
@@ -48,8 +49,38 @@ def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
     assert not any(found)
 
 
+ZEROS = (math.radians(0.3), 0.044, 870.0)
+"""Each pushes the water as much as all zeros together may."""
+
+
+@pytest.mark.parametrize("roll_deg", [0.3, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("pressure_pa", [0.0, 6e3, 30e3])
+@pytest.mark.parametrize("frequency_rad_s", [0.45, 0.6])
+@pytest.mark.parametrize("sensor", [0, 1, 2])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
+    roll_deg: float, pressure_pa: float, frequency_rad_s: float, sensor: int, way: int
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    for k in range(900):
+        sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
+        sample[sensor] += way * ZEROS[sensor]
+        assert not equation.update(*sample)
+
+
+def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:
+    """Water that is pushed by a constant and a wave, under a roll that does not move."""
+    for times, explained in ((0.9, True), (3.0, False)):
+        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+        level_m = times * THRESHOLDS.zero_push_m2_s2 / (2 * 9.80665)
+        found = [equation.update(0.0, level_m, 0.0) for _ in range(900)]
+        assert (Finding.ROLL_STUCK in Finding(found[-1])) is not explained
+
+
 def test_gains_are_one_and_the_delay_is_the_delay() -> None:
-    ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
+    ship, equation = MovingShip(), TankEquation(SHIP, TANK, exact, STEP_S)
     late_s = 0.4
     for k in range(1000):
         t = k * STEP_S

@@ -7,6 +7,7 @@ from typing import Final
 
 from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.runtime.commissioning.pulses import PulsePlan, ValveStroke
 from utank_hil.runtime.observations import VALVE_OFF
 
@@ -15,6 +16,8 @@ RATE_ZERO_DEG_S: Final = 0.03
 """The monitors learn so much; twice as much would be DRIFT for good, and arming refused."""
 PRESSURE_ZERO: Final = 0.02
 """Share of the pressure limit."""
+WATER_HEEL_DEG: Final = 0.2
+"""Two thirds of the disagreement at which the monitors take water at rest for moving water."""
 
 STILL: Final = 0.2
 """Share of the plan's peaks: ship and water that move more by themselves hide what pulses do."""
@@ -72,8 +75,12 @@ def judge_rest(
     """
     mean = {name: float(column.mean()) for name, column in rest.items()}
     roll_deg = math.degrees(mean["roll_rad"])
-    # the water's surface stays level
-    starboard_m = math.tan(mean["roll_rad"]) * plant.tank.width_m / 2
+    # the water's surface stays level, but for what the pressure sensor says of a pump that is off
+    width_m, density_kg_m3 = plant.tank.width_m, plant.tank.density_kg_m3
+    starboard_m = math.tan(mean["roll_rad"]) * width_m / 2
+    higher_m = mean["starboard_level_m"] - mean["port_level_m"]
+    higher_m -= mean.get("pressure_pa", 0.0) / (density_kg_m3 * GRAVITY_M_S2)
+    heel_deg = math.degrees(math.atan(higher_m / width_m))
     checks = [
         Check("roll_zero", "roll at rest", roll_deg, 0.0, ROLL_ZERO_DEG, "deg",
               "Trim the ship upright, or mount the motion sensor level."),
@@ -98,6 +105,10 @@ def judge_rest(
                   PRESSURE_ZERO * limit_kpa, "kPa",
                   "Set the pressure sensor's zero; both its sides are to be full of water.")
         )  # fmt: skip
+    checks.append(
+        Check("water_heel", "heel by levels and pressure, less the roll", heel_deg - roll_deg, 0.0,
+              WATER_HEEL_DEG, "deg", "Set the zeros of motion sensor, gauges and pressure sensor.")
+    )  # fmt: skip
     if "roll_2_rad" in rest:
         apart_deg = math.degrees(mean["roll_2_rad"]) - roll_deg
         checks += [

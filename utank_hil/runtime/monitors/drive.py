@@ -6,11 +6,11 @@ from typing import Final
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
-LAGS_S: Final = 0.2
+LAGS_S: Final = 0.17
 LOST_S: Final = 0.4
-REVERSED_S: Final = 0.15
-"""Up to two steps less than 300, 500 and 200 ms: the fault begins between two, and so does a tick.
-"""
+REVERSED_S: Final = 0.12
+"""Two steps and more less than 300, 500 and 200 ms: a fault begins between two, and the model lags
+behind the command."""
 REVERSED_SHARE: Final = 1 / 3
 """Of the threshold: so much the other way is reversed."""
 SETTLED_S: Final = 0.5

@@ -5,8 +5,10 @@ m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it
 constant bias is learned over five minutes and taken off.
 
 The sum tells *that* the two disagree. What disagrees is found by the sums over the time in which
-one of them has not moved, and by the sign of sum(m t) / sum(t t) over the last second, which is 1
-in health and -1 with one sign wrong.
+one of them has not moved. A wrong sign of one, m = -t, is found against a roll that does not move,
+m = 0, and with that against health, m = t, by a sequential test (CUSUM; Page, Continuous Inspection
+Schemes, Biometrika 41, 1954): steps add their log-likelihood ratio, -t (m + t / 2) over the
+variance of m, and the sum is kept above zero.
 """
 
 import math
@@ -21,12 +23,14 @@ BIAS_S: Final = 300.0
 FIRST_BIAS_S: Final = 30.0
 """The bias is zero at the start as if it had been learned for so long."""
 SMOOTH_S: Final = 0.25
-LONG_STEP_S: Final = 0.2
-"""Steps of the sign's sums: in a longer one a sensor's noise is a smaller share."""
-SIGN_S: Final = 0.5
-NOISE_SHARE: Final = 5.0
-"""Standard deviations by which the noise does not shift the sum of a sound sensor."""
-SIGN_GAIN: Final = -0.25
+LONG_STEP_S: Final = 0.14
+"""Steps of the sign's test: in a longer one a sensor's noise is a smaller share."""
+SIGN_SUM: Final = 8.0
+"""Log-likelihood ratio from which a sign is wrong. To a sound sensor's sum, noise n of the standard
+deviation s adds n^2 / 6 s^2 in a step at most.
+"""
+SIGN_STEP: Final = 5.0
+"""One step adds so much at most: one jump is no wrong sign."""
 STUCK_S: Final = 0.7
 LEARN: Final = 3.0
 """Up to so many times the threshold what is left is taken for a bias."""
@@ -53,23 +57,28 @@ class Stuck:
         Of the signal.
     limit_rad : float
         Sum, with the same leak, at which the signal is stuck.
+
+    Attributes
+    ----------
+    still_s : float
+        How long it has stayed there.
     """
 
     def __init__(self, band: float, limit_rad: float) -> None:
         self._band = band
         self._limit_rad = limit_rad
         self._value = math.inf
-        self._sum_rad = self._still_s = 0.0
+        self._sum_rad = self.still_s = 0.0
 
     def update(self, value: float, left_rad: float, keep: float, elapsed_s: float) -> bool:
         """Take a value and what the step left unexplained; return whether the signal is stuck."""
         if abs(value - self._value) > self._band:
             self._value = value
-            self._sum_rad = self._still_s = 0.0
+            self._sum_rad = self.still_s = 0.0
             return False
         self._sum_rad = keep * (self._sum_rad + left_rad)
-        self._still_s += elapsed_s
-        return abs(self._sum_rad) > self._limit_rad and self._still_s > STUCK_S
+        self.still_s += elapsed_s
+        return abs(self._sum_rad) > self._limit_rad and self.still_s > STUCK_S
 
 
 class RollAgainstRate:
@@ -90,6 +99,8 @@ class RollAgainstRate:
         self._roll_stuck = Stuck(thresholds.roll_still_rad, least_rad)
         self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
         self.noise = Noise(math.sqrt(6) * thresholds.roll_noise_rad)
+        # of a difference of two samples with the noise that the maker states, a fifth of the limit
+        self._least_power = 2 * (thresholds.roll_noise_rad / 5) ** 2
         self._bend = SecondDifference()
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
@@ -101,8 +112,7 @@ class RollAgainstRate:
         self._bend.restart()
         self.unexplained_rad = 0.0
         self._over_s = self._smooth_rad = 0.0
-        self._moved_turned = self._turned_turned = 0.0
-        self._moved_rad = self._turned_rad = self._long_s = 0.0
+        self._moved_rad = self._turned_rad = self._long_s = self._sign = 0.0
 
     def update(
         self, roll_rad: float, rate_rad_s: float, turned_rad: float, elapsed_s: float
@@ -143,11 +153,10 @@ class RollAgainstRate:
         self._turned_rad += turned_rad
         self._long_s += elapsed_s
         if self._long_s >= LONG_STEP_S:
-            keep = max(1 - self._long_s / SIGN_S, 0.0)
-            self._moved_turned = keep * self._moved_turned + self._moved_rad * self._turned_rad
-            self._turned_turned = keep * self._turned_turned + self._turned_rad**2
-            self._moved_rad = self._turned_rad = self._long_s = 0.0
+            self._judge_sign()
         found = _NOISE if noisy else 0
+        if self._sign > SIGN_SUM:
+            found |= _SIGN
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
                 self._over_s = 0.0
@@ -156,12 +165,17 @@ class RollAgainstRate:
         found |= _DRIFT
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
-        turned = self._turned_turned
-        beside = NOISE_SHARE * math.sqrt(self.noise.power / 3 * turned)
-        if self._moved_turned < min(SIGN_GAIN * turned, turned - beside):
-            found |= _SIGN
         if roll_stuck:
             found |= _ROLL_STUCK
         if rate_stuck:
             found |= _RATE_STUCK
         return found
+
+    def _judge_sign(self) -> None:
+        """Take a long step to the test of the sign, and begin the next."""
+        turned_rad = self._turned_rad
+        if self._rate_stuck.still_s <= STUCK_S:  # else it is the rate that is wrong
+            power = max(self.noise.power / 3, self._least_power)
+            against = -turned_rad * (self._moved_rad + turned_rad / 2) / power
+            self._sign = min(max(self._sign + min(against, SIGN_STEP), 0.0), 2 * SIGN_SUM)
+        self._moved_rad = self._turned_rad = self._long_s = 0.0

@@ -57,6 +57,10 @@ class MotionWatch:
         found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
         if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
             found |= _NOISE
-        if self._gate is not None and self._spikes.update(self._gate.discarded, elapsed_s):
+        if (
+            self._gate is not None
+            and self._spikes.update(self._gate.discarded, elapsed_s)
+            and not found & _NOISE  # whose largest samples are discarded, too
+        ):
             found |= _SPIKES
         self.found = found

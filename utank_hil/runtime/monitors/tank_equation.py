@@ -14,6 +14,8 @@ differentiating. Sums with a memory of 0.4 roll periods tell the gains::
 
 and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
 Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
+No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
+pass. Something is found only if no constant of that size explains it.
 The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
 sixteen times as large is half of it.
@@ -34,7 +36,7 @@ from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 SIGN_GAIN: Final = -0.25
 VALVE_SIGN_GAIN: Final = -0.5
 """The same behind a valve: one that holds back half as much again as configured makes it -0.38."""
-SETTLED: Final = 10.0
+SETTLED: Final = 6.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
 STILL_PERIODS: Final = 0.25
@@ -126,9 +128,10 @@ class TankEquation:
     Attributes
     ----------
     roll_gain, pump_gain, level_gain : float
-        See the module; NaN as long as the push is too small to tell.
+        See the module; NaN as long as the push is too small to tell. With the constant within +-z
+        that speaks most for sound sensors.
     late_s : float
-        Delay of the motion sensor; NaN as long as the roll is too small to tell.
+        Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
     """
 
     def __init__(
@@ -166,6 +169,7 @@ class TankEquation:
         self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
         late_share = LATE_PUSHES * thresholds.least_roll_push_m2_s2 * frequency_rad_s
         self._least_dd = late_share**2 / (1 - self._late_keep)
+        self._zero = thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.roll_period_s / period_s)
         self._most_unmoved = STILL_PUSHES**2 * self._least_xx
@@ -177,7 +181,7 @@ class TankEquation:
         """Begin anew after a gap."""
         self._wait = -1
         self._xx = self._pp = self._rest_x = self._rest_p = self._both = self._level_both = 0.0
-        self._lead = self._dd = 0.0
+        self._x = self._p = self._left = self._weight = self._lead = self._d = self._dd = 0.0
         self._samples = self._still = 0
         self._roll_rad = math.inf
         self._unmoved = 0.0
@@ -214,40 +218,48 @@ class TankEquation:
         self._rest_p = keep * self._rest_p + (y - x) * p
         self._both = both = keep * self._both + push * push
         self._level_both = keep * self._level_both + y * push
+        left = y - push
+        self._x = keep * self._x + x
+        self._p = keep * self._p + p
+        self._left = keep * self._left + left
+        self._weight = keep * self._weight + 1.0
         d = self._push_at_w0 * roll.rate
-        self._lead = self._late_keep * self._lead + (y - push) * d
+        self._lead = self._late_keep * self._lead + left * d
+        self._d = self._late_keep * self._d + d
         self._dd = dd = self._late_keep * self._dd + d * d
         self._samples += 1
         self._still += 1
         if abs(roll_rad - self._roll_rad) > self._still_rad:
             self._roll_rad = roll_rad
             self._still = 0
-        left = y - push
         self._unmoved = keep * self._unmoved + left * left
         return self._judge(xx, pp, both, dd)
 
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
         found = 0
-        share = self._least_share
+        share, zero = self._least_share, self._zero
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
         if xx > self._least_xx and xx > share * pp:
-            self.roll_gain = gain = self._rest_x / xx
+            self.roll_gain = gain = (self._rest_x + zero * abs(self._x)) / xx
             if gain < self._sign_gain:
                 found = _WATER_SIGN
         if pp > self._least_pp and pp > share * xx:
-            self.pump_gain = gain = self._rest_p / pp
+            self.pump_gain = gain = (self._rest_p + zero * abs(self._p)) / pp
             if gain < self._sign_gain:
                 found |= _PUMP_SIGN
         if both > self._least_xx + self._least_pp:
-            self.level_gain = gain = self._level_both / both
+            self.level_gain = gain = (self._level_both + zero * abs(self._x + self._p)) / both
             if gain < self._sign_gain:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
-        if self._still > self._still_samples and self._unmoved > self._most_unmoved:
-            found |= _ROLL_STUCK
+        if self._still > self._still_samples:
+            weight = self._weight
+            mean = min(max(self._left / weight, -zero), zero)
+            if self._unmoved + mean * (weight * mean - 2 * self._left) > self._most_unmoved:
+                found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
-            self.late_s = late_s = self._lead / dd
+            self.late_s = late_s = (self._lead - zero * abs(self._d)) / dd
             if late_s > self._late_limit_s:
                 found |= _LATE
         return found

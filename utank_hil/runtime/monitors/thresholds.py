@@ -7,11 +7,14 @@ the ship rolls; s a sensor's noise. The smallest roll at which each fault can be
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Final
 
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import Range, range_problems, refuse
+
+ZERO_HEEL_DEG: Final = 0.3
+"""Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,8 @@ class MonitorThresholds:
     least_roll_push_m2_s2, least_pump_push_m2_s2 : float
         Root mean square of the push on the water, as pressure over density, below which the tank's
         equation says nothing.
+    zero_push_m2_s2 : float
+        Constant push that the sensors' zeros may feign, all together.
     motion_late_s : float
         Delay of the motion sensor.
     pressure_error_pa : float
@@ -96,6 +101,7 @@ class MonitorThresholds:
     volume_m: float
     least_roll_push_m2_s2: float
     least_pump_push_m2_s2: float
+    zero_push_m2_s2: float
     motion_late_s: float
     pressure_error_pa: float
     free_rotor_pa_m: float
@@ -133,7 +139,7 @@ def thresholds_of(
         level_most_m_s=tank.level_limit_m * fastest_rad_s,
         roll_noise_rad=5 * roll_s,
         rate_noise_rad_s=5 * rate_s,
-        level_noise_m=4 * sensors.level_noise_m,
+        level_noise_m=3 * sensors.level_noise_m,
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
         rate_still_rad_s=5 * rate_s,
@@ -141,6 +147,7 @@ def thresholds_of(
         volume_m=max(0.03 * tank.height_m, 6 * sensors.level_noise_m),
         least_roll_push_m2_s2=roll_push_m2_s2,
         least_pump_push_m2_s2=0.1 * limits.pressure_pa / tank.density_kg_m3,
+        zero_push_m2_s2=GRAVITY_M_S2 * tank.width_m * math.radians(ZERO_HEEL_DEG),
         motion_late_s=0.2 / frequency_rad_s,
         pressure_error_pa=0.15 * limits.pressure_pa,
         # its inertia is some 7 % of the water's, which 2 rho g accelerates per level

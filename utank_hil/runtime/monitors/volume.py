@@ -28,7 +28,7 @@ class Volume:
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_m = thresholds.volume_m
-        self._noise = Noise(2**0.5 * thresholds.level_noise_m)
+        self._noise = Noise(thresholds.level_noise_m)
         self._over_s = 0.0
         self.sum_m = math.nan
 
