@@ -70,6 +70,25 @@ def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
     assert table.inbox.high_level
 
 
+def noisy_table(times: float) -> tuple[Table, int, int]:
+    """Noise of the motion sensor over its figure; all that was found, and samples discarded."""
+    table, random, found = Table(), np.random.default_rng(1), 0
+    for k in range(1500):
+        noise = times if k > 500 else 1.0
+        roll_rad, rate_rad_s = random.standard_normal(2) * (2e-4, 5e-4) * noise
+        table.say_roll(roll_rad, rate_rad_s)
+        found |= table.tick()
+    return table, found, table.monitors.gates.discarded
+
+
+def test_samples_that_noise_has_discarded_are_no_spikes() -> None:
+    _, found, discarded = noisy_table(12.0)
+    assert discarded > 10  # without the noise these would be too many
+    assert found & Finding.NOISE
+    assert not found & Finding.SPIKES
+    assert not noisy_table(1.0)[1] & (Finding.NOISE | Finding.SPIKES)
+
+
 def test_five_spikes_in_a_second_are_found() -> None:
     table = Table()
     table.say_roll(0.0)

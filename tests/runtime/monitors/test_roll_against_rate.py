@@ -47,6 +47,34 @@ def test_a_bias_of_the_gyroscope_that_passes_a_commissioning_is_learned(share: f
     assert not late
 
 
+def found_with(rates: list[float], wrong: range) -> list[int]:
+    """Of a ship that rolls at these rates, of which some are measured with the wrong sign."""
+    noise, monitor, roll_rad, found = MovingShip(0.0, 0.0), RollAgainstRate(THRESHOLDS), 0.0, []
+    for k, rate_rad_s in enumerate(rates):
+        roll_rad += rate_rad_s * STEP_S
+        measured_rad_s = -rate_rad_s if k in wrong else rate_rad_s
+        at_s = k * STEP_S
+        sample = roll_rad + noise.roll_rad(at_s), measured_rad_s + noise.rate_rad_s(at_s)
+        found.append(monitor.update(*sample, measured_rad_s * STEP_S, STEP_S))
+    return found
+
+
+def test_a_sign_that_goes_wrong_as_a_fast_roll_slows_down_is_found_at_once() -> None:
+    """What was right a moment before does not outweigh the little that is wrong now."""
+    rates = [min(0.03, max(0.25 - 0.001 * k, -0.004)) for k in range(400)]
+    found = found_with(rates, range(240, 400))
+    assert not any(found[:240])
+    assert found[250] & Finding.MOTION_SIGN
+
+
+def test_a_tenth_of_a_second_of_contradiction_is_no_wrong_sign() -> None:
+    for begin in range(200, 206):
+        found = found_with([0.03] * 300, range(begin, begin + 2))
+        assert not any(each & Finding.MOTION_SIGN for each in found)
+        found = found_with([0.03] * 300, range(begin, begin + 8))
+        assert any(each & Finding.MOTION_SIGN for each in found)
+
+
 @pytest.mark.parametrize("flipped", ["roll", "rate"])
 @pytest.mark.parametrize("shift_s", [0.0, 1.3, 2.6, 3.9])
 def test_sign_of_roll_or_rate_alone_is_found(flipped: str, shift_s: float) -> None:
