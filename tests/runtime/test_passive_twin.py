@@ -112,6 +112,15 @@ def test_law_that_rolls_the_ship_is_found_and_not_before_a_period() -> None:
     assert judged[-1][1]
 
 
+def test_a_ratio_that_the_first_waves_may_give_counts_only_once_more_is_remembered() -> None:
+    little, much = (
+        next(t for t, amplified in rolled(own_rad, 0.1, 40 * PERIOD_S) if amplified)
+        for own_rad in (0.13, 0.3)  # 1.45 and 2.9 times the twin's roll in the end
+    )
+    assert 12 * PERIOD_S < little < 16 * PERIOD_S
+    assert much < 8 * PERIOD_S
+
+
 def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
     assert not any(amplified for _, amplified in rolled(0.005, 0.0, 20 * PERIOD_S))
     assert not any(amplified for _, amplified in rolled(0.0, 0.1, 20 * PERIOD_S))
