@@ -207,7 +207,7 @@ def test_json_is_the_record_and_nothing_else(
     printed = json.loads(result.stdout)
     assert printed.pop("record") == str(path)
     assert printed == json.loads(path.read_text())
-    assert len(printed["checks"]) == 15
+    assert len(printed["checks"]) == 16
 
 
 def test_ended_before_the_end_it_writes_nothing(

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 
 import e2e
 from cantools.database.can import Database
 
 from utank_hil.canbus import Frame, NodeState
 from utank_hil.canbus.catalogue import DBC_PATH
+from utank_hil.configuration import Vessel, load_config
 
 MS = 1_000_000
+TANK = load_config(Path("configs/ships/thesis_first.yaml"), Vessel).tank
 DATABASE = Database()
 DATABASE.add_dbc_file(DBC_PATH)
 
@@ -59,9 +62,16 @@ class ForeignNode:
 
 
 class ForeignSensors(ForeignNode):
-    """A ship that rolls as a sine, whatever the pump does; the pressure is what the drive says."""
+    """A ship that rolls as a sine, whatever the pump does; the pressure is what the drive says.
+
+    The water moves as both push it: water that does not is found.
+    """
 
     amplitude_rad, period_s = 0.05, 12.0
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.level_m = self.level_rate_m_s = 0.0
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         omega = 2 * math.pi / self.period_s
@@ -70,13 +80,23 @@ class ForeignSensors(ForeignNode):
                              roll_rate_rad_s=self.amplitude_rad * omega * math.cos(angle),
                              quality=0)]  # fmt: skip
         if self.due("SENSOR_TANK", now_ns):
-            level_m = 0.4 * math.cos(angle)
+            self.move(self.amplitude_rad * math.sin(angle), omega)
+            level_m = self.level_m
             frames += [
                 self.frame("SENSOR_TANK", port_level_m=-level_m, starboard_level_m=level_m,
                            port_high=0, starboard_high=0, quality=0),
                 self.frame("SENSOR_PUMP", pressure_pa=self.pressure_pa(), flow_m3_s=0, quality=0),
             ]  # fmt: skip
         return frames + self.life(now_ns)
+
+    def move(self, roll_rad: float, omega_rad_s: float) -> None:
+        """Water for 20 ms, thesis (2.19)."""
+        lift_m = TANK.height_m + TANK.lz_m
+        push = TANK.width_m * (9.80665 - lift_m * omega_rad_s**2) * roll_rad
+        loss_pa = TANK.loss_pa_per_m_s * self.level_rate_m_s
+        push += (self.pressure_pa() - loss_pa) / TANK.density_kg_m3 - 2 * 9.80665 * self.level_m
+        self.level_rate_m_s += push / TANK.effective_length_m * 0.02
+        self.level_m += self.level_rate_m_s * 0.02
 
     def pressure_pa(self) -> float:
         return self.heard.get("DRIVE_STATUS_1", {}).get("pressure_pa", 0.0)

@@ -43,7 +43,7 @@ TRIAL: Final = TrialSettings(
 LOSING: Final = 1.2
 """Roll over the passive ship's at which a law has lost and the pump rests."""
 LOSING_PERIODS: Final = 4.0
-"""Roll periods that this is judged by, once half of them have passed."""
+"""Roll periods that this is judged by: half as many condemned sound laws by their first waves."""
 LEAST_ROLL_RAD: Final = math.radians(0.25)
 """Root mean square of the roll below which nothing is judged."""
 AWAY: Final = 5.0
@@ -123,7 +123,7 @@ class RenewingController(LawExchange):
         lately.add(self._roll_rad, 0.0, self._passive_roll_rad)
         now = lately.statistics
         if (
-            2 * lately.samples > lately.length
+            lately.full
             and now.roll_rad > max(LEAST_ROLL_RAD, LOSING * now.passive_roll_rad)
             and now.passive_roll_rad > 0  # it is known
         ):
