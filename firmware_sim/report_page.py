@@ -18,7 +18,7 @@ from utank_hil.commands.report_parts import (
     printed,
     roll_figure,
 )
-from utank_hil.commands.ship_report import ship_line
+from utank_hil.commands.ship_report import power_words, ship_line
 from utank_hil.configuration import Vessel
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.telemetry.recording import read_recording
@@ -26,6 +26,25 @@ from utank_hil.telemetry.recording import read_recording
 Recorded = Mapping[str, Mapping[str, FloatArray]]
 """Columns by run."""
 FIGURES, PICTURE, RECORDING = "bench.json", "bench.png", "bench.rrd"
+
+_SEAS: Final = {
+    "measured": "measured",
+    "jonswap": "growing (JONSWAP)",
+    "ittc": "of given height and period (ITTC)",
+    "pierson_moskowitz": "fully developed (Pierson-Moskowitz)",
+    "regular": "one regular wave",
+}
+_SEA_KEYS: Final = {
+    "time": "{} UTC",
+    "until": "to {} UTC",
+    "hs_m": "significant height {:g} m",
+    "tp_s": "peak period {:g} s",
+    "amplitude_m": "amplitude {:g} m",
+    "period_s": "period {:g} s",
+    "spreading": "spread as cos^2s with s = {:g}",
+    "course_deg": "her course {:g}° from true north",
+    "heading_deg": "waves at {:g}° to her course (0° following, 90° from port, 180° head)",
+}
 
 
 def bench_report(folder: Path, scratch: Path) -> Report:
@@ -91,8 +110,8 @@ def _verdict(content: dict[str, Any]) -> Verdict:
             line += f", {_less(below)} than the passive tank"
         if bare is not None:
             line += f" and {_less(bare)} than no tank"
-        power = best["pump"]["power_mean_w"]
-        lines.append(f"{line}, for {power / 1e3:.3g} kW of shaft power on average.")
+        power = power_words(best["pump"]["power_mean_w"])
+        lines.append(f"{line}, for {power} of shaft power on average.")
     wrong = [*content["endings"], *content["limits_passed"]]
     lines += wrong or ["No run failed, and no limit of the model was passed."]
     return Verdict(lines, good=not wrong)
@@ -102,14 +121,24 @@ def _less(share: float) -> str:
     return f"{abs(share):.0%} {'less' if share >= 0 else 'more'}"
 
 
+def sea_words(sea: Mapping[str, Any]) -> str:
+    """The section ``sea`` of a scenario, for people."""
+    words = [_SEAS[sea["kind"]]]
+    for key, said in _SEA_KEYS.items():
+        value = sea.get(key)
+        if value is not None:
+            words.append(said.format(value.replace("T", " ") if isinstance(value, str) else value))
+    if sea.get("speed_m_s"):
+        words.append(f"her speed {sea['speed_m_s']:g} m/s")
+    return ", ".join(words)
+
+
 def _what_was_run(content: dict[str, Any]) -> list[str]:
     vessel = Vessel.model_validate(content["configuration"]["vessel"])
-    sea = content["configuration"]["sea"]
-    keys = ("kind", "hs_m", "tp_s", "time", "heading_deg")
     names = [run["name"] for run in content["runs"] if run["name"] != PASSIVE]
     return [
         f"Ship: {vessel.name}. {ship_line(vessel)}",
-        f"Sea: {', '.join(f'{key} {sea[key]}' for key in keys if sea.get(key) is not None)}.",
+        f"Sea: {sea_words(content['configuration']['sea'])}.",
         f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
     ]
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
+from firmware_sim.report_page import sea_words
 from firmware_sim.scenario_sea import ScenarioSea
 from firmware_sim.voyage import Waypoint
 from utank_hil.configuration import ConfigError, Section, load_config
@@ -163,3 +164,27 @@ def test_the_document_s_sections_are_valid(tmp_path: Path) -> None:
     assert [Waypoint.model_validate(point).time_s for point in voyage] == [
         1800, 3600, 3660, 4200, 6600
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (
+            {"kind": "jonswap", "hs_m": 2.0, "tp_s": 8.7, "speed_m_s": 5.0},
+            "growing (JONSWAP), significant height 2 m, peak period 8.7 s, waves at 90° to her "
+            "course (0° following, 90° from port, 180° head), her speed 5 m/s",
+        ),
+        (
+            {"kind": "regular", "amplitude_m": 0.5, "period_s": 10.0, "heading_deg": 45.0},
+            "one regular wave, amplitude 0.5 m, period 10 s, waves at 45° to her course "
+            "(0° following, 90° from port, 180° head)",
+        ),
+    ],
+)
+def test_a_report_says_the_sea_in_words(tmp_path: Path, content: dict[str, Any], said: str) -> None:
+    assert sea_words(load_sea(tmp_path, content).model_dump(mode="json")) == said
+
+
+@pytest.mark.parametrize("kind", IRREGULAR)
+def test_a_report_has_words_for_every_spectrum(tmp_path: Path, kind: str) -> None:
+    assert "_" not in sea_words(load_sea(tmp_path, IRREGULAR[kind]).model_dump(mode="json"))

@@ -125,9 +125,9 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
         ("  in metres of water", f"{figures['pump_head_m']:.2f} m"),
         ("heel that it holds", _held(figures["pump_heel_rad"], figures["pump_heel_at_the_end"])),
         ("flow from full to empty at the roll period", f"{figures['pump_flow_m3_s']:.3g} m³/s"),
-        ("power of pressure and flow, without losses", _power(figures["pump_power_asked_w"])),
-        ("power to hold the pressure in still water", _power(figures["pump_power_held_w"])),
-        ("power of the motor", _power(figures["pump_power_w"])),
+        ("power of pressure and flow, without losses", power_words(figures["pump_power_asked_w"])),
+        ("power to hold the pressure in still water", power_words(figures["pump_power_held_w"])),
+        ("power of the motor", power_words(figures["pump_power_w"])),
     ]
 
 
@@ -201,7 +201,7 @@ def ship_line(vessel: Vessel) -> str:
     if vessel.pump is not None:
         pump = (
             f"the pump presses {figures['pump_head_m']:.2g} m of water, moves up to "
-            f"{figures['pump_flow_m3_s']:.3g} m³/s and has {_power(figures['pump_power_w'])}"
+            f"{figures['pump_flow_m3_s']:.3g} m³/s and has {power_words(figures['pump_power_w'])}"
         )
     if vessel.valve is not None:
         pump += f"; a valve in the {vessel.valve.kind} opens in {vessel.valve.opening_time_s:g} s"
@@ -217,7 +217,8 @@ def _tonnes(mass_kg: float) -> str:
     return f"{mass_kg / 1e3:.3g} t"
 
 
-def _power(power_w: float) -> str:
+def power_words(power_w: float) -> str:
+    """A power with the unit that suits it."""
     return f"{power_w / 1e6:.2f} MW" if power_w >= 1e6 else f"{power_w / 1e3:.3g} kW"
 
 
