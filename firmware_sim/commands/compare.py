@@ -80,11 +80,14 @@ def _recording(place: Path) -> Path:
 
 
 def _table(reference: Path, found: list["Comparison"]) -> Table:
+    intervals = any(
+        figure.half_width is not None for each in found for figure in each.figures.values()
+    )
     table = new_table(
         f"{shown(Path(found[0].source))} against {shown(reference)}",
         *("first", "this", "difference", "%", "pairs"),
         names=("run", *found[0].parameters, "figure"),
-        caption="difference ± half width of its 95 % interval",
+        caption="difference ± half width of its 95 % interval" if intervals else None,
     )
     for each in found:
         for name, figure in each.figures.items():

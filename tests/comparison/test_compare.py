@@ -232,6 +232,7 @@ def test_table_of_a_bench_fits_eighty_columns(tmp_path: Path, monkeypatch: pytes
         recorded(Path(f"{n}.rrd"), waves(n, 2400.0))
     done = CliRunner().invoke(APP, ["1.rrd", "2.rrd"])
     assert "┃ figure " in done.stdout
+    assert "± half width of its 95 % interval" in done.stdout
 
 
 def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
@@ -241,6 +242,7 @@ def test_record_that_is_too_short_has_no_interval(tmp_path: Path):
     assert "no interval: shorter than 120 rolls" in each["remarks"][-1]
     done = CliRunner().invoke(APP, list(map(str, short)))
     assert "no interval" in done.stdout
+    assert "±" not in done.stdout
 
 
 def test_what_can_not_be_compared_is_said(tmp_path: Path):
