@@ -53,6 +53,16 @@ def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
         assert seen.complaints == []
 
 
+def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: Path) -> None:
+    with opened(browser, (site.parent / "README.html").as_uri(), PHONE) as seen:
+        seen.page.wait_for_load_state("load")
+        names = seen.page.locator("td code")
+        assert names.count() > 5
+        for name in names.all():
+            assert name.evaluate("each => each.getClientRects().length") == 1, name.inner_text()
+        assert seen.too_wide <= 0
+
+
 def test_the_gallery_shows_its_curves(browser: Browser, site: Path) -> None:
     with opened(browser, (site / "gallery.html").as_uri(), DESK) as seen:
         seen.page.wait_for_load_state("load")
