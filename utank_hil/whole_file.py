@@ -34,12 +34,20 @@ def left_whole(path: Path) -> Iterator[None]:
     OSError
         If it can't be written, with its name.
     """
+    with errors_name(path):
+        try:
+            yield
+        except BaseException as error:
+            if path.is_file() and not isinstance(error, PermissionError):
+                path.unlink()
+            raise
+
+
+@contextmanager
+def errors_name(path: Path) -> Iterator[None]:
+    """Have an `OSError` say of which file it is: one of writing does not."""
     try:
         yield
-    except BaseException as error:
-        if path.is_file() and not isinstance(error, PermissionError):
-            path.unlink()
-        if isinstance(error, OSError):
-            reason = os.strerror(error.errno) if error.errno else str(error)
-            raise OSError(error.errno, reason, str(path)) from error
-        raise
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OSError(error.errno, reason, str(path)) from error

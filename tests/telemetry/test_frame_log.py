@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_whole_file import little_room
 
 from utank_hil.telemetry.bus_records import LAYOUT, RECORD, Kind, Records
 from utank_hil.telemetry.frame_log import BlockSink, FrameLog, FrameLogError, FrameLogWriter
@@ -121,3 +122,11 @@ def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
     (tmp_path / "b.frames").write_bytes((tmp_path / "b.frames").read_bytes()[:30])
     with pytest.raises(FrameLogError, match=r"b\.frames is cut at byte 30"):
         FrameLog(tmp_path / "b.frames")
+
+
+def test_a_log_that_does_not_fit_is_named_and_read_up_to_there(tmp_path: Path) -> None:
+    file = tmp_path / "a.frames"
+    with little_room(), pytest.raises(OSError, match=f"File too large: '{file}'"):
+        write_log(file, 230)
+    _, log = read(file)
+    assert f"{file.name} is cut" in log.cut

@@ -19,6 +19,7 @@ import numpy as np
 from utank_hil.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Records, pack, unpack
 from utank_hil.telemetry.rotation import Rotation, part_of, remove_oldest
+from utank_hil.whole_file import errors_name
 
 SUFFIX: Final = ".frames"
 BLOCK_NS: Final = 500_000_000
@@ -60,7 +61,7 @@ class FrameLogWriter(Closing):
     Raises
     ------
     OSError
-        If it can't be written.
+        If it can't be written, with its name; also of `write` and `close`.
     """
 
     def __init__(
@@ -88,7 +89,7 @@ class FrameLogWriter(Closing):
             self._begin_ns = begin_ns
         rotation = self._rotation
         if rotation is not None and begin_ns - self._begin_ns >= rotation.part_s * 1e9:
-            self._content.close()
+            self.close()
             self._begin_ns = begin_ns
             self._begin()
         packed = pack(records)
@@ -99,7 +100,8 @@ class FrameLogWriter(Closing):
 
     def close(self) -> None:
         """Close the file; idempotent."""
-        self._content.close()
+        with errors_name(Path(self._content.name)):
+            self._content.close()
 
     def _begin(self) -> None:
         self.count += 1
@@ -112,9 +114,10 @@ class FrameLogWriter(Closing):
 
     def _append(self, kind: bytes, payload: bytes) -> None:
         header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))
-        self._content.write(header + payload)
-        self._content.flush()
-        os.fsync(self._content.fileno())
+        with errors_name(Path(self._content.name)):
+            self._content.write(header + payload)
+            self._content.flush()
+            os.fsync(self._content.fileno())
 
 
 class BlockSink:
