@@ -21,6 +21,7 @@ from firmware_sim.campaign.metrics import METRICS
 from firmware_sim.campaign.simulations import Row
 from firmware_sim.campaign.study import LoadedStudy
 from firmware_sim.campaign.work import LOST
+from utank_hil.whole_file import errors_name, left_whole
 
 STUDY, ABOUT, CASES, ROWS = "study.yaml", "study.json", "cases.parquet", "rows"
 SUMMARY, PICTURE = "summary.json", "campaign.png"
@@ -166,5 +167,6 @@ def _column(values: Iterable[Any]) -> pa.Array:
 def _replacing(file: Path) -> Iterator[Path]:
     """A name to write a file under, which then takes its place at once."""
     temporary = file.with_name(file.name + ".part")
-    yield temporary
-    temporary.replace(file)
+    with errors_name(file), left_whole(temporary):
+        yield temporary
+        temporary.replace(file)

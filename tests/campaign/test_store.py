@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from studies import small
+from test_whole_file import little_room
 
 from firmware_sim.campaign.store import Store, StoreError, read_results
 from firmware_sim.campaign.work import FAILED, LOST, OK, failed_row
@@ -66,3 +67,14 @@ def test_results_are_not_overwritten_unasked_and_those_of_other_cases_are_left_a
     found = read_results(tmp_path / "out")
     assert [each["case"] for each in found.cases] == [loaded.cases[0].name]
     assert (tmp_path / "out" / "study.yaml").read_bytes() == loaded.path.read_bytes()
+
+
+def test_rows_that_do_not_fit_are_named_and_those_before_stay(tmp_path: Path):
+    store = Store(tmp_path)
+    (tmp_path / "rows").mkdir()
+    store.write(rows("c1"))
+    many = [row for number in range(300) for row in rows(f"c{number}", roll=number**0.5)]
+    with little_room(), pytest.raises(OSError, match=rf"File too large: '{tmp_path}/rows/.*parq"):
+        store.write(many)
+    assert store.done() == {"c1"}
+    assert len(list((tmp_path / "rows").iterdir())) == 1
