@@ -1,6 +1,9 @@
 """What a command tells by its exit code."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -45,6 +48,31 @@ def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
     assert result.exit_code == ExitCode.BUS_LOST
     report = json.loads(result.stdout)
     assert (report["exit_code"], report["fault"]) == (ExitCode.BUS_LOST, "BUS_LOST")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+@pytest.mark.parametrize("gone", ["full", "closed"])
+def test_run_goes_on_and_keeps_its_code_where_its_terminal_is_full_or_gone(
+    stream: str, gone: str
+) -> None:
+    program = (
+        "import ports, utank_hil.commands.run\n"
+        "utank_hil.commands.run.SocketCanPort = ports.DeadBus\n"
+        "from utank_hil.cli import main; main()"
+    )
+    words = ["run", str(GPC), "--bus", "any0", "--duration", "0.3"]
+    read, written = os.pipe()
+    os.close(read)
+    with Path("/dev/full").open("w") as full, os.fdopen(written, "w") as closed:
+        done = subprocess.run(
+            [sys.executable, "-c", program, *words],
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+            **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            | {stream: full if gone == "full" else closed},  # type: ignore[call-overload]
+            check=False,
+        )
+    assert done.returncode == ExitCode.BUS_LOST
 
 
 def test_codes_differ_and_the_shells_own_are_left_alone() -> None:

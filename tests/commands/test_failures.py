@@ -91,17 +91,27 @@ def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> N
     assert done.stderr == "error: No space left on device\n"
 
 
+def test_no_output_at_all_ends_with_the_same_code() -> None:
+    with Path("/dev/full").open("w") as full:
+        assert started(("check", GPC), stdout=full, stderr=full).returncode == ExitCode.USAGE
+
+
 def test_a_terminal_that_lacks_a_sign_gets_a_question_mark() -> None:
     done = started(("check", GPC), stdout=subprocess.PIPE, encoding="ascii")
     assert done.returncode == ExitCode.OK, done.stderr
     assert "m?/s" in done.stdout
 
 
-def started(words: tuple[str, ...], stdout: object, encoding: str = "utf-8") -> Any:
+def started(
+    words: tuple[str, ...],
+    stdout: object,
+    encoding: str = "utf-8",
+    stderr: object = subprocess.PIPE,
+) -> Any:
     return subprocess.run(
         [sys.executable, "-c", "from utank_hil.cli import main; main()", *words],
         stdout=stdout,
-        stderr=subprocess.PIPE,
+        stderr=stderr,
         text=True,
         env=os.environ | {"PYTHONIOENCODING": encoding, "COLUMNS": "200"},
         check=False,

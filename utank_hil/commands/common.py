@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn, TypeVar
 
@@ -58,8 +59,20 @@ Duration = Annotated[
     typer.Option("--duration", min=0.1, max=1e9, metavar="SECONDS", help="Length of a run."),
 ]
 
+
+class _Notes(Console):
+    """What goes to standard error; where that is full or gone, the command goes on without."""
+
+    def print(self, *objects: Any, **how: Any) -> None:
+        with suppress(OSError):
+            super().print(*objects, **how)
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+
+
 # progress, notes and errors; standard output is for results
-notes: Final = Console(stderr=True, highlight=False)
+notes: Final = _Notes(stderr=True, highlight=False)
 
 
 def finite(value: Any) -> Any:

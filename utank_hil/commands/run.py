@@ -164,7 +164,8 @@ def run(
             )
         manager.stopping()
     kept = None if out is None else recording.summary
-    with suppress(OSError):  # a full disk behind the output: the exit code tells how the run ended
+    # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
+    with suppress(OSError, SystemExit):
         if announcer is not None and announcer.error is not None:
             said = escape(announcer.error)
             notes.print(f"[red]events were not logged:[/red] {said}", soft_wrap=True)
