@@ -5,6 +5,7 @@ import multiprocessing
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnContext
 from pathlib import Path
@@ -15,7 +16,7 @@ from firmware_sim.real_time_run import join, run_controller, run_in_one_process,
 from firmware_sim.run import RECORD_S, Job, Run, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
-from firmware_sim.worker_pool import WorkerPool, shared
+from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
 from utank_hil.configuration import ControllerConfig
@@ -65,6 +66,8 @@ class BenchResult:
         Time all of it took.
     without_tank_capsized_s : float
         When the bare ship capsized; infinite if it did not.
+    killed : bool
+        Whether a process of it was killed from outside, which ended the runs that went on.
     """
 
     scenario: Scenario
@@ -79,6 +82,7 @@ class BenchResult:
     interrupted: bool
     wall_s: float
     without_tank_capsized_s: float = math.inf
+    killed: bool = False
 
     @property
     def expected_rows(self) -> int:
@@ -200,6 +204,8 @@ def run_bench(
     ------
     OSError
         If the interface can't be used, or everything was ended before the first sample.
+    BrokenProcessPool
+        If a process was killed before the passive run had ended.
     """
     seed = scenario.seed if options.seed is None else options.seed
     duration_s = scenario.duration_s if options.duration_s is None else options.duration_s
@@ -210,12 +216,20 @@ def run_bench(
     workers = 2 if options.channel is not None or not options.real_time else 1
     with stop_on_signals() as stopped:
         board = _Board(multiprocessing.get_context("spawn"), len(jobs))
-        with WorkerPool(workers, board) as pool:
-            runs = list(_run_all(pool, jobs, options, board, stopped, progress))
+        runs: list[Run] = []
+        killed = False
+        try:
+            with WorkerPool(workers, board) as pool:
+                for run in _run_all(pool, jobs, options, board, stopped, progress):
+                    runs.append(run)  # noqa: PERF402, those before an error are kept
+        except BrokenProcessPool:
+            if not runs or runs[0].name != PASSIVE:
+                raise
+            killed = True
         interrupted = stopped()
     if not runs or len(runs[0].rows) == 0:
         raise InterruptedError("ended before the first sample")
-    return _result(jobs, runs, _mode(options), interrupted, started)
+    return replace(_result(jobs, runs, _mode(options), interrupted, started), killed=killed)
 
 
 def run_in_turn(
@@ -288,7 +302,7 @@ def _run_all(
     def start(function: Callable[..., Any], index: int, *arguments: object) -> Future[Any]:
         return pool.submit(_call, function, index, *arguments)
 
-    def wait(futures: list[Future[Any]]) -> list[Any]:
+    def wait(futures: list[Future[Any]]) -> Iterable[Any]:
         while not all(future.done() for future in futures):
             time.sleep(POLL_S)
             # where one side has failed, the other must not wait for it
@@ -298,7 +312,7 @@ def _run_all(
                 board.begin_ns.value = time.monotonic_ns() + BEGIN_AFTER_NS
             for job, done in zip(jobs, board.done_s, strict=True):
                 progress(job.name, done.value)
-        return [future.result() for future in futures]
+        return whole_first(futures)
 
     if not options.real_time:
         yield from wait([start(run_lockstep, index, job) for index, job in enumerate(jobs)])

@@ -19,6 +19,7 @@ from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.commands.common import finite, why
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.failures import KILLED
 from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
@@ -34,6 +35,8 @@ def endings(result: BenchResult) -> list[str]:
     said = []
     if result.interrupted:
         said.append(f"ended at {result.end_s:g} of {result.duration_s:g} s")
+    if result.killed:
+        said.append(KILLED)
     if result.not_run:
         said.append(f"not run: {', '.join(result.not_run)}")
     if result.without_tank_capsized_s < result.end_s:
@@ -53,6 +56,8 @@ def exit_code(result: BenchResult) -> ExitCode:
     """How a bench ended, for scripts."""
     if result.interrupted:
         return ExitCode.INTERRUPTED
+    if result.killed:
+        return ExitCode.SYSTEM
     marked = any(mark_of(result, run) for run in result.runs)
     return ExitCode.NOT_RANKED if marked or result.not_run else ExitCode.OK
 

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from utank_hil.commands.common import CONFIGS, Json, fail, load, notes, prepare_out, shown
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.failures import KILLED
 from utank_hil.commands.tables import print_table
 from utank_hil.provenance import describe
 
@@ -90,6 +91,7 @@ def faults(
             recorded=out is not None,
         )
         interrupted = stopped()
+    killed = not interrupted and any(len(outcomes[row.id]) < seeds for row in chosen)
     results = [
         judged(row, loaded.setups[row.setup], requirement_text(loaded, row.meets), outcomes[row.id])
         for row in chosen
@@ -112,7 +114,8 @@ def faults(
             on_bus.append(run_live(row, str(bus), requirement_text(loaded, row.meets)))
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
-    not_run |= {row.id: "interrupted" for row in chosen if len(outcomes[row.id]) < seeds}
+    ended = KILLED if killed else "interrupted"
+    not_run |= {row.id: ended for row in chosen if len(outcomes[row.id]) < seeds}
     options = {"seeds": seeds, "full": full, "rows": names}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     if out is not None:
@@ -139,6 +142,8 @@ def faults(
             f"compared over {window.stopped_s:g} s, in charge over {window.running_s:g} s; "
             f"{time.monotonic() - began:.0f} s."
         )
+    if killed:
+        fail(KILLED, ExitCode.SYSTEM)
     if interrupted:
         raise typer.Exit(ExitCode.INTERRUPTED)
     on_bus_passed = all(told["verdict"] == "pass" for told in on_bus)

@@ -6,6 +6,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.sharedctypes import Synchronized
@@ -13,7 +14,7 @@ from typing import Any, Final
 
 from firmware_sim.fault_campaign.campaign import Campaign, Row
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window
-from firmware_sim.worker_pool import WorkerPool, shared
+from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.assembly import build_law
 from utank_hil.control import BuiltLaw
 
@@ -89,7 +90,7 @@ def run_rows(
     Returns
     -------
     dict of str to list of Outcome
-        By row, in the order of the seeds; less where it was ended early.
+        By row, in the order of the seeds; less where it was ended early, or a process was killed.
     """
     context = multiprocessing.get_context("spawn")
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
@@ -98,7 +99,9 @@ def run_rows(
         by_setup[row.setup].append(row)
     workers = workers or len(os.sched_getaffinity(0))
     futures: list[Future[list[Outcome]]] = []
-    with WorkerPool(workers, _Shared(campaign, window, recorded, done, stop)) as pool:
+    outcomes: list[Outcome] = []
+    common = _Shared(campaign, window, recorded, done, stop)
+    with suppress(BrokenProcessPool), WorkerPool(workers, common) as pool:
         for seed in seeds:
             for setup, its in by_setup.items():
                 tasks = -(-len(its) // ROWS_A_TASK)
@@ -117,7 +120,8 @@ def run_rows(
                     future.cancel()
             progress(done.value)
         ended = (future for future in futures if not future.cancelled())
-        outcomes = [each for future in ended for each in future.result()]
+        for done_together in whole_first(ended):
+            outcomes += done_together
     found: dict[str, list[Outcome]] = {row.id: [] for row in rows}
     for each in sorted(outcomes, key=lambda each: seeds.index(each.seed)):
         found[each.row].append(each)

@@ -22,6 +22,7 @@ from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_differ
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH
+from firmware_sim.worker_pool import end_with
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import estimator_work
 from utank_hil.canbus import Fault, Mode
@@ -358,9 +359,11 @@ def in_a_copy(work: Callable[[], T], stopped: Callable[[], bool] = lambda: False
         With the traceback, if it failed.
     """
     reading, writing = os.pipe()
+    parent_pid = os.getpid()
     child = os.fork()
     if child == 0:
         try:
+            end_with(parent_pid)
             try:
                 told = pickle.dumps((True, work()))
             except Exception:  # raised again by the parent

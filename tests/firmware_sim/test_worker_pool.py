@@ -5,13 +5,15 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
-from firmware_sim.worker_pool import WorkerPool, shared
+from firmware_sim.worker_pool import WorkerPool, shared, whole_first
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.failures import KILLED
 from utank_hil.runtime.stopping import SIGNALS
 
 BUSY_S = 2.0
@@ -44,6 +46,16 @@ def test_one_that_is_killed_takes_the_others_along() -> None:
         pool.submit(killed).result()
 
 
+def test_what_is_whole_is_kept_beside_what_was_lost() -> None:
+    lost, whole = Future[str](), Future[str]()
+    lost.set_exception(BrokenProcessPool())
+    whole.set_result("whole")
+    found = []
+    with pytest.raises(BrokenProcessPool):
+        found.extend(whole_first([lost, whole]))
+    assert found == ["whole"]
+
+
 def in_session(number: int) -> dict[int, float]:
     """Processes of a session that live, and the seconds that each has computed."""
     found = {}
@@ -58,27 +70,61 @@ def in_session(number: int) -> dict[int, float]:
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", COMMANDS)
-def test_sigterm_to_all_processes_ends_a_command_in_order(tmp_path: Path, name: str) -> None:
-    words = [name, *COMMANDS[name], str(tmp_path)]
-    with subprocess.Popen(
-        [sys.executable, "-c", "from utank_hil.cli import main; main()", *words],
+def at_work(name: str, out: Path) -> "subprocess.Popen[str]":
+    """A command in a session of its own."""
+    return subprocess.Popen(
+        [
+            *(sys.executable, "-c", "from utank_hil.cli import main; main()"),
+            *(name, *COMMANDS[name], str(out)),
+        ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-    ) as process:
-        while not any(
-            seconds > BUSY_S
-            for pid, seconds in in_session(process.pid).items()
-            if pid != process.pid
-        ):
-            assert process.poll() is None
-            time.sleep(0.02)
+        env=os.environ | {"COLUMNS": "200"},
+    )
+
+
+def a_worker(process: "subprocess.Popen[str]") -> int:
+    """One of the command's processes, when it is busy."""
+    while True:
+        for pid, seconds in in_session(process.pid).items():
+            if pid != process.pid and seconds > BUSY_S:
+                return pid
+        assert process.poll() is None
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMMANDS)
+def test_sigterm_to_all_processes_ends_a_command_in_order(tmp_path: Path, name: str) -> None:
+    with at_work(name, tmp_path) as process:
+        a_worker(process)
         os.killpg(process.pid, signal.SIGTERM)
         _, errors = process.communicate()
     assert process.returncode == ExitCode.INTERRUPTED, errors
     assert "Traceback" not in errors
     while in_session(process.pid):  # what keeps account of shared memory ends after it
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bench", "faults"])
+def test_a_process_that_is_killed_is_said_with_a_code_of_its_own(tmp_path: Path, name: str) -> None:
+    with at_work(name, tmp_path) as process:
+        os.kill(a_worker(process), signal.SIGKILL)
+        _, errors = process.communicate()
+    assert process.returncode == ExitCode.SYSTEM, errors
+    assert errors.splitlines()[-1] == f"error: {KILLED}"
+    assert "Traceback" not in errors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bench", "faults"])
+def test_processes_end_with_the_command_that_is_killed(tmp_path: Path, name: str) -> None:
+    with at_work(name, tmp_path) as process:
+        a_worker(process)
+        process.kill()
+        process.communicate()
+    while in_session(process.pid):
         time.sleep(0.02)

@@ -55,6 +55,13 @@ class ExitCode(IntEnum):
         "The results are written, but a run is marked and not ranked: the ship capsized, the "
         "controller ended in a fault or was too seldom in charge, or rows are missing.",
     )
+    SYSTEM = (
+        7,
+        "`run`, `bench`, `faults`",
+        "The system refused what the command needs, such as a process or shared memory, or a "
+        "process of it was killed. `bench` and `faults` keep what there is. Starting again may "
+        "help.",
+    )
     INTERRUPTED = (
         130,
         "all but `panel`, `monitor`",

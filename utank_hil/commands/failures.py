@@ -4,6 +4,7 @@ import errno
 import io
 import sys
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import Final
 
@@ -25,6 +26,7 @@ EXTRA_OF: Final = {
     "rerun_cli": "viewer",
 }
 """Packages that are not needed to run the controller, and the extra that installs each."""
+KILLED: Final = "a process of this command was killed: too little memory?"
 
 
 @contextmanager
@@ -47,6 +49,9 @@ def failures_named() -> Iterator[None]:
             soft_wrap=True,
         )
         raise SystemExit(ExitCode.USAGE) from None
+    except BrokenExecutor:
+        notes.print(f"[red]error:[/red] {KILLED}", soft_wrap=True)
+        raise SystemExit(ExitCode.SYSTEM) from None
     except OSError as error:
         if error.filename is None and error.errno != errno.ENOSPC:
             raise
