@@ -1,5 +1,6 @@
 """What a command tells by its exit code."""
 
+import errno
 import json
 import os
 import subprocess
@@ -8,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from ports import DeadBus
+from ports import DeadBus, QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.canbus import Fault, Mode
@@ -48,6 +49,21 @@ def test_run_on_a_bus_that_is_down_ends_with_the_code_of_a_lost_bus(
     assert result.exit_code == ExitCode.BUS_LOST
     report = json.loads(result.stdout)
     assert (report["exit_code"], report["fault"]) == (ExitCode.BUS_LOST, "BUS_LOST")
+
+
+def test_run_that_the_system_refuses_memory_is_started_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files", "/psm_1")
+
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(module, "RunRecording", refuse)
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
+    assert result.exit_code == ExitCode.SYSTEM
+    assert result.stderr.splitlines()[-1] == "error: /psm_1: Too many open files"
+    unit = Path("deploy/utank-hil.service").read_text(encoding="utf-8")
+    assert f"RestartPreventExitStatus={ExitCode.USAGE:d}\n" in unit
 
 
 @pytest.mark.slow

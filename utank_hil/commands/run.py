@@ -3,8 +3,8 @@
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -111,7 +111,7 @@ def run(
     if refused:
         notes.print("[yellow]arming will be refused:[/yellow]", escape(refused), soft_wrap=True)
     statistics = LoopStatistics()
-    with ExitStack() as stack:
+    with _refusals_named(), ExitStack() as stack:
         manager = _service_manager(stack)
         port = _port(stack, bus)
         stop = stack.enter_context(stop_on_signals())
@@ -176,11 +176,20 @@ def run(
     raise typer.Exit(_code(node))
 
 
+@contextmanager
+def _refusals_named() -> Iterator[None]:
+    """End in words, and so that a service manager starts it again, where the system refuses."""
+    try:
+        yield
+    except OSError as error:
+        fail(error, ExitCode.SYSTEM)
+
+
 def _service_manager(stack: ExitStack) -> ServiceManager:
     try:
         return stack.enter_context(ServiceManager())
     except OSError as error:
-        fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}")
+        fail(f"NOTIFY_SOCKET: the service manager can't be reached: {error}", ExitCode.SYSTEM)
 
 
 def _port(stack: ExitStack, bus: str) -> SocketCanPort:
@@ -273,7 +282,7 @@ def _alarm_lines(stack: ExitStack) -> AlarmLines:
     try:
         alarms = AlarmLines()
     except OSError as error:
-        fail(f"no process to print alarms: {error}")
+        fail(f"no process to print alarms: {error}", ExitCode.SYSTEM)
     stack.callback(alarms.close)
     return alarms
 
