@@ -39,3 +39,5 @@ def test_the_runs_and_signals_of_a_viewers_plot_are_told_apart() -> None:
 def test_the_parts_of_the_ships_section_are_told_apart() -> None:
     for one, other in ((WATER, HULL), (WATER, PUMP), (WATER, LIMIT), (HULL, TWIN), (SEA, WATER)):
         assert difference(shade(one), shade(other), grey=False) >= LEAST_DIFFERENCE
+    for other in (WATER, HULL):  # the arrow is as wide as the water that it lies in
+        assert difference(shade(PUMP), shade(other), grey=True) >= 3 * LEAST_DIFFERENCE
