@@ -3,20 +3,25 @@
 import json
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.common import CONFIGS, Json, fail, load, notes, prepare_out, shown
+from utank_hil.commands.common import CONFIGS, Json, fail, load, notes, prepare_out, shown, why
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.failures import KILLED
 from utank_hil.commands.tables import print_table
 from utank_hil.provenance import describe
+
+if TYPE_CHECKING:
+    from firmware_sim.fault_campaign.campaign import Campaign, LiveRow
+    from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
 
@@ -53,8 +58,7 @@ def faults(
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
-    from firmware_sim.fault_campaign.live import run_live
-    from firmware_sim.fault_campaign.report import as_json, requirement_text, table, write_junit
+    from firmware_sim.fault_campaign.report import as_json, requirement_text, write_junit
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window, write_recordings
     from firmware_sim.fault_campaign.verdict import judged
@@ -91,11 +95,12 @@ def faults(
             recorded=out is not None,
         )
         interrupted = stopped()
-    killed = not interrupted and any(len(outcomes[row.id]) < seeds for row in chosen)
+    partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
+    killed = bool(partly) and not interrupted
     results = [
         judged(row, loaded.setups[row.setup], requirement_text(loaded, row.meets), outcomes[row.id])
         for row in chosen
-        if len(outcomes[row.id]) == seeds
+        if row.id not in partly
     ]
     not_run = {
         each.id: f"{each.fault}: shown by {each.elsewhere}"
@@ -103,19 +108,9 @@ def faults(
     }
     not_run |= {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
-    to_run = [row for row in live if row.does]
-    if bus is None:
-        not_run |= {row.id: "needs a live bus: --bus" for row in to_run}
-        to_run = []
-    on_bus = []
-    try:
-        for row in to_run:
-            notes.print(f"{row.id} on {bus}")
-            on_bus.append(run_live(row, str(bus), requirement_text(loaded, row.meets)))
-    except OSError as error:
-        fail(error, ExitCode.NO_BUS)
-    ended = KILLED if killed else "interrupted"
-    not_run |= {row.id: ended for row in chosen if len(outcomes[row.id]) < seeds}
+    not_run |= dict.fromkeys(partly, KILLED if killed else "interrupted")
+    on_bus, waiting, bus_error = _on_bus(loaded, live, None if partly else bus)
+    not_run |= dict.fromkeys(waiting, bus_error or "needs a live bus: --bus")
     options = {"seeds": seeds, "full": full, "rows": names}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
     if out is not None:
@@ -126,18 +121,9 @@ def faults(
     if json_:
         sys.stdout.write(json.dumps(as_json(results, on_bus, not_run, about)) + "\n")
     else:
-        console = Console()
-        print_table(console, table(results))
-        for result in results:
-            for problem in result.problems:
-                console.print(f"[red]{result.row.id}: {escape(problem)}[/red]", soft_wrap=True)
-        for told in on_bus:
-            console.print(
-                f"{told['id']}: {told['verdict']}, found {told['found_ms']} ms, drive off "
-                f"{told['zero_ms']} ms, limit {told['limit_ms']} ms {'; '.join(told['problems'])}"
-            )
+        _print(results, on_bus)
         failed = sum(not result.passed for result in results)
-        console.print(
+        Console().print(
             f"{len(results)} rows in {seeds} seas, {failed} failed, {len(not_run)} not run; roll "
             f"compared over {window.stopped_s:g} s, in charge over {window.running_s:g} s; "
             f"{time.monotonic() - began:.0f} s."
@@ -146,9 +132,47 @@ def faults(
         fail(KILLED, ExitCode.SYSTEM)
     if interrupted:
         raise typer.Exit(ExitCode.INTERRUPTED)
+    if bus_error:
+        fail(bus_error, ExitCode.NO_BUS)
     on_bus_passed = all(told["verdict"] == "pass" for told in on_bus)
     if not (on_bus_passed and all(result.passed for result in results)):
         raise typer.Exit(ExitCode.REFUSED)
+
+
+def _on_bus(
+    campaign: "Campaign", live: Sequence["LiveRow"], bus: str | None
+) -> tuple[list[dict[str, Any]], list[str], str]:
+    """Results of the live rows, those that were not run, and why if it is the bus's fault."""
+    from firmware_sim.fault_campaign.live import run_live
+    from firmware_sim.fault_campaign.report import requirement_text
+
+    waiting = [row for row in live if row.does]
+    results: list[dict[str, Any]] = []
+    error = ""
+    try:
+        while bus is not None and waiting:
+            row = waiting[0]
+            notes.print(f"{row.id} on {bus}")
+            results.append(run_live(row, bus, requirement_text(campaign, row.meets)))
+            del waiting[0]
+    except OSError as why_not:
+        error = why(why_not)
+    return results, [row.id for row in waiting], error
+
+
+def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> None:
+    from firmware_sim.fault_campaign.report import table
+
+    console = Console()
+    print_table(console, table(results))
+    for result in results:
+        for problem in result.problems:
+            console.print(f"[red]{result.row.id}: {escape(problem)}[/red]", soft_wrap=True)
+    for told in on_bus:
+        console.print(
+            f"{told['id']}: {told['verdict']}, found {told['found_ms']} ms, drive off "
+            f"{told['zero_ms']} ms, limit {told['limit_ms']} ms {'; '.join(told['problems'])}"
+        )
 
 
 if __name__ == "__main__":  # as a part of the evidence

@@ -5,6 +5,8 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 from xml.etree import ElementTree
 
 import pytest
@@ -12,14 +14,15 @@ import typer
 from typer.testing import CliRunner
 
 from firmware_sim.commands.faults import faults
-from firmware_sim.fault_campaign import runner
+from firmware_sim.fault_campaign import live, runner
 from firmware_sim.fault_campaign.campaign import Campaign, Row
 from firmware_sim.fault_campaign.live import ACTIONS
 from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy
 from firmware_sim.fault_campaign.verdict import Result, judged
-from firmware_sim.fault_campaign.watch import first_difference
+from firmware_sim.fault_campaign.watch import BusLog, first_difference
 from utank_hil.assembly import build_law
+from utank_hil.canbus import Fault
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.runtime.faults import FAULTS
@@ -154,6 +157,34 @@ def test_the_worst_seed_counts_and_none_where_one_was_not_found() -> None:
     assert verdict("roll-sign-flipped", GOOD, missed).as_json()["found_ms"] is None
 
 
+@pytest.mark.parametrize(
+    ("row", "active_s", "over_s", "found_s", "found_ms"),
+    [
+        ("motion-silent", 1.0, None, 40.5, 500.0),  # from the fault, at 40 s
+        ("both-signs-from-start", 41.0, 43.0, 44.0, 1000.0),  # from the later of both
+        ("both-signs-from-start", 43.0, 41.0, 44.0, 1000.0),
+        ("rate-stuck", 1.0, 41.0, 41.2, 200.0),  # from where the difference shows
+        ("rate-stuck", 1.0, 41.0, 40.8, 0.0),  # found before that
+        ("rate-stuck", 1.0, None, 40.8, 0.0),
+        ("rate-stuck", 1.0, 41.0, None, None),
+    ],
+)
+def test_from_when_a_row_counts(
+    row: str, active_s: float, over_s: float | None, found_s: float | None, found_ms: float | None
+) -> None:
+    def ns(seconds: float | None) -> int | None:
+        return None if seconds is None else round(seconds * 1e9)
+
+    watch = SimpleNamespace(
+        active_ns=ns(active_s), over_ns=ns(over_s), found_ns=ns(found_s), pressed_ns=ns(40.0),
+        halved_ns=None, noted_ns=None, alarm_ns=None, code=Fault.NONE, alarms=(), armed_again=False,
+    )  # fmt: skip
+    sea = Sea.__new__(Sea)
+    sea._seed = 1
+    outcome = sea._measured(ROWS[row], cast(Any, watch), BusLog(), 40_000_000_000)
+    assert outcome.found_ms == found_ms
+
+
 def test_first_difference_of_two_logs() -> None:
     log = [(1, 2, b"a"), (3, 2, b"b")]
     assert first_difference(log, log, 10) is None
@@ -258,6 +289,27 @@ def test_a_row_that_fails_is_told_by_the_exit_code(tmp_path: Path) -> None:
     done = invoke(str(path), "--rows", "roll-spike", "--seeds", "1")
     assert done.exit_code == ExitCode.REFUSED
     assert "1 allowed" in done.output
+
+
+@pytest.mark.slow
+def test_a_bus_that_cannot_be_used_loses_no_results() -> None:
+    done = invoke("--rows", "held-arm-bit,live-controller-killed", "--seeds", "1", "--json",
+                  "--bus", "nosuch0")  # fmt: skip
+    assert done.exit_code == ExitCode.NO_BUS
+    told = json.loads(done.stdout)
+    assert [row["verdict"] for row in told["rows"]] == ["pass"]
+    (waiting,) = told["not_run"]
+    assert waiting["id"] == "live-controller-killed"
+    assert waiting["why"] in done.stderr
+
+
+def test_an_ended_campaign_begins_no_live_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "run_rows", lambda _, rows, *__, **___: {r.id: [] for r in rows})
+    monkeypatch.setattr(live, "run_live", lambda *_: pytest.fail("begun"))
+    done = invoke("--bus", "vcan0", "--json")
+    assert done.exit_code == ExitCode.SYSTEM
+    reasons = {each["id"]: each["why"] for each in json.loads(done.stdout)["not_run"]}
+    assert "--bus" in reasons["live-controller-killed"]
 
 
 @pytest.mark.parametrize(
