@@ -66,6 +66,20 @@ def test_run_that_the_system_refuses_memory_is_started_again(
     assert f"RestartPreventExitStatus={ExitCode.USAGE:d}\n" in unit
 
 
+@pytest.mark.parametrize(("number", "named"), [(errno.ENOMEM, True), (errno.EBADF, False)])
+def test_run_names_what_the_system_refuses_and_hides_no_defect(
+    monkeypatch: pytest.MonkeyPatch, number: int, *, named: bool
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, "reason")
+
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(module, "build_controller_node", refuse)
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
+    assert isinstance(result.exception, SystemExit if named else OSError)
+    assert result.exit_code == (ExitCode.SYSTEM if named else 1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 @pytest.mark.parametrize("gone", ["full", "closed"])

@@ -1,5 +1,6 @@
 """``utank-hil run``: the deployed controller alone."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -57,6 +58,7 @@ from utank_hil.telemetry.event_ring import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
+_REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
 _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 
@@ -178,10 +180,15 @@ def run(
 
 @contextmanager
 def _refusals_named() -> Iterator[None]:
-    """End in words, and so that a service manager starts it again, where the system refuses."""
+    """End in words, and so that a service manager starts it again, where the system refuses.
+
+    Any other error is a defect: it keeps its traceback, and is started again, too.
+    """
     try:
         yield
     except OSError as error:
+        if error.filename is None and error.errno not in _REFUSALS:
+            raise
         fail(error, ExitCode.SYSTEM)
 
 

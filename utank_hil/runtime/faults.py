@@ -455,7 +455,8 @@ FAULTS: Final = (
         "configuration.",
         _found(
             Reaction.HALVE,
-            "five times the noise of the section `sensors`, three times for levels, over 0.7 s",
+            "five times the noise of the section `sensors`, 3.75 times in the sum of the levels, "
+            "over 0.7 s",
             Finding.NOISE,
         ),
     ),

@@ -65,12 +65,14 @@ def test_noise_ten_times_the_figure_is_found_within_two_seconds(
     assert found is expected
 
 
-def volume_findings(port_error_m: float, seconds: float, noise_m: float = 0.005) -> list[int]:
+def volume_findings(
+    port_error_m: float, seconds: float, noise_m: float = 0.005, port_noise_m: float = 0.0
+) -> list[int]:
     random, volume = np.random.default_rng(1), Volume(THRESHOLDS)
     found = []
     for k in range(round(seconds / 0.1)):
         level = 2.0 * math.sin(0.06 * k)
-        port, starboard = noise_m * random.standard_normal(2)
+        port, starboard = (max(noise_m, port_noise_m), noise_m) * random.standard_normal(2)
         found.append(volume.update(port_error_m - level + port, level + starboard, 0.1))
     return found
 
@@ -86,6 +88,12 @@ def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off() -> No
     assert not little[50] & Finding.VOLUME_LASTS
     assert little[-1] & Finding.VOLUME_LASTS
     assert volume_findings(8 * THRESHOLDS.volume_m, 5)[-1] & Finding.VOLUME_LASTS
+
+
+def test_noise_of_one_gauge_is_seen_from_four_times_its_figure() -> None:
+    found = volume_findings(0.0, 60.0, port_noise_m=0.0225)
+    assert np.mean([bool(each & Finding.NOISE) for each in found]) > 0.6
+    assert not any(volume_findings(0.0, 600.0, port_noise_m=0.0075))
 
 
 def test_noise_of_the_gauges_is_seen_in_their_sum() -> None:
@@ -138,6 +146,22 @@ def test_stalled_drive_is_found_by_300_ms_and_lost_by_500(begin_s: float) -> Non
     assert found[Finding.DRIVE_LAGS] - off_s <= 0.3 + STEP_S
     assert found[Finding.DRIVE_LOST] - off_s <= 0.5 + STEP_S
     assert Finding.PUMP_SIGN not in found
+
+
+@pytest.mark.parametrize(
+    ("share", "what", "updates"),
+    [(0.0, Finding.DRIVE_LAGS, 4), (0.0, Finding.DRIVE_LOST, 9), (-1.0, Finding.PUMP_SIGN, 3)],
+)
+def test_how_many_steps_a_drive_may_be_off(share: float, what: Finding, updates: int) -> None:
+    """With the step in which the fault began and the model's lag: 300, 500 and 200 ms."""
+    monitor = DriveFollowing(LAG_S, THRESHOLDS, STEP_S)
+    for _ in range(60):
+        assert not monitor.update(40e3, 40e3, 0.0, 0.0, enabled=True, limited=False)
+    found = [
+        monitor.update(40e3, share * 40e3, 0.0, 0.0, enabled=True, limited=False)
+        for _ in range(updates)
+    ]
+    assert [bool(each & what) for each in found] == [False] * (updates - 1) + [True]
 
 
 def test_reversed_pump_is_found_within_200_ms_limited_or_not() -> None:

@@ -62,11 +62,12 @@ def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
     roll_deg: float, pressure_pa: float, frequency_rad_s: float, sensor: int, way: int
 ) -> None:
     ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
-    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    monitors = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+                LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S))  # fmt: skip
     for k in range(900):
         sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
         sample[sensor] += way * ZEROS[sensor]
-        assert not equation.update(*sample)
+        assert not any(monitor.update(*sample) for monitor in monitors)
 
 
 def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:

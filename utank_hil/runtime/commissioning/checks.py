@@ -9,6 +9,7 @@ from utank_hil.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.runtime.commissioning.pulses import PulsePlan, ValveStroke
+from utank_hil.runtime.monitors.thresholds import ZERO_HEEL_DEG
 from utank_hil.runtime.observations import VALVE_OFF
 
 ROLL_ZERO_DEG: Final = 1.0
@@ -16,8 +17,8 @@ RATE_ZERO_DEG_S: Final = 0.03
 """The monitors learn so much; twice as much would be DRIFT for good, and arming refused."""
 PRESSURE_ZERO: Final = 0.02
 """Share of the pressure limit."""
-WATER_HEEL_DEG: Final = 0.2
-"""Two thirds of the disagreement at which the monitors take water at rest for moving water."""
+WATER_HEEL_DEG: Final = ZERO_HEEL_DEG * 2 / 3
+"""The monitors bear half as much again."""
 
 STILL: Final = 0.2
 """Share of the plan's peaks: ship and water that move more by themselves hide what pulses do."""

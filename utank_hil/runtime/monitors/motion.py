@@ -15,7 +15,7 @@ import math
 from typing import Final
 
 from utank_hil.runtime.monitors.finding import Finding
-from utank_hil.runtime.monitors.noise import Noise, SecondDifference
+from utank_hil.runtime.monitors.noise import Noise, SecondDifference, within
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 LEAK_S: Final = 15.0
@@ -135,21 +135,18 @@ class RollAgainstRate:
         limit_rad = self._limit_rad
         left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
         noisy = self.noise.update(self._bend.update(roll_rad), elapsed_s)
-        slow_rad = min(
-            max(left_rad, -limit_rad), limit_rad
-        )  # a jump is neither bias nor standstill
+        slow_rad = within(left_rad, limit_rad)  # a jump is neither bias nor standstill
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
             self._bias_rad_s += slow_rad / self._learned_s
-        most_rad = MOST_DRIFT * limit_rad
         keep = max(1 - elapsed_s / LEAK_S, 0.0)  # a late tick may span more than that
-        summed_rad = keep * (self.unexplained_rad + left_rad)
-        self.unexplained_rad = summed_rad = min(max(summed_rad, -most_rad), most_rad)
+        summed_rad = within(keep * (self.unexplained_rad + left_rad), MOST_DRIFT * limit_rad)
+        self.unexplained_rad = summed_rad
         self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
         roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
         rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
-        most_move_rad = abs(turned_rad) + limit_rad  # nor is a jump a wrong sign
-        self._moved_rad += min(max(moved_rad, -most_move_rad), most_move_rad)
+        # nor is a jump a wrong sign
+        self._moved_rad += within(moved_rad, abs(turned_rad) + limit_rad)
         self._turned_rad += turned_rad
         self._long_s += elapsed_s
         if self._long_s >= LONG_STEP_S:

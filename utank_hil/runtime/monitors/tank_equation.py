@@ -31,6 +31,7 @@ from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.noise import within
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
@@ -255,7 +256,7 @@ class TankEquation:
                 found |= _LEVEL_STUCK
         if self._still > self._still_samples:
             weight = self._weight
-            mean = min(max(self._left / weight, -zero), zero)
+            mean = within(self._left / weight, zero)
             if self._unmoved + mean * (weight * mean - 2 * self._left) > self._most_unmoved:
                 found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:

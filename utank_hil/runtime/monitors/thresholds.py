@@ -139,7 +139,7 @@ def thresholds_of(
         level_most_m_s=tank.level_limit_m * fastest_rad_s,
         roll_noise_rad=5 * roll_s,
         rate_noise_rad_s=5 * rate_s,
-        level_noise_m=3 * sensors.level_noise_m,
+        level_noise_m=3.75 * sensors.level_noise_m,  # in the sum of both
         drift_rad=6 * drift_s,
         roll_still_rad=5 * roll_s,
         rate_still_rad_s=5 * rate_s,
