@@ -33,10 +33,10 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def taken() -> Iterator[int]:
-    """A port of somebody else."""
+def taken() -> Iterator[socket.socket]:
+    """A port where somebody else listens."""
     with socket.create_server((viewer.LOOPBACK, 0)) as other:
-        yield other.getsockname()[1]
+        yield other
 
 
 def refused(*words: str) -> str:
@@ -47,17 +47,14 @@ def refused(*words: str) -> str:
     return " ".join(result.stderr.split())
 
 
-@pytest.mark.parametrize("which", [0, 1], ids=["data", "page"])
 @pytest.mark.parametrize("command", ["monitor", "bench --duration 1 --view --json --out"])
 def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
-    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: int, which: int, command: str
+    monkeypatch: pytest.MonkeyPatch, recording: Path, taken: socket.socket, command: str
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    free = viewer.free_tcp_port
-    ports = [free(), free()]
-    ports[which] = taken
-    monkeypatch.setattr(viewer, "free_tcp_port", lambda: ports.pop(0))
+    ports = [taken.dup(), viewer.hold_port()]
+    monkeypatch.setattr(viewer, "hold_port", lambda: ports.pop(0))
     bench = command != "monitor"
     said = refused(*command.split(), str(recording.parent if bench else recording))
     assert "the viewer failed" in said
@@ -67,19 +64,23 @@ def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
 
 
 def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
-    monkeypatch: pytest.MonkeyPatch, taken: int
+    monkeypatch: pytest.MonkeyPatch, taken: socket.socket
 ) -> None:
-    monkeypatch.setattr(live, "free_tcp_port", lambda: taken)
+    monkeypatch.setattr(live, "hold_port", taken.dup)
     monkeypatch.setattr(os, "nice", lambda by: by)  # of the tests
     with RingWriter(SIGNALS):
         said = refused("monitor", str(os.getpid()))
-    assert f"port {taken} of this machine was taken; start it again: it takes another" in said
+    assert (
+        f"port {viewer.port_of(taken)} of this machine was taken; start it again: it takes another"
+        in said
+    )
 
 
 def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], taken: int
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], taken: socket.socket
 ) -> None:
-    live_taken = f"from utank_hil.telemetry import live; live.free_tcp_port = lambda: {taken}; "
+    port = viewer.port_of(taken)
+    live_taken = f"from utank_hil.telemetry import live; live.port_of = lambda held: {port}; "
     monkeypatch.setattr(run, "_COMMAND_LINE", live_taken + run._COMMAND_LINE)
     started, popen = [], subprocess.Popen
 
@@ -91,7 +92,7 @@ def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
     with RingWriter(SIGNALS), ExitStack() as stack:
         run._show(stack)  # and does not wait for it
         assert started[0].wait() == ExitCode.USAGE
-    assert f"port {taken} of this machine was taken" in " ".join(capfd.readouterr().err.split())
+    assert f"port {port} of this machine was taken" in " ".join(capfd.readouterr().err.split())
 
 
 def test_where_no_window_can_be_the_page_and_the_remedy_are_named(recording: Path) -> None:

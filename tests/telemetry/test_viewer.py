@@ -1,5 +1,6 @@
 """The viewer, where there is no display: served in the browser, to this machine only."""
 
+import socket
 import time
 import urllib.error
 import urllib.request
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.telemetry.viewer import open_viewer
+from utank_hil.telemetry.viewer import hold_port, open_viewer, port_of
 
 
 def fetch(url: str, seconds: float = 20.0) -> bytes:
@@ -44,6 +45,14 @@ def test_without_a_display_the_viewer_is_a_page_on_loopback(
         assert mine == {"0100007F"}
     viewer.close()
     assert process.poll() is not None
+
+
+def test_a_port_that_is_held_is_for_a_server_of_ours_only() -> None:
+    with hold_port() as held, socket.socket() as other:
+        with pytest.raises(OSError, match="in use"):
+            other.bind(held.getsockname())
+        with socket.create_server(held.getsockname()) as server:
+            assert port_of(server) == port_of(held)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ from rerun.experimental import ViewerClient
 
 from utank_hil.telemetry.viewer import (
     LOOPBACK,
-    free_tcp_port,
+    hold_port,
     live_url,
+    port_of,
     rerun_binary,
     rerun_environment,
 )
@@ -32,27 +33,28 @@ CHROMIUM = Path("/usr/lib/chromium")
 
 def main(source: str, picture: str, size: str = "1600x1000") -> int:
     """Start a viewer without a window, show the source, save the picture."""
-    port = free_tcp_port()
-    command = [rerun_binary(), "--headless", "--bind", LOOPBACK, "--port", str(port)]
-    viewer = subprocess.Popen(
-        [*command, "--window-size", size, source],
-        env=rerun_environment() | software_renderer() | {"RUST_LOG": "error"},
-    )
-    try:
-        client = _connected(viewer, port)
-        path, before = Path(picture).absolute(), Path(f"{picture}.before").absolute()
-        for left in (path, before):
-            left.unlink(missing_ok=True)
-        while not (before.exists() and filecmp.cmp(path, before, shallow=False)):
-            if path.exists():
-                path.replace(before)
-            time.sleep(SETTLE_S)
-            client.save_screenshot(str(path))
-        before.unlink()
-        complaints = [report for view in client.get_state().views for report in view.reports]
-    finally:
-        viewer.terminate()
-        viewer.wait()
+    with hold_port() as held:
+        port = port_of(held)
+        command = [rerun_binary(), "--headless", "--bind", LOOPBACK, "--port", str(port)]
+        viewer = subprocess.Popen(
+            [*command, "--window-size", size, source],
+            env=rerun_environment() | software_renderer() | {"RUST_LOG": "error"},
+        )
+        try:
+            client = _connected(viewer, port)
+            path, before = Path(picture).absolute(), Path(f"{picture}.before").absolute()
+            for left in (path, before):
+                left.unlink(missing_ok=True)
+            while not (before.exists() and filecmp.cmp(path, before, shallow=False)):
+                if path.exists():
+                    path.replace(before)
+                time.sleep(SETTLE_S)
+                client.save_screenshot(str(path))
+            before.unlink()
+            complaints = [report for view in client.get_state().views for report in view.reports]
+        finally:
+            viewer.terminate()
+            viewer.wait()
     for complaint in complaints:
         print(complaint, file=sys.stderr)
     return 1 if complaints else 0

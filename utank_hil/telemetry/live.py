@@ -17,7 +17,7 @@ from utank_hil.telemetry.event_ring import EventReader, is_event_ring
 from utank_hil.telemetry.rerun_log import APPLICATION, LIVE_RUN, RunLog, run_paths, write_about
 from utank_hil.telemetry.ring import RingReader, ring_names
 from utank_hil.telemetry.scene import scene_size
-from utank_hil.telemetry.viewer import LOOPBACK, free_tcp_port, live_url
+from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
 MEMORY: Final = "64MiB"
 """History for a viewer that connects late; bounds the memory of the stream."""
@@ -89,7 +89,7 @@ class LiveStream(Closing):
             if self._events is not None:
                 stack.enter_context(self._events)
             self._recording = rr.RecordingStream(APPLICATION, recording_id=run.ring)
-            port = free_tcp_port()
+            port = port_of(stack.enter_context(hold_port()))
             self.url = live_url(port)
             columns = self._ring.columns
             self._recording.set_sinks(

@@ -4,6 +4,7 @@ import importlib.util
 import os
 import socket
 import subprocess
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -30,9 +31,14 @@ class Viewer(Closing):
     """
 
     def __init__(
-        self, process: subprocess.Popen[bytes], url: str | None = None, ports: tuple[int, ...] = ()
+        self,
+        process: subprocess.Popen[bytes],
+        held: Sequence[socket.socket],
+        url: str | None = None,
+        ports: tuple[int, ...] = (),
     ) -> None:
         self._process = process
+        self._held = held
         self.url = url
         self.ports = ports
 
@@ -54,6 +60,8 @@ class Viewer(Closing):
         """End the viewer; idempotent."""
         self._process.terminate()
         self._process.wait()
+        for port in self._held:
+            port.close()
 
 
 def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool = True) -> Viewer:
@@ -79,22 +87,24 @@ def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool =
     if isinstance(source, Path) and not source.is_file():
         raise FileNotFoundError(f"no recording {source}")
     command = [rerun_binary(), "--bind", LOOPBACK]
-    port = free_tcp_port()
+    held = [hold_port()]
+    port = port_of(held[0])
     command += ["--port", str(port)]
     displays = (os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     if window and any(displays):
-        viewer = Viewer(_started([*command, str(source)]))
+        viewer = Viewer(_started([*command, str(source)]), held)
         if at_s is not None:
             _move_cursor(viewer, port, at_s)
         return viewer
-    page_port = free_tcp_port()
+    held.append(hold_port())  # Rerun 0.41 may hang if somebody else has the page's port
+    page_port = port_of(held[1])
     command += ["--serve-web", "--web-viewer-port", str(page_port), str(source)]
     data = live_url(port) if isinstance(source, Path) else source
     when = "" if at_s is None else f"#when=time@{at_s:g}s"
     url = f"http://{LOOPBACK}:{page_port}?url={quote(data + when, safe='')}"
     data_port = urlsplit(data).port
     assert data_port is not None
-    return Viewer(_started(command), url, (page_port, data_port))
+    return Viewer(_started(command), held, url, (page_port, data_port))
 
 
 def _started(command: list[str]) -> subprocess.Popen[bytes]:
@@ -131,9 +141,19 @@ def live_url(port: int) -> str:
     return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
-def free_tcp_port() -> int:
-    """Return a free TCP port of the loopback interface."""
-    with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
-        port: int = probe.getsockname()[1]
-        return port
+def hold_port() -> socket.socket:
+    """Return a socket that holds a free TCP port of the loopback interface until it is closed.
+
+    It does not listen. A server that sets SO_REUSEADDR, as Rerun's do, may listen on the port; the
+    kernel chooses it for nobody else.
+    """
+    held = socket.socket()
+    held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    held.bind((LOOPBACK, 0))
+    return held
+
+
+def port_of(held: socket.socket) -> int:
+    """Return the number of the port that a socket holds."""
+    port: int = held.getsockname()[1]
+    return port
