@@ -82,7 +82,7 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> Non
 def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Path) -> None:
     with RingWriter(ROW, capacity=64, rows=IN_A_SLOT) as frames:
         feed(frames, range(10))
-        recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD, None)
+        recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD)
         recording.write()
         feed(frames, range(10, 110))  # two slots each
         recording.write()
@@ -98,7 +98,7 @@ def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -
     file = tmp_path / "run-a.rrd"
     with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
         data = feed(frames, range(20))
-        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--head"]
+        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--content"]
         process = subprocess.Popen(
             [sys.executable, "-c", NO_RERUN, *words],
             stdin=subprocess.PIPE,
@@ -107,7 +107,7 @@ def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -
         )
         assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write('{"about": {"x": 1}}')
+        process.stdin.write('{"head": {"about": {"x": 1}}}')
         process.stdin.close()
         assert process.stdout.readline() == '{"ready": 1}\n'
     with process.stdout as output:

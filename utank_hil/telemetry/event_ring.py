@@ -96,12 +96,14 @@ class EventWriter(Closing):
 
 
 class EventReader(Closing):
-    """A reading end with its own cursor, which starts at the oldest event.
+    """A reading end with its own cursor.
 
     Parameters
     ----------
     name : str
         The writer's `name`.
+    place : int, optional
+        As that of a `RingReader`.
 
     Raises
     ------
@@ -114,8 +116,8 @@ class EventReader(Closing):
         Time of the first telemetry row on the writer's monotonic clock, once there was an event.
     """
 
-    def __init__(self, name: str) -> None:
-        self._ring = RingReader(name)
+    def __init__(self, name: str, place: int | None = None) -> None:
+        self._ring = RingReader(name, place)
         self.start_ns = 0
 
     def read(self) -> list[Event]:
@@ -124,6 +126,11 @@ class EventReader(Closing):
         if contents:
             self.start_ns = contents[-1]["start_ns"]
         return [_decoded(content) for content in contents]
+
+    @property
+    def place(self) -> int:
+        """As that of a `RingReader`."""
+        return self._ring.place
 
     @property
     def ended(self) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 
 from utank_hil.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Records, pack, unpack
-from utank_hil.telemetry.rotation import Rotation, part_of, remove_oldest
+from utank_hil.telemetry.rotation import part_of
 from utank_hil.whole_file import errors_name
 
 SUFFIX: Final = ".frames"
@@ -47,16 +47,8 @@ class FrameLogWriter(Closing):
         Overwritten.
     head : mapping
         Where it comes from, see `utank_hil.telemetry.replay_head`.
-    rotation : Rotation, optional
-        When the log goes on in another file, ``<its stem>-part002.frames`` and so on, and how much
-        of older ones is kept; without it there is one file.
     small : bool
         Compress as well as possible, for logs to be kept.
-
-    Attributes
-    ----------
-    count : int
-        Files begun.
 
     Raises
     ------
@@ -64,34 +56,16 @@ class FrameLogWriter(Closing):
         If it can't be written, with its name; also of `write` and `close`.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        head: Mapping[str, Any],
-        rotation: Rotation | None = None,
-        *,
-        small: bool = False,
-    ) -> None:
-        self._first = file
-        self._head = json.dumps(head).encode()
-        self._rotation = rotation
+    def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
         self._small = small
-        self._begin_ns: int | None = None
-        self.count = 0
-        self._begin()
+        self._content = file.open("wb")
+        self._content.write(_MARK)
+        self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
 
     def write(self, records: Records) -> None:
-        """Append records, if there are any; begins the next file where it is time."""
+        """Append records, if there are any."""
         if not len(records):
             return
-        begin_ns = int(records["time_ns"][0])
-        if self._begin_ns is None:
-            self._begin_ns = begin_ns
-        rotation = self._rotation
-        if rotation is not None and begin_ns - self._begin_ns >= rotation.part_s * 1e9:
-            self.close()
-            self._begin_ns = begin_ns
-            self._begin()
         packed = pack(records)
         if self._small:
             self._append(_SMALL, lzma.compress(packed, preset=9 | lzma.PRESET_EXTREME))
@@ -102,15 +76,6 @@ class FrameLogWriter(Closing):
         """Close the file; idempotent."""
         with errors_name(Path(self._content.name)):
             self._content.close()
-
-    def _begin(self) -> None:
-        self.count += 1
-        file = part_of(self._first, self.count)
-        if self._rotation is not None and self._rotation.keep_bytes is not None:
-            remove_oldest(file, self._rotation.keep_bytes)
-        self._content = file.open("wb")
-        self._content.write(_MARK)
-        self._append(_HEAD, zlib.compress(self._head))
 
     def _append(self, kind: bytes, payload: bytes) -> None:
         header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))

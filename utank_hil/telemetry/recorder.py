@@ -7,6 +7,9 @@ is not installed, that is all it writes.
 utank_hil.telemetry.recorder --ring NAME --file OUT.rrd` attaches one by hand. It ends when the ring
 is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with all rows written. The
 controller never waits for it: rows that it reads too late are overwritten and counted as lost.
+
+Each file of a long recording is written by the process anew (`execv`): Rerun keeps memory and
+threads of the files that are finished.
 """
 
 import argparse
@@ -19,10 +22,10 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 import numpy as np
 
@@ -30,8 +33,8 @@ from utank_hil.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Kind, records_of
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLogWriter
-from utank_hil.telemetry.ring import RingReader
-from utank_hil.telemetry.rotation import Rotation
+from utank_hil.telemetry.ring import RingReader, held_ring
+from utank_hil.telemetry.rotation import Rotation, make_room, part_of
 from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
@@ -39,6 +42,8 @@ NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 _NICENESS: Final = 5
+_CONTENT: Final = "--content"
+_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class RecorderError(RuntimeError):
@@ -67,28 +72,69 @@ class RecorderReport:
     records_lost: int = 0
 
 
-def record_ring(
-    ring: str,
-    file: Path,
-    events: str | None = None,
-    rotation: Rotation | None = None,
-    frames: str | None = None,
-    head: Mapping[str, Any] | None = None,
-) -> RecorderReport:
-    """Record a ring until it ends or a signal stops it; main function of the process.
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Rows of the rings at which a part of a recording begins; None is the oldest.
+
+    Attributes
+    ----------
+    rows, events, frames : int or None
+        Of each ring, as `RingReader.place`.
+    """
+
+    rows: int | None = None
+    events: int | None = None
+    frames: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What is recorded, and where.
+
+    Attributes
+    ----------
+    ring : str
+        Name of the ring of rows.
+    file : Path
+        The first `.rrd` file.
+    events : str or None
+        Name of the ring of events (`EventWriter`) that belongs to it.
+    rotation : Rotation or None
+        Where it goes on in another file; without it there is one.
+    frames : str or None
+        Name of the ring of `bus_records`; they go into a frame log beside the file.
+    head : mapping
+        Head of the frame log (`replay_head`).
+    """
+
+    ring: str
+    file: Path
+    events: str | None
+    rotation: Rotation | None
+    frames: str | None
+    head: Mapping[str, Any]
+
+
+def record_part(
+    source: Source, before: RecorderReport, places: Places
+) -> tuple[RecorderReport, Places | None]:
+    """Record into one file until the ring ends, a signal comes or it is time for the next file.
+
+    The signals have to be blocked.
 
     Parameters
     ----------
-    file : Path
-        The `.rrd` file; overwritten.
-    events : str, optional
-        Name of the ring of events (`EventWriter`) that belongs to it.
-    rotation : Rotation, optional
-        Where it goes on in another file; without it there is one.
-    frames : str, optional
-        Name of the ring of `bus_records`; they go into a frame log beside the file.
-    head : mapping, optional
-        Head of the frame log (`replay_head`).
+    before : RecorderReport
+        What the parts before hold.
+    places : Places
+        Where they ended.
+
+    Returns
+    -------
+    RecorderReport
+        What all parts hold.
+    Places or None
+        Where the next part begins; None if there is none.
 
     Raises
     ------
@@ -99,51 +145,67 @@ def record_ring(
     RuntimeError
         If the file can't be finished.
     """
-    stop = _stop_pipe()
+    number = before.parts + 1
+    file, rotation = part_of(source.file, number), source.rotation
+    make_room(source.file, number, rotation)
     with ExitStack() as stack:
-        reader = stack.enter_context(RingReader(ring))
-        event_reader = None if events is None else stack.enter_context(EventReader(events))
-        parts = None
+        reader = stack.enter_context(RingReader(source.ring, places.rows))
+        event_reader = None
+        if source.events is not None:
+            event_reader = stack.enter_context(EventReader(source.events, places.events))
+        part = None
         if find_spec("rerun") is not None:
-            from utank_hil.telemetry.parts import RecordingParts
+            from utank_hil.telemetry.part import RecordingPart
 
-            parts = RecordingParts(file, reader.columns, rotation, reader.about)
+            part = RecordingPart(file, reader.columns, reader.about)
         log = None
-        if frames is not None:
-            if rotation is not None and parts is not None:
-                rotation = replace(rotation, keep_bytes=None)  # the recording makes the room
-            log = stack.enter_context(FrameRecording(frames, file, head or {}, rotation))
-        _print_json({"ready": 1})
+        if source.frames is not None:
+            log = FrameRecording(source.frames, file, source.head, places.frames)
+            stack.enter_context(log)
+        if number == 1:
+            _print_json({"ready": 1})
+        time = reader.columns.index("time_s")
         recorded = reported_rows = reported_events = 0
-        while True:
-            last = reader.ended or bool(select.select([stop], [], [], BATCH_S)[0])
+        begin_s: float | None = None
+        last = full = False
+        while not (last or full):
+            last = reader.ended or signal.sigtimedwait(_ENDING, BATCH_S) is not None
             rows = reader.read()
-            recorded += len(rows)
+            if len(rows):
+                recorded += len(rows)
+                begin_s = float(rows[0, time]) if begin_s is None else begin_s
+                full = rotation is not None and rows[-1, time] - begin_s >= rotation.part_s
             new_events = [] if event_reader is None else event_reader.read()
             if log is not None:
                 log.write()
-            if parts is not None:
+            if part is not None:
                 if reader.lost > reported_rows:
-                    parts.note(
-                        f"{reader.lost - reported_rows} rows lost: the recorder was too slow"
-                    )
+                    part.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
                     reported_rows = reader.lost
                 if len(rows):
-                    parts.write(rows)
-                parts.write_events(new_events)
+                    part.write(rows)
+                part.write_events(new_events)
                 if event_reader is not None and event_reader.lost > reported_events:
                     lost = event_reader.lost - reported_events
-                    parts.note(f"{lost} events lost: the recorder was too slow")
+                    part.note(f"{lost} events lost: the recorder was too slow")
                     reported_events = event_reader.lost
                 if len(rows) or new_events:
-                    parts.flush()
-            if last:
-                break
-        count = 0 if log is None else log.count
-        if parts is not None:
-            parts.close()
-            count = parts.count
-        return RecorderReport(recorded, reader.lost, count, 0 if log is None else log.lost)
+                    part.flush()
+        if part is not None:
+            part.close()
+        whole = RecorderReport(
+            before.rows + recorded,
+            before.lost + reader.lost,
+            number,
+            before.records_lost + (0 if log is None else log.lost),
+        )
+        if last:
+            return whole, None
+        return whole, Places(
+            reader.place,
+            None if event_reader is None else event_reader.place,
+            None if log is None else log.place,
+        )
 
 
 class FrameRecording(Closing):
@@ -153,6 +215,8 @@ class FrameRecording(Closing):
     ----------
     file : Path
         The recording beside which the log is written.
+    place : int, optional
+        As that of a `RingReader`.
 
     Attributes
     ----------
@@ -161,16 +225,16 @@ class FrameRecording(Closing):
     """
 
     def __init__(
-        self, ring: str, file: Path, head: Mapping[str, Any], rotation: Rotation | None
+        self, ring: str, file: Path, head: Mapping[str, Any], place: int | None = None
     ) -> None:
-        self._reader = RingReader(ring)
-        self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head, rotation)
+        self._reader = RingReader(ring, place)
+        self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head)
         self.lost = 0
 
     @property
-    def count(self) -> int:
-        """Files begun."""
-        return self._writer.count
+    def place(self) -> int:
+        """Of the ring, as `RingReader.place`."""
+        return self._reader.place
 
     def write(self) -> None:
         """Write what has come since the last call."""
@@ -195,7 +259,7 @@ class RecorderProcess(Closing):
 
     Start it before the loop: it takes about a second, mostly for importing Rerun. It runs in a
     session of its own, so that Ctrl-C in the terminal does not end it before the loop's last rows.
-    Arguments are those of `record_ring`.
+    Arguments are those of `Source`.
 
     Raises
     ------
@@ -220,7 +284,7 @@ class RecorderProcess(Closing):
         if frames is not None:
             command += ["--frames", frames]
         if head is not None:
-            command += ["--head"]
+            command += [_CONTENT]
         if rotation is not None:
             command += ["--part-s", str(rotation.part_s)]
             if rotation.keep_bytes is not None:
@@ -236,7 +300,7 @@ class RecorderProcess(Closing):
         )
         if self._process.stdin is not None:
             with contextlib.suppress(BrokenPipeError), self._process.stdin as content:
-                json.dump(head, content)  # where it has ended already, its reason follows
+                json.dump({"head": head}, content)  # where it has ended already, its reason follows
         output = self._process.stdout
         assert output is not None
         ready, _, _ = select.select([output], [], [], _START_TIMEOUT_S)
@@ -293,22 +357,31 @@ def _main() -> None:
     parser.add_argument("--file", required=True, type=Path, metavar="OUT.rrd")
     parser.add_argument("--events", metavar="NAME", help="ring of events that belongs to it")
     parser.add_argument("--frames", metavar="NAME", help="ring of the frame log's records")
-    parser.add_argument("--head", action="store_true", help="JSON of it is on standard input")
     parser.add_argument("--part-s", type=float, help="begin another file after so long")
     parser.add_argument("--keep-bytes", type=int, help="remove the oldest files beyond so much")
+    parser.add_argument(
+        _CONTENT, action="store_true", help="JSON on standard input: head of the frame log"
+    )
     arguments = parser.parse_args()
-    head = json.load(sys.stdin) if arguments.head else None
+    content = json.load(sys.stdin) if arguments.content else {}
+    rotation = None
+    if arguments.part_s is not None:
+        rotation = Rotation(arguments.part_s, arguments.keep_bytes)
     os.environ.update(rerun_environment())
-    os.nice(_NICENESS)
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # first: Rerun's threads inherit it
     try:
-        report = record_ring(
-            arguments.ring,
-            arguments.file,
-            arguments.events,
-            None if arguments.part_s is None else Rotation(arguments.part_s, arguments.keep_bytes),
-            arguments.frames,
-            head,
+        if "rings" not in content:
+            os.nice(_NICENESS)
+            names = (arguments.ring, arguments.events, arguments.frames)
+            content["rings"] = [None if name is None else held_ring(name) for name in names]
+        ring, events, frames = content["rings"]
+        report, places = record_part(
+            Source(ring, arguments.file, events, rotation, frames, content.get("head", {})),
+            RecorderReport(**content.get("before", {"rows": 0, "lost": 0, "parts": 0})),
+            Places(**content.get("places", {})),
         )
+        if places is not None:
+            _go_on(content | {"before": asdict(report), "places": asdict(places)})
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
         print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
@@ -316,14 +389,15 @@ def _main() -> None:
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
 
 
-def _stop_pipe() -> int:
-    """Return a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives."""
-    readable, written = os.pipe()
-    os.set_blocking(written, False)
-    signal.set_wakeup_fd(written)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda _number, _frame: None)  # the wake-up descriptor does the work
-    return readable
+def _go_on(content: Mapping[str, Any]) -> NoReturn:
+    """Begin the program anew in this process, for the next part; signals stay blocked."""
+    file = os.memfd_create("recorder")
+    with open(file, "w", encoding="utf-8", closefd=False) as written:
+        json.dump(content, written)
+    os.lseek(file, 0, os.SEEK_SET)
+    os.dup2(file, sys.stdin.fileno())
+    command = sys.orig_argv if _CONTENT in sys.orig_argv else [*sys.orig_argv, _CONTENT]
+    os.execv(sys.executable, command)
 
 
 def _print_json(message: Mapping[str, int | str]) -> None:

@@ -197,12 +197,15 @@ class RingWriter(Closing):
 
 
 class RingReader(Closing):
-    """A reading end with its own cursor, which starts at the oldest row.
+    """A reading end with its own cursor.
 
     Parameters
     ----------
     name : str
         The writer's `name`.
+    place : int, optional
+        `place` of another reader, from where this one goes on; it starts at the oldest row if not
+        given.
 
     Attributes
     ----------
@@ -217,12 +220,9 @@ class RingReader(Closing):
         If there is no such ring, or the segment is not a ring of this version.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, place: int | None = None) -> None:
         self.name = name
-        try:
-            descriptor = os.open(_SHM / name, os.O_RDONLY | os.O_CLOEXEC)
-        except FileNotFoundError as error:
-            raise RingError(f"no ring {name!r}: is its writer running?") from error
+        descriptor = _opened(name)
         try:
             size = os.fstat(descriptor).st_size
             if size < 8 * _HEADER_WORDS:
@@ -246,7 +246,7 @@ class RingReader(Closing):
         self._slots = words[first : first + capacity * stride].reshape(capacity, stride)
         self._rows = rows
         self._writer_start = start
-        self._next = max(0, int(words[_Word.COUNT]) - capacity)
+        self._next = max(0, int(words[_Word.COUNT]) - capacity) if place is None else place
 
     def read(self) -> FloatArray:
         """Return the rows written since the last call, oldest first; never blocks.
@@ -276,6 +276,11 @@ class RingReader(Closing):
         return values[np.arange(rows) < held[intact, None]]
 
     @property
+    def place(self) -> int:
+        """Slots up to here are read or lost, counted from the first that was ever written."""
+        return self._next
+
+    @property
     def ended(self) -> bool:
         """Whether no more rows will be written: the writer closed the ring, or is dead.
 
@@ -289,6 +294,29 @@ class RingReader(Closing):
         if not self._map.closed:
             del self._words, self._slots  # mapped memory can be released only without views
             self._map.close()
+
+
+def held_ring(name: str) -> str:
+    """Return a name of a ring for this process, and for programs that it becomes by `exec`.
+
+    It holds when the writer has closed the ring, too.
+
+    Raises
+    ------
+    RingError
+        If there is no such ring.
+    """
+    descriptor = _opened(name)
+    os.set_inheritable(descriptor, True)
+    return f"/proc/self/fd/{descriptor}"
+
+
+def _opened(name: str) -> int:
+    """Descriptor of a ring's segment, to read."""
+    try:
+        return os.open(_SHM / name, os.O_RDONLY | os.O_CLOEXEC)
+    except FileNotFoundError as error:
+        raise RingError(f"no ring {name!r}: is its writer running?") from error
 
 
 def ring_names() -> list[str]:

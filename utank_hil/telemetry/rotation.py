@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+_GROWTH: Final = 1.05  # compression differs from file to file
 SUFFIXES: Final = (".rrd", ".frames")
 """Files of one recording, which come and go together."""
 
@@ -28,6 +29,21 @@ class Rotation:
 def part_of(file: Path, number: int) -> Path:
     """Name of the part of a recording with a number; the first has the recording's own."""
     return file if number == 1 else file.with_stem(f"{file.stem}-part{number:03d}")
+
+
+def make_room(file: Path, number: int, rotation: Rotation | None) -> None:
+    """Remove the oldest recordings before a part of one begins, if its rotation says so.
+
+    Parameters
+    ----------
+    file : Path
+        Of the first part.
+    number : int
+        Of the part that begins.
+    """
+    if rotation is not None and rotation.keep_bytes is not None:
+        room_bytes = 0 if number == 1 else round(_GROWTH * bytes_of(part_of(file, number - 1)))
+        remove_oldest(part_of(file, number), rotation.keep_bytes - room_bytes)
 
 
 def bytes_of(file: Path) -> int:

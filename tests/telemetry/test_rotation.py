@@ -1,0 +1,166 @@
+"""A long recording in several files, within a bound of the disk."""
+
+import os
+import re
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rerun.chunk import RrdReader
+
+from utank_hil.canbus import RetuningState
+from utank_hil.retuning import RetuningEvent
+from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind
+from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.recorder import RecorderProcess, RecorderReport
+from utank_hil.telemetry.recording import read_about, read_recording
+from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation, make_room, part_of, remove_oldest
+
+TIME = SIGNALS.index("time_s")
+
+
+def rows(first: int, count: int) -> np.ndarray:
+    """Rows of 10 ms."""
+    values = np.zeros((count, len(SIGNALS)))
+    values[:, TIME] = np.arange(first, first + count) / 100
+    return values
+
+
+def times(file: Path) -> np.ndarray:
+    return read_recording(file)["live"]["time_s"]
+
+
+def names(count: int, suffix: str) -> list[str]:
+    return ["run-a" + suffix] + [f"run-a-part{n:03d}{suffix}" for n in range(2, count + 1)]
+
+
+@pytest.mark.slow
+def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path: Path) -> None:
+    oldest = tmp_path / "run-0.rrd"
+    oldest.write_bytes(bytes(2_000_000))
+    head, records = {"x": 1}, b""
+    with (
+        RingWriter(SIGNALS, about=head) as ring,
+        RingWriter(ROW, rows=IN_A_SLOT) as frames,
+        EventWriter() as events,
+    ):
+        recorder = RecorderProcess(
+            ring.name,
+            tmp_path / "run-a.rrd",
+            events.name,
+            Rotation(0.4, 2_200_000),
+            frames.name,
+            head,
+        )
+        pid, sent = recorder.pid, 0
+        while not (tmp_path / "run-a-part003.rrd").exists():
+            assert sent < 1000
+            ring.write(rows(5 * sent, 1)[0])
+            tick = LAYOUT.pack(0, b"", Kind.TICK, 50_000_000 * sent)
+            frames.write(tick)
+            events.write(RetuningEvent(50_000_000 * sent, RetuningState.REFUSED, (f"<{sent}>",)), 0)
+            records += tick
+            sent += 1
+            time.sleep(0.05)
+    report = recorder.stop()
+    assert recorder.pid == pid
+    assert report == RecorderReport(sent, 0, 3)
+    assert not oldest.exists()  # there was room for it, until the second part
+    files = [tmp_path / name for name in names(3, ".rrd")]
+    np.testing.assert_allclose(np.concatenate([*map(times, files)]), np.arange(sent) / 20)
+    assert all(len(times(file)) > 8 for file in files[:-1])
+    log = FrameLog(tmp_path / "run-a.frames")
+    assert np.concatenate([*log.blocks()]).tobytes() == records
+    refused: list[str] = []
+    for file in files:
+        RrdReader(file).store()  # needs the footer
+        assert read_about(file) == head
+        refused += re.findall(r"<\d+>", " ".join(texts(file)))
+    assert refused == [f"<{number}>" for number in range(sent)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        names(3, ".rrd") + names(3, ".frames")
+    )
+
+
+def texts(file: Path) -> list[str]:
+    """Lines of the text log."""
+    chunks = RrdReader(file).stream().filter(components="TextLog:text").to_chunks()
+    found = [chunk.to_record_batch().column("TextLog:text").flatten() for chunk in chunks]
+    return [str(text) for each in found for text in each.to_pylist()]
+
+
+@pytest.mark.slow
+def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: Path) -> None:
+    """When the signal comes, the process is a program that has not set anything up yet."""
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, tmp_path / "run-a.rrd", rotation=Rotation(1.0))
+        ring.write(rows(0, 110))
+        started = Path(f"/proc/{recorder.pid}/cmdline")
+        deadline = time.monotonic() + 20.0
+        while b"--content" not in started.read_bytes():
+            assert time.monotonic() < deadline
+        ring.write(rows(110, 7))
+    assert recorder.stop() == RecorderReport(117, 0, 2)
+    assert len(times(tmp_path / "run-a-part002.rrd")) == 7
+
+
+@pytest.mark.slow
+def test_without_rotation_there_is_one_file(tmp_path: Path) -> None:
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, tmp_path / "run-a.rrd")
+        ring.write(rows(0, 350))
+    assert recorder.stop() == RecorderReport(350, 0, 1)
+    assert [path.name for path in tmp_path.iterdir()] == ["run-a.rrd"]
+
+
+@given(
+    sizes=st.lists(st.integers(980, 1020), min_size=8, max_size=8),
+    keep_bytes=st.integers(2200, 5000),
+)
+def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_bytes: int) -> None:
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "run-a.rrd"
+        for number, size in enumerate(sizes, 1):
+            make_room(file, number, Rotation(1.0, keep_bytes))
+            part = part_of(file, number)
+            part.write_bytes(bytes(size))
+            os.utime(part, ns=(number, number))
+            left = [path.stat().st_size for path in file.parent.iterdir()]
+            assert sum(left) <= keep_bytes
+            assert sum(left) + 2 * 1050 > keep_bytes or len(left) == number
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
+@given(
+    sizes=st.lists(st.integers(0, 500), max_size=8),
+    keep_bytes=st.integers(0, 2000),
+)
+def test_what_is_removed_is_the_oldest_and_no_more_than_needed(
+    tmp_path: Path, sizes: list[int], keep_bytes: int
+) -> None:
+    for path in tmp_path.iterdir():
+        path.unlink()
+    files = []
+    for age, size in enumerate(sizes):
+        path = tmp_path / f"run-{len(sizes) - age}.rrd"  # by time, not by name
+        path.write_bytes(bytes(size))
+        os.utime(path, ns=(age, age))
+        files.append(path)
+    apart = [tmp_path / name for name in ("bench-1.rrd", "run-1.yaml", "run-now.rrd")]
+    for path in apart:
+        path.write_bytes(bytes(3000))
+    removed = remove_oldest(tmp_path / "run-now.rrd", keep_bytes)
+    left = [path for path in files if path.exists()]
+    assert removed + left == files
+    assert all(path.exists() for path in apart)
+    total = sum(path.stat().st_size for path in left)
+    assert total <= keep_bytes
+    if removed:
+        assert total + sizes[len(removed) - 1] > keep_bytes

@@ -1,0 +1,111 @@
+"""One file of a live recording."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import rerun as rr
+
+from utank_hil.arrays import FloatArray
+from utank_hil.closing import Closing
+from utank_hil.telemetry.blueprint import columns_of, make_blueprint
+from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.rerun_log import (
+    APPLICATION,
+    LIVE_RUN,
+    PICTURES_S,
+    RunLog,
+    run_paths,
+    write_about,
+)
+from utank_hil.telemetry.scene import scene_size
+
+_FLUSH_TIMEOUT_S: Final = 5.0
+_RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
+_FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
+
+
+class RecordingPart(Closing):
+    """Writes one file of a recording, complete in itself.
+
+    Parameters
+    ----------
+    file : Path
+        The `.rrd` file; overwritten.
+    columns : sequence of str
+        Names of a row's values.
+    about : mapping, optional
+        Where it comes from (`utank_hil.provenance`).
+
+    Raises
+    ------
+    OSError
+        If the file can't be created, or there is no room for its beginning.
+    RuntimeError
+        If the file can't be finished.
+    """
+
+    def __init__(
+        self, file: Path, columns: Sequence[str], about: Mapping[str, Any] | None = None
+    ) -> None:
+        _reserve_file(file)
+        self._file = file
+        self._rows = 0
+        self._open = True
+        self._recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
+        size = scene_size(columns, about)
+        self._recording.set_sinks(
+            rr.FileSink(file),
+            default_blueprint=make_blueprint(columns_of(columns, about), [LIVE_RUN], size=size),
+        )
+        if about is not None:
+            write_about(self._recording, about)
+        self._log = RunLog(self._recording, run_paths([LIVE_RUN])[0], columns, about, PICTURES_S)
+
+    def write(self, rows: FloatArray) -> None:
+        """Append rows, shape (n, width), n above zero."""
+        self._rows += len(rows)
+        self._log.write(rows)
+
+    def write_events(self, events: Sequence[Event]) -> None:
+        """Log events of retuning and alarms."""
+        self._log.write_events(events)
+
+    def note(self, text: str) -> None:
+        """Log a warning about the recording itself."""
+        self._log.note(text)
+
+    def flush(self) -> None:
+        """Bring it to the disk, so that a kill does not lose it."""
+        # without a timeout it would wait forever on a full disk
+        self._recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+
+    def close(self) -> None:
+        """Finish the file; idempotent."""
+        if not self._open:
+            return
+        self._open = False
+        self._log.close()
+        self.flush()
+        self._recording.disconnect()  # writes the footer; reports no error
+        if not _is_finished(self._file):
+            raise RuntimeError(
+                f"its {self._rows} rows are written, but not the end of {self._file.name}: is the "
+                "disk full?"
+            )
+
+
+def _reserve_file(file: Path) -> None:
+    """Reserve the first bytes, or raise: Rerun would wait forever on a full disk."""
+    with file.open("wb") as begun:
+        os.posix_fallocate(begun.fileno(), 0, _RESERVED_BYTES)
+
+
+def _is_finished(file: Path) -> bool:
+    """Return whether a recording has its footer; a truncated one has none."""
+    mark, length = _FOOTER
+    with file.open("rb") as content:
+        content.seek(0, os.SEEK_END)
+        content.seek(max(0, content.tell() - length))
+        return mark in content.read()
