@@ -205,6 +205,11 @@ def share(value: dict[str, float]) -> str:
     return f"{value['mean']:.0%}" + ("" if half is None else f" ± {100 * half:.0f}")
 
 
+def points(value: dict[str, float]) -> str:
+    """A difference in per cent with its interval."""
+    return f"{100 * value['mean']:.1f} ± {100 * value['half_width']:.1f}"
+
+
 def many_seas(result: dict[str, Any]) -> Rows:
     """Shares of the possible, a row a sea."""
     mean = "mean of the first sixteen"
@@ -249,10 +254,6 @@ def planning(result: dict[str, Any]) -> Rows:
     def level_m(case: dict[str, Any], law: str) -> str:
         return f"{max(run['level_peak_m'] for run in case['runs'][law]):.2f}"
 
-    def below(case: dict[str, Any], rival: str) -> str:
-        gain = case["below"][rival]
-        return f"{100 * gain['mean']:.1f} ± {100 * gain['half_width']:.1f}"
-
     return [
         ["sea and pump", "Hs, Tp", "passive", "`gpc.yaml`", "clipped", "constrained", "below, %",
          "self-tuned clipped", "self-tuned", "below, %",
@@ -263,10 +264,10 @@ def planning(result: dict[str, Any]) -> Rows:
                 f"{case['hs_m']:.2f} m, {case['tp_s']:.1f} s",
                 *(f"{case['roll_rms_deg'][law]:.3f}"
                   for law in ("passive", "GPC_ROLL", "clipped", "constrained")),
-                below(case, "clipped"),
+                points(case["below"]["clipped"]),
                 *(f"{case['roll_rms_deg'][law]:.3f}"
                   for law in ("self-tuned clipped", "self-tuned")),
-                below(case, "self-tuned clipped"),
+                points(case["below"]["self-tuned clipped"]),
                 ", ".join(level_m(case, law) for law in ("clipped", "constrained", "self-tuned")),
             ]
             for case in result["cases"]
@@ -278,22 +279,50 @@ def voyage_stages(result: dict[str, Any]) -> Rows:
     """The renewed law beside the one that was given the truth, a row a stage."""
     return [
         ["stage", "passive, °", "renewed, °", "knows the truth, °", "share, renewed",
-         "share, knows the truth"],
+         "share, knows the truth", "lost, points"],
         *(
             [
                 row["stage"],
                 *(f"{row[f'{name}_deg']:.3f}" for name in ("passive", "renewed", "told")),
                 *(f"{row[f'{name}_share']:.1%}" for name in ("renewed", "told")),
+                points(row["lost_share"]),
             ]
             for row in result["stages"]
         ),
     ]  # fmt: skip
 
 
-def stiffness_by_loading(result: dict[str, Any]) -> Rows:
-    """How well stiffness, and with it GM, is told, a row a loading."""
+def sea_errors(result: dict[str, Any]) -> Rows:
+    """Errors of the estimates in per cent, a row a law, record length and sea."""
+
+    def spread(row: dict[str, float], name: str) -> str:
+        if row.get(name) is None:
+            return ""
+        return f"{100 * row[name]:+.1f} ± {100 * row[name + '_scatter']:.1f}"
+
+    def percent(row: dict[str, float], name: str) -> str:
+        return "" if row.get(name) is None else f"{100 * row[name]:.1f}"
+
     return [
-        ["record, min", "roll period, s", "records", "told", "within 5 %", "greatest error"],
+        ["law", "min", "sea", "parts", "sea, ship known", "moment RMS", "stated", "Hs", "Tp",
+         "density, dB", "stiffness where known", "stated", "period where known"],
+        *(
+            [
+                row["law"], f"{row['minutes']:g}", row["sea"], str(row["parts"]),
+                f"{row['sea_good']}, {row['ship_good']}",
+                spread(row, "moment"), percent(row, "stated"), spread(row, "height"),
+                spread(row, "peak"), f"{row['spectrum_db']:.1f}", spread(row, "stiffness"),
+                percent(row, "stiffness_deviation"), spread(row, "period"),
+            ]
+            for row in result["errors"]
+        ),
+    ]  # fmt: skip
+
+
+def stiffness_by_loading(result: dict[str, Any]) -> Rows:
+    """How well stiffness, and with it GM, is known under way, a row a loading."""
+    return [
+        ["record, min", "roll period, s", "records", "known", "within 5 %", "greatest error"],
         *(
             [
                 *(f"{row[name]:g}" for name in ("minutes", "period_s")),
@@ -303,6 +332,32 @@ def stiffness_by_loading(result: dict[str, Any]) -> Rows:
             for row in result["loadings"]
         ),
     ]
+
+
+def storm_shares(result: dict[str, Any]) -> Rows:
+    """Each law in the storm hour, between the passive tank and the clairvoyant."""
+
+    def row(name: str, law: dict[str, float]) -> list[str]:
+        part, of = law.get("share"), law.get("pressure_rms_pa")
+        peak_w = law.get("power_peak_w")
+        return [
+            name,
+            number(law["roll_rms_deg"], ".3f"),
+            "" if part is None else f"{100 * part:.1f} ± {100 * law['share_half_width']:.1f} %",
+            number(law.get("share_of_causal"), ".3f"),
+            number(law.get("level_peak_m"), ".2f"),
+            number(None if of is None else of / 1e3, ".1f"),
+            number(None if peak_w is None else peak_w / 1e6, ".2f"),
+            number(law.get("peak_sensitivity"), ".2f"),
+            number(law.get("worst_radius"), ".4f"),
+        ]
+
+    return [
+        ["", "roll RMS, deg", "share of the possible", "of the causal bound's", "highest level, m",
+         "pressure RMS, kPa", "peak power, MW", "peak sensitivity",
+         "largest eigenvalue"],
+        *(row(name, law) for name, law in result["rows"].items()),
+    ]  # fmt: skip
 
 
 def february_hours(result: dict[str, Any]) -> Rows:
@@ -362,7 +417,9 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "renewed seas": ("renewed_seas", renewed_seas),
     "planning": ("constrained_campaign", planning),
     "voyage stages": ("renewed_voyage", voyage_stages),
+    "sea estimates": ("sea_estimates", sea_errors),
     "stiffness by loading": ("sea_estimates", stiffness_by_loading),
+    "storm shares": ("share_of_possible", storm_shares),
     "february hours": ("february_hours", february_hours),
     "fault times": ("fault_campaign", fault_times),
     "shipped scenarios": ("shipped_scenarios", scenarios),

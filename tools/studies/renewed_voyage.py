@@ -1,6 +1,6 @@
 """A self-tuned law that is renewed under way, beside laws that were told what she meets.
 
-    python -m tools.studies.renewed_voyage --json
+    python -m tools.studies.renewed_voyage --json     # --seeds
 
 One voyage on the bench's full plant, in lockstep: an hour of 3 m, into the storm and out of it, and
 in the storm the load changes and changes back. The renewed law starts knowing nothing; it estimates
@@ -9,6 +9,8 @@ clairvoyant bound for the passive ship's own record, from 20 minutes after each 
 """
 
 import math
+import sys
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from datetime import datetime
@@ -26,6 +28,7 @@ from tools.printing import command_line, show
 from tools.studies.trial_setup import CONFIGS, measured_hour, shipped
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of, self_tuned
+from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw, DesignPlant
@@ -180,18 +183,34 @@ def judge(runs: dict[str, Run], plant: DesignPlant) -> list[dict[str, Any]]:
     return found
 
 
+def mean_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """One stage over the seeds, and how far the renewed law's share is below the other's."""
+    numbers = [name for name in rows[0] if name != "stage"]
+    lost = np.array([row["told_share"] - row["renewed_share"] for row in rows])
+    return {
+        "stage": rows[0]["stage"],
+        **{name: float(np.mean([row[name] for row in rows])) for name in numbers},
+        "lost_share": mean_interval(lost)._asdict(),
+    }
+
+
 def main() -> None:
     """Sail and print."""
     parser = command_line(__doc__)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seeds", type=int, default=3, help="2 or more (%(default)s)")
     arguments = parser.parse_args()
+    if arguments.seeds < 2:
+        parser.error("--seeds must be 2 or more: one value has no confidence interval")
+    plant = shipped("self_tuned").plant
+    voyages, events = [], []
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        runs = {run.name: run for run in pool.map(sail, jobs(arguments.seed))}
-    events = {
-        f"{event.time_ns * 1e-9:.0f} s, {event.state.name}": "; ".join(event.reasons)
-        for event in runs[RENEWED].retuning
-    }
-    show({"stages": judge(runs, shipped("self_tuned").plant), "events": events}, arguments)
+        for seed in range(1, 1 + arguments.seeds):
+            runs = {run.name: run for run in pool.map(sail, jobs(seed))}
+            voyages.append(judge(runs, plant))
+            events.append([event.as_json() for event in runs[RENEWED].retuning])
+            sys.stderr.write(f"voyage {seed} of {arguments.seeds}\n")
+    stages = [mean_of(rows) for rows in zip(*voyages, strict=True)]
+    show({"stages": stages, "voyages": voyages, "events": events}, arguments)
 
 
 if __name__ == "__main__":
