@@ -26,7 +26,7 @@ from utank_hil.retuning import (
 )
 from utank_hil.retuning.law_bank import FADE_SAMPLES
 from utank_hil.retuning.law_exchange import RETRY_NS
-from utank_hil.retuning.renewing import SEA_DIFFERENCE, TRIAL, sea_difference
+from utank_hil.retuning.renewing import LOSING, SEA_DIFFERENCE, TRIAL, sea_difference
 from utank_hil.sea import SlopeSpectrum, jonswap
 
 CONFIG = load_config("configs/controllers/constrained_gpc.yaml", ControllerConfig)
@@ -343,6 +343,27 @@ def test_the_pump_rests_when_the_law_loses_and_for_ten_minutes() -> None:
     rig.run(260)
     assert rig.controller.excused  # it loses again
     assert rig.states == [IDLE, IDLE]
+
+
+def test_a_law_that_did_well_rests_only_when_it_has_lost_for_longer() -> None:
+    rig = Rig(renewed())
+    lull, after = range(1000, 1300), 1600
+    rig.wave = lambda k: 0.3 if k in lull else 1.0
+    rig.passive = lambda k: 0.1 if k in lull else 0.2 if k >= after else 2.0
+    rig.run(after)
+    window = slice(lull.stop - 250, lull.stop)
+    roll, passive = (
+        np.std(each[window])
+        for each in (
+            np.array([row[0] for row in rig.rows]),
+            [0.04 * rig.passive(k) * np.sin(0.12 * k) for k in range(after)],
+        )
+    )
+    assert roll > LOSING * passive  # over four roll periods
+    assert rig.states == []
+    rig.run(750)  # twelve roll periods are 150 s
+    assert rig.controller.excused
+    assert rig.states == [IDLE]
 
 
 def test_a_resting_pump_is_woken_by_the_next_law() -> None:

@@ -44,6 +44,10 @@ LOSING: Final = 1.2
 """Roll over the passive ship's at which a law has lost and the pump rests."""
 LOSING_PERIODS: Final = 4.0
 """Roll periods that this is judged by: half as many condemned sound laws by their first waves."""
+RECORD_PERIODS: Final = 12.0
+"""Roll periods over which she must have rolled more than the passive ship, too. In the lull after a
+group of waves, a law that halves her roll lost by 1.23 over four periods.
+"""
 LEAST_ROLL_RAD: Final = math.radians(0.25)
 """Root mean square of the roll below which nothing is judged."""
 AWAY: Final = 5.0
@@ -92,8 +96,9 @@ class RenewingController(LawExchange):
         self._law = law
         self._limits = limits
         self._configured = self._ship = ship
-        samples = round(LOSING_PERIODS * ship.roll_period_s / self.sample_time_s)
-        self._lately = MovingWindow(samples)
+        samples = ship.roll_period_s / self.sample_time_s
+        self._lately = MovingWindow(round(LOSING_PERIODS * samples))
+        self._record = MovingWindow(round(RECORD_PERIODS * samples))
         self._rests_until_ns = 0
         self._latest: MotionEstimate | None = None
         self._seen: ShipFigures | None = None
@@ -110,7 +115,7 @@ class RenewingController(LawExchange):
         command = super().step(y, reference)
         self.fallbacks += controller.fallbacks - before
         if not self._engaged or self.state is RetuningState.TRIAL:
-            self._lately.clear()
+            self._forget()
             self._rests_until_ns = 0
         elif self.excused:
             return np.zeros(1)
@@ -119,16 +124,17 @@ class RenewingController(LawExchange):
         return command
 
     def _rest_if_losing(self) -> None:
-        lately = self._lately
-        lately.add(self._roll_rad, 0.0, self._passive_roll_rad)
-        now = lately.statistics
+        for window in (self._lately, self._record):
+            window.add(self._roll_rad, 0.0, self._passive_roll_rad)
+        now, record = self._lately.statistics, self._record.statistics
         if (
-            lately.full
+            self._lately.full
             and now.roll_rad > max(LEAST_ROLL_RAD, LOSING * now.passive_roll_rad)
             and now.passive_roll_rad > 0  # it is known
+            and record.roll_rad > record.passive_roll_rad
         ):
             self._rests_until_ns = self._now_ns + RETRY_NS
-            lately.clear()
+            self._forget()
             self._log_event(
                 (
                     f"she rolls {now.roll_rad / now.passive_roll_rad:.2f} times what she would "
@@ -136,6 +142,10 @@ class RenewingController(LawExchange):
                     f"{RETRY_NS // 60_000_000_000} minutes at most",
                 )
             )
+
+    def _forget(self) -> None:
+        self._lately.clear()
+        self._record.clear()
 
     def reset(self) -> None:
         """Reset all laws; a law on trial is dropped."""
