@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.runtime.passive_twin import LASTS_PERIODS, MEMORY_PERIODS, PassiveTwin
+from utank_hil.runtime.passive_twin import AMPLIFIED, LASTS_PERIODS, MEMORY_PERIODS, PassiveTwin
 
 STEP_S = 0.05
 FIRST = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
@@ -125,6 +126,34 @@ def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
     assert not any(amplified for _, amplified in rolled(0.005, 0.0, 20 * PERIOD_S))
     assert not any(amplified for _, amplified in rolled(0.0, 0.1, 20 * PERIOD_S))
     assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
+
+
+def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
+    ship, tank = FIRST.ship, FIRST.tank
+    mass, damping, stiffness = coupled_matrices(ship, tank)
+    w, begins_s, ends_s = 0.6, 30 * PERIOD_S, 41 * PERIOD_S
+    response = np.linalg.solve(
+        stiffness - w**2 * mass + 1j * w * damping, [0.0, tank.reservoir_area_m2]
+    )[0]
+    t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
+    # the pump halves the roll of the waves; in the lull it doubles them
+    waves = np.where(t < begins_s, 0.1, 0.04)
+    phasor = np.where(t < begins_s, -0.05, 0.04) / response
+    pressure_pa = np.abs(phasor) * np.sin(w * t + np.angle(phasor))
+    inverse = np.linalg.inv(mass)
+    system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
+    force = np.concatenate([np.zeros(2), inverse @ [0.0, tank.reservoir_area_m2]])[:, None]
+    observed = np.eye(1, 4), np.zeros((1, 1))
+    _, made, _ = scipy.signal.lsim((system, force, *observed), pressure_pa, t)
+    roll_rad = waves * np.sin(w * t) + made.ravel()
+    twin, ratios, amplified = PassiveTwin(ship, tank, STEP_S, LEAST_RAD), [], []
+    for own_rad, effort_pa in zip(roll_rad, pressure_pa, strict=True):
+        twin.update(own_rad, 0.0, 0.0, effort_pa)
+        ratios.append(twin.ship_rms_rad / twin.rms_rad if twin.rms_rad else 0.0)
+        amplified.append(twin.amplified)
+    lost = t[np.argmax(amplified)]
+    patient = np.argmax((t > begins_s) & (np.array(ratios) > AMPLIFIED))
+    assert t[patient] < ends_s < lost < begins_s + 17 * PERIOD_S
 
 
 def test_mean_squares_are_those_of_some_roll_periods() -> None:

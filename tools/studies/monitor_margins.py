@@ -7,7 +7,6 @@ In lockstep, with bus, nodes, sensors, retuning and the scenario's operator. One
 gain's margin is its distance from 1 over the distance at which it is found.
 """
 
-import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,7 +24,6 @@ from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.tank_equation import SIGN_GAIN, STUCK_GAIN
-from utank_hil.runtime.passive_twin import AMPLIFIED
 from utank_hil.tick import TICK_NS
 
 LOOK_TICKS = 5
@@ -34,7 +32,6 @@ LOOK_TICKS = 5
 def shares(monitors: Monitors) -> dict[str, float]:
     """Each statistic of now over its threshold; NaN where it is not known."""
     limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
-    judged = twin.ship_rms_rad > limits.amplified_roll_rad and twin.rms_rad > 0
     return {
         "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
         "roll noise": monitors.motion.noise.share,
@@ -45,7 +42,7 @@ def shares(monitors: Monitors) -> dict[str, float]:
         "level stuck": (1 - equation.level_gain) / (1 - STUCK_GAIN),
         "motion late": equation.late_s / limits.motion_late_s,
         "drive": monitors.drive.late_pa / limits.pressure_error_pa,
-        "roll over twin": twin.ship_rms_rad / twin.rms_rad / AMPLIFIED if judged else math.nan,
+        "roll over twin": twin.share,
     }
 
 

@@ -496,8 +496,8 @@ FAULTS: Final = (
         "Retune the law, or use one for this load and sea.",
         _found(
             Reaction.RAMP,
-            "roll over 1.25 times the passive twin's for a quarter of a roll period, and over 0.5 "
-            "degrees RMS",
+            "roll over 1.25 times the passive twin's for a quarter of a roll period, over 1.1 "
+            "times in twelve roll periods, and over 0.5 degrees RMS",
             Finding.ROLL_AMPLIFIED,
         ),
     ),

@@ -40,6 +40,10 @@ RECOVERED: Final = 1.05
 UNKNOWN: Final = 1.0
 """So much more at the start, when nothing is remembered: over their first roll period sound laws
 rolled a ship 1.63 times as much, over the first five 1.5 times."""
+RECORD_PERIODS: Final = 12.0
+RECORD: Final = 1.1
+"""Own roll over the twin's that a law has lost by over so many roll periods, too. In the lull after
+a group of waves, laws that halve her roll came to 1.25 over six periods, 1.05 over twelve."""
 LASTS_PERIODS: Final = 0.25
 """The memory of the mean squares is the patience: longer, and a bad law only rolls her longer."""
 
@@ -77,6 +81,8 @@ class PassiveTwin:
         self._pressure_pa = 0.0
         self._mean_rad = self._twin_mean_rad = 0.0
         self._power = self._twin_power = 0.0
+        self._record_share = period_s / (RECORD_PERIODS * roll_period_s)
+        self._record_power = self._twin_record_power = 0.0
         self._losing_s = 0.0
         self._unknown = UNKNOWN
         self.roll_rad = 0.0
@@ -107,6 +113,14 @@ class PassiveTwin:
         """The same of the twin's."""
         return math.sqrt(self._twin_power)
 
+    @property
+    def share(self) -> float:
+        """How near the comparison is to its threshold, 1; NaN where nothing is judged."""
+        if self._power <= self._least_power or not self._twin_power:
+            return math.nan
+        lately = math.sqrt(self._power / self._twin_power) / (AMPLIFIED + self._unknown)
+        return min(lately, math.sqrt(self._record_power / self._twin_record_power) / RECORD)
+
     def update(
         self, roll_rad: float, rate_rad_s: float, level_rate_m_s: float, pressure_pa: float
     ) -> None:
@@ -132,8 +146,11 @@ class PassiveTwin:
         self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
         self._twin_mean_rad += self._mean_share * (twin_rad - self._twin_mean_rad)
         own_rad, twin_rad = roll_rad - self._mean_rad, twin_rad - self._twin_mean_rad
-        self._power += self._share * (own_rad * own_rad - self._power)
-        self._twin_power += self._share * (twin_rad * twin_rad - self._twin_power)
+        own_power, twin_power = own_rad * own_rad, twin_rad * twin_rad
+        self._power += self._share * (own_power - self._power)
+        self._twin_power += self._share * (twin_power - self._twin_power)
+        self._record_power += self._record_share * (own_power - self._record_power)
+        self._twin_record_power += self._record_share * (twin_power - self._twin_record_power)
         self._judge()
 
     def excuse(self) -> None:
@@ -144,7 +161,8 @@ class PassiveTwin:
         self._unknown -= self._share * self._unknown
         ratio = RECOVERED if self.amplified else AMPLIFIED + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
-        if self._losing_s < 0 or self._power > least_power:
+        on_record = self.amplified or self._record_power > RECORD**2 * self._twin_record_power
+        if self._losing_s < 0 or (on_record and self._power > least_power):
             self._losing_s += self._period_s
         else:
             self._losing_s = 0.0
