@@ -34,9 +34,7 @@ def test_faults_and_retunings_leave_nothing_behind() -> None:
     def retune(record: FloatArray) -> Answer:
         return candidate
 
-    samples, counts = sail(
-        1000, 50, 3, settings=SETTINGS, retune=retune, episode_s=75.0, cargo_s=150.0
-    )
+    samples, counts = sail(1000, 50, retune, 3, settings=SETTINGS, episode_s=75.0, cargo_s=150.0)
     print(counts, verdict(samples))
     assert counts["last 50 events: RETUNED"] > 0
     assert min(counts[name] for name in ("silence", "lost_link", "strange_frames")) > 0

@@ -5,7 +5,8 @@
 In lockstep, the storm scenario of the load change. Every ten minutes one thing goes wrong (sensors
 silent for a second, the link lost, the levels' switch closed, a burst of strange frames), and the
 operator resets and arms again; every four hours the cargo is moved and a retuning is ordered. Each
-hour is a sample. The verdict compares the last quarter of the samples with the second quarter.
+hour is a sample. The verdict compares the last quarter of the samples with the second quarter. The
+retuner has a process of its own, as on a ship.
 """
 
 import gc
@@ -13,9 +14,12 @@ import os
 import random
 import resource
 import time
+from array import array
 from collections import Counter
 from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -25,7 +29,8 @@ from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.canbus import Frame
-from utank_hil.configuration import load_config
+from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.one_thread import one_thread_each
 from utank_hil.retuning import RetuneFunction, RetuningSettings, SimulatedRetuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S
 from utank_hil.runtime import Lockstep, Node
@@ -34,6 +39,8 @@ from utank_hil.runtime.panel import Action, TimedAction
 SCENARIO = Path("configs/scenarios/load_change.yaml")
 SECOND_NS = 1_000_000_000
 EPISODE_S = 600.0
+SAMPLE_S = 3600.0
+LEAST_HOURS = 8
 CARGO_S = 4 * 3600.0
 MOST_GROWTH_MB = 4.0
 MOST_OBJECTS = 1.01
@@ -64,7 +71,7 @@ class Timed(Mutable):
 
     def __init__(self, node: Node) -> None:
         super().__init__(node)
-        self.costs_ns: list[int] = []
+        self.costs_ns = array("q")  # ints would scatter over the heap
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Note what the node's tick takes."""
@@ -96,17 +103,22 @@ def sample(node: Timed, hours: float) -> Sample:
         len(os.listdir("/proc/self/fd")),
         median(node.costs_ns) / 1e3,
     )
-    node.costs_ns.clear()
+    del node.costs_ns[:]
     return taken
+
+
+def law_of(scenario: Scenario) -> ControllerConfig:
+    """The controller that sails."""
+    return scenario.controllers["gpc"]
 
 
 def sail(
     seconds: float,
     sample_s: float,
+    retune: RetuneFunction,
     seed: int = 1,
     *,
     settings: RetuningSettings | None = None,
-    retune: RetuneFunction | None = None,
     episode_s: float = EPISODE_S,
     cargo_s: float = CARGO_S,
 ) -> tuple[list[Sample], Counter[str]]:
@@ -116,19 +128,19 @@ def sail(
     ----------
     seconds, sample_s : float
         Ship time in all, and from one sample to the next.
-    settings, retune : optional
+    retune : callable
+        Identifies and designs.
+    settings : optional
         Of the retuning, in the place of the configuration's.
     episode_s, cargo_s : float
         From one fault, and from one load change, to the next.
     """
     draw, counts = random.Random(seed), Counter[str]()
     scenario = load_config(SCENARIO, Scenario)
-    config = scenario.controllers["gpc"]
-    work = retuner_work(config)
-    assert work is not None
+    config = law_of(scenario)
     if settings is not None:
         config = config.model_copy(update={"retuning": settings})
-    retuner = SimulatedRetuner(retune or work[0], scenario.retuner_latency_s)
+    retuner = SimulatedRetuner(retune, scenario.retuner_latency_s)
     side = build_ship_side(scenario, seed, (TimedAction(1.0, Action.ARM),))
     ships = scenario.vessel.ship, scenario.sailing_ship
     plant: Any = side.plant
@@ -207,7 +219,17 @@ def main() -> None:
     parser = command_line(__doc__)
     parser.add_argument("--days", type=float, default=7.0)
     arguments = parser.parse_args()
-    samples, counts = sail(arguments.days * 86400, 3600.0)
+    if arguments.days * 24 < LEAST_HOURS:
+        parser.error(f"--days: at least {LEAST_HOURS} hours, for samples to compare")
+    work = retuner_work(law_of(load_config(SCENARIO, Scenario)))
+    assert work is not None
+    identify_and_design, *_ = work
+    with one_thread_each(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as apart:
+        samples, counts = sail(
+            arguments.days * 86400,
+            SAMPLE_S,
+            lambda record: apart.submit(identify_and_design, record).result(),
+        )
     rows = [[round(value, 3) for value in vars(each).values()] for each in samples]
     table = {"head": list(vars(samples[0])), "rows": rows}
     show({"verdict": verdict(samples), "counts": dict(counts), "samples": table}, arguments)
