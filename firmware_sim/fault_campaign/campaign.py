@@ -221,6 +221,11 @@ class Campaign(Section):
             if ids.count(row.id) > 1
         ]
         problems += [
+            (f"requirements.{place}.id", "is there twice")
+            for place, name in enumerate(known)
+            if known.count(name) > 1
+        ]
+        problems += [
             (f"{key}.{place}.meets", f"{name} is no requirement")
             for key, rows in every
             for place, row in enumerate(rows)

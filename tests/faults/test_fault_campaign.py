@@ -62,6 +62,7 @@ def test_every_live_row_has_what_it_does_or_what_shows_it() -> None:
         ("codes: [LEVEL_LIMIT]", "codes: [LEVEL]", "rows"),
         ("controller: on_off", "controller: off", "setups.valve.controller"),
         ("meets: [F17]", "meets: [F18]", "requirements"),
+        ("{id: F01, ", "{id: F02, ", "requirements.0.id"),
     ],
 )
 def test_what_is_wrong_in_a_campaign_is_named(tmp_path: Path, old: str, new: str, key: str) -> None:

@@ -79,8 +79,8 @@ class ControllerBench:
     """Everything else on the bus, healthy unless a test says otherwise.
 
     Fields that a test changes: the truth that is sent (`motion`, `tank`, `pump`, `drive_state`,
-    `drive_fault`, `order`), `silent` (message types that are not sent) and `spoil` (a function
-    applied to every frame on its way, which may return none or several).
+    `drive_fault`, `drive_warns`, `order`), `silent` (message types that are not sent) and `spoil`
+    (a function applied to every frame on its way, which may return none or several).
     """
 
     def __init__(
@@ -119,6 +119,7 @@ class ControllerBench:
         self.drive_state: DriveState | None = DriveState.SWITCH_ON_DISABLED
         self.drive_follows = True
         self.drive_fault = DriveFault.NONE
+        self.drive_warns = False
         self.order = OperatorCommand(Mode.STANDBY, *(False,) * 4)
         self.versions = self.panel_versions = (CATALOGUE.version, VERSION)
         self.silent: set[type] = set()
@@ -197,7 +198,9 @@ class ControllerBench:
         if index % 10 == 0:
             self._send(
                 DriveStatus2,
-                DriveStatus2(self.drive_fault, 1000.0, 12.0, 40.0, 40.0, *(False,) * 4),
+                DriveStatus2(
+                    self.drive_fault, 1000.0, 12.0, 40.0, 40.0, self.drive_warns, *(False,) * 3
+                ),
             )
             for address, sender in self._beats.items() if Heartbeat not in self.silent else ():
                 nan = float("nan")

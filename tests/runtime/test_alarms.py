@@ -219,6 +219,21 @@ def test_alarm_of_a_fault_outlives_its_reset_until_it_is_accepted() -> None:
     assert codes(bench) == {Fault.NONE}
 
 
+def test_a_warning_of_the_drive_alarms_within_two_messages_and_changes_no_command() -> None:
+    bench = ControllerBench()
+    bench.drive_at(20e3)
+    bench.drive_warns = True
+    bench.run(200)
+    assert bench.node.alarms.codes == {Fault.DRIVE_WARNING}
+    bench.run(1000)
+    assert (bench.node.mode, bench.node.fault) == (Mode.ACTIVE, Fault.NONE)
+    assert bench.node.command_pa == 20e3
+    bench.drive_warns = False
+    bench.order_is(acknowledge=True)
+    bench.run(11_000)
+    assert codes(bench) == {Fault.NONE}
+
+
 @pytest.mark.parametrize("second", [HIGH, SILENT])
 def test_second_fault_while_the_first_is_latched_alarms_again(second: Fault) -> None:
     bench = ControllerBench()

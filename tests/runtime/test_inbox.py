@@ -361,8 +361,8 @@ def test_new_it_knows_nothing_and_trusts_nothing() -> None:
         assert inbox.valve_opening == 1.0
         assert inbox.valve_state is None
         assert inbox.drive_fault is DriveFault.NONE
-        for name in ("high_level", "drive_held_back", "versions_match", "panel_matches",
-                     "protection_valid"):  # fmt: skip
+        for name in ("high_level", "drive_held_back", "drive_warns", "versions_match",
+                     "panel_matches", "protection_valid"):  # fmt: skip
             assert getattr(inbox, name) is False, name
 
 
@@ -440,6 +440,16 @@ def test_a_drive_at_its_power_or_speed_is_held_back(limited: str) -> None:
         assert line.inbox.drive_held_back is said
     line.say(status._replace(pressure_limited=True, rate_limited=True))  # type: ignore[attr-defined]
     assert not line.inbox.drive_held_back
+
+
+@pytest.mark.parametrize(
+    "bit", ["temperature_warning", "voltage_warning", "command_warning", "sensor_warning"]
+)
+def test_a_drive_warns_by_any_bit_until_its_next_status(bit: str) -> None:
+    line, status = Line(), GOOD[DriveStatus2]
+    for said in (True, False, True):
+        line.say(status._replace(**{bit: said}))  # type: ignore[attr-defined]
+        assert line.inbox.drive_warns is said
 
 
 def test_the_panel_in_command_is_to_match_and_not_the_other() -> None:

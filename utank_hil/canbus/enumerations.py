@@ -79,6 +79,7 @@ class Fault(IntEnum):
     NOT_COMMISSIONED = 37
     BUS_DEGRADED = 38
     STABILITY_LOW = 39
+    DRIVE_WARNING = 40
 
 
 class RetuningState(IntEnum):

@@ -530,6 +530,17 @@ FAULTS: Final = (
         ),
     ),
     _row(
+        Fault.DRIVE_WARNING,
+        "The pump drive warns: it may soon trip or not hold the pressure.",
+        "Read the warning bits in DRIVE_STATUS_2. Temperature: cooling, load. Voltage: supply. "
+        "Command: bus, its cable and load. Sensor: the drive's pressure feedback.",
+        Condition(
+            Reaction.WARN,
+            "a warning bit in the last DRIVE_STATUS_2",
+            lambda seen, _: seen.drive_warns,
+        ),
+    ),
+    _row(
         Fault.BUS_DEGRADED,
         "Frames are lost on the CAN bus, though not so many in succession that it ends the run, or "
         "a node sends too seldom.",

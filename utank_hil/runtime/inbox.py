@@ -92,6 +92,8 @@ class Inbox:
     drive_state, drive_fault : DriveState or None, DriveFault or None
         Received at `drive_ns`; the echo of a new command at `echo_ns`. Without a pump the drive
         counts as enabled and is never late.
+    drive_warns : bool
+        A warning bit was set in the last DRIVE_STATUS_2.
     drive_held_back : bool
         The drive says that its power or its speed is at the limit.
     power_w : float
@@ -188,7 +190,7 @@ class Inbox:
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
         self.pressure_pa = self.power_w = 0.0
-        self.drive_held_back = False
+        self.drive_held_back = self.drive_warns = False
         self.high_level = False
         self.valve_opening = 1.0
         self.valve_state: ValveState | None = None
@@ -330,6 +332,12 @@ class Inbox:
 
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self.drive_fault = status.fault
+        self.drive_warns = (
+            status.temperature_warning
+            or status.voltage_warning
+            or status.command_warning
+            or status.sensor_warning
+        )
         self.power_w = status.bus_voltage_v * status.current_a
 
     def _on_valve(self, status: ValveStatus, now_ns: int) -> None:

@@ -53,6 +53,8 @@ class Observations:
         Time since arming was accepted; the supervisor counts it.
     drive_fault : bool
         The drive's status reports a fault.
+    drive_warns : bool
+        The drive's status has a warning.
     drive_stays_on : bool
         It was told to be off in vain.
     valve_age_ms, valve_echo_age_ms : float
@@ -117,6 +119,7 @@ class Observations:
     drive_out_ms: float = 0.0
     arming_ms: float = 0.0
     drive_fault: bool = False
+    drive_warns: bool = False
     drive_stays_on: bool = False
     valve_age_ms: float = 0.0
     valve_echo_age_ms: float = 0.0
@@ -213,6 +216,7 @@ class Observer:
         seen.drive_fault = (
             inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
         )
+        seen.drive_warns = inbox.drive_warns
         seen.link_lost = (
             self._link_lost_ns is not None and now_ns - self._link_lost_ns <= self._command_cycle_ns
         )
