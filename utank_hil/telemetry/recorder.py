@@ -384,7 +384,8 @@ def _main() -> None:
             _go_on(content | {"before": asdict(report), "places": asdict(places)})
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
-        print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # a terminal that is gone
+            print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
         _print_json({"error": str(error)})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
 
@@ -401,8 +402,9 @@ def _go_on(content: Mapping[str, Any]) -> NoReturn:
 
 
 def _print_json(message: Mapping[str, int | str]) -> None:
-    """Send a message to the parent: one JSON object a line on standard output."""
-    print(json.dumps(message), flush=True)
+    """Send a message to the parent, if it lives: one JSON object a line on standard output."""
+    with contextlib.suppress(BrokenPipeError):  # nothing is buffered, or it would fail at the end
+        os.write(sys.stdout.fileno(), f"{json.dumps(message)}\n".encode())
 
 
 if __name__ == "__main__":
