@@ -338,6 +338,8 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
         feed(ring, table(rows)[100:])
     with pytest.raises(RecorderError, match="the recorder failed: ") as caught:
         recorder.stop()
+    with pytest.raises(RecorderError, match="the recorder failed: "):
+        recorder.close()
     assert "exit code" not in str(caught.value)
     assert len(recorded(file)) >= 100
     if rows == 300:

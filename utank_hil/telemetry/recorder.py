@@ -289,7 +289,7 @@ class RecorderProcess(Closing):
             command += ["--part-s", str(rotation.part_s)]
             if rotation.keep_bytes is not None:
                 command += ["--keep-bytes", str(rotation.keep_bytes)]
-        self._report: RecorderReport | None = None
+        self._end: RecorderReport | RecorderError | None = None
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL if head is None else subprocess.PIPE,
@@ -326,24 +326,29 @@ class RecorderProcess(Closing):
         RecorderError
             If the process failed, with the reason, or does not end.
         """
-        if self._report is None:
-            self._process.terminate()
-            try:
-                code = self._process.wait(_STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                self._kill()
-                raise RecorderError("the recorder did not end and was killed") from None
-            with self._output:
-                reply = json.loads(self._output.readline() or "{}")
-                if code != 0:
-                    reason = reply.get("error", f"exit code {code}")
-                    raise RecorderError(f"the recorder failed: {reason}")
-                self._report = RecorderReport(**reply)
-        return self._report
+        if self._end is None:
+            self._end = self._ended()
+        if isinstance(self._end, RecorderError):
+            raise self._end
+        return self._end
 
     def close(self) -> None:
         """Same as `stop`."""
         self.stop()
+
+    def _ended(self) -> RecorderReport | RecorderError:
+        self._process.terminate()
+        try:
+            code = self._process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            return RecorderError("the recorder did not end and was killed")
+        with self._output:
+            reply = json.loads(self._output.readline() or "{}")
+        if code != 0:
+            reason = reply.get("error", f"exit code {code}")
+            return RecorderError(f"the recorder failed: {reason}")
+        return RecorderReport(**reply)
 
     def _kill(self) -> None:
         self._process.kill()
