@@ -159,7 +159,7 @@ def run(
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
-            notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
+            notes.print(escape(f"{loaded.name} on {bus}; Ctrl-C ends it."), soft_wrap=True)
             manager.ready(f"{loaded.name} on {bus}")
             RealTimeLoop([on_bus], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
