@@ -117,7 +117,7 @@ class RunRecording:
             )
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
-            self.stop()
+            self._close_records()
         for file in files:
             if file.exists() and file.stat().st_size == 0:
                 file.unlink()  # nothing in it
@@ -148,9 +148,7 @@ class RunRecording:
 
     def stop(self) -> None:
         """Have the summary completed; idempotent."""
-        records, self._records = self._records, None
-        if records is not None:
-            records.close()  # before the other, whose end is what ends the recorder
+        self._close_records()  # before the other, whose end is what ends the recorder
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()
@@ -164,3 +162,8 @@ class RunRecording:
                 self.summary.rows, self.summary.lost = report.rows, report.lost
                 self.summary.records_lost = report.records_lost
                 self.summary.parts = report.parts
+
+    def _close_records(self) -> None:
+        records, self._records = self._records, None
+        if records is not None:
+            records.close()
