@@ -69,6 +69,8 @@ class RunRecording:
         Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional
         The folder's oldest recordings are removed beyond so much; without it none are.
+    log : Path, optional
+        Log of the run's events, whose time the recording is named by: a report looks for it there.
 
     Attributes
     ----------
@@ -83,6 +85,7 @@ class RunRecording:
         about: Mapping[str, Any] | None = None,
         head: Mapping[str, Any] | None = None,
         keep_bytes: int | None = None,
+        log: Path | None = None,
     ) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
@@ -99,8 +102,9 @@ class RunRecording:
         if reason is not None:
             self.summary.error = reason
             return
+        stamp = None if log is None else log.stem.partition("-")[2]
         try:
-            files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]))
+            files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]), stamp=stamp)
         except OSError as error:
             self.summary.error = str(error)
             return

@@ -31,6 +31,12 @@ def part_of(file: Path, number: int) -> Path:
     return file if number == 1 else file.with_stem(f"{file.stem}-part{number:03d}")
 
 
+def whole_of(file: Path) -> tuple[Path, int]:
+    """Return the first part of a recording, by the name of one, and the number of that one."""
+    stem, mark, number = file.stem.rpartition("-part")
+    return (file.with_stem(stem), int(number)) if mark and number.isdecimal() else (file, 1)
+
+
 def make_room(file: Path, number: int, rotation: Rotation | None) -> None:
     """Remove the oldest recordings before a part of one begins, if its rotation says so.
 
