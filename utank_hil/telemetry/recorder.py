@@ -165,7 +165,7 @@ def record_part(
         if number == 1:
             _print_json({"ready": 1})
         time = reader.columns.index("time_s")
-        recorded = reported_rows = reported_events = 0
+        recorded = 0
         begin_s: float | None = None
         last = full = False
         while not (last or full):
@@ -179,16 +179,12 @@ def record_part(
             if log is not None:
                 log.write()
             if part is not None:
-                if reader.lost > reported_rows:
-                    part.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
-                    reported_rows = reader.lost
+                part.note_lost("rows", reader.lost)
                 if len(rows):
                     part.write(rows)
                 part.write_events(new_events)
-                if event_reader is not None and event_reader.lost > reported_events:
-                    lost = event_reader.lost - reported_events
-                    part.note(f"{lost} events lost: the recorder was too slow")
-                    reported_events = event_reader.lost
+                if event_reader is not None:
+                    part.note_lost("events", event_reader.lost)
                 if len(rows) or new_events:
                     part.flush()
         if part is not None:
