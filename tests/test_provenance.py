@@ -188,3 +188,30 @@ def test_recording_that_does_not_say_is_refused_with_its_name(tmp_path: Path) ->
     assert recording.summary.file is not None
     with pytest.raises(ValueError, match="does not say where it comes from"):
         read_about(Path(recording.summary.file))
+
+
+def test_a_git_at_work_in_the_source_tree_is_not_disturbed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=x", "-c", "user.email=x@x")
+        subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True)
+
+    file, index = tmp_path / "file", tmp_path / ".git" / "index"
+    file.write_text("text")
+    git("init", "-q")
+    git("add", "file")
+    git("commit", "-q", "-m", "first")
+    file.touch()  # git would note the time in its index, under a lock
+    before = index.stat()
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    clean = commit.__wrapped__()
+    after = index.stat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    (tmp_path / "other").write_text("not of the program")
+    assert commit.__wrapped__() == clean
+    file.write_text("changed")
+    assert commit.__wrapped__() == f"{clean}-dirty"
+    git("tag", "-a", "v1", "-m", "v1")
+    git("commit", "-q", "-a", "-m", "second")
+    assert re.fullmatch("v1-1-g[0-9a-f]{12}", commit.__wrapped__())

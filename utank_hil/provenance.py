@@ -41,22 +41,26 @@ def commit() -> str:
     the one that pip noted when it installed from a repository; else `UNKNOWN`.
     """
     if (_ROOT / ".git").exists():
-        # no lock: another git may be at work there
-        command = ["git", "--no-optional-locks", "-C", str(_ROOT), "describe", "--always",
-                   "--dirty", "--abbrev=12"]  # fmt: skip
         try:
-            done = subprocess.run(
-                command, capture_output=True, text=True, timeout=_GIT_S, check=True
-            )
+            tree = _git("describe", "--always", "--abbrev=12")
+            # not --dirty, which writes the index under a lock: another git may be at work there
+            changed = _git("--no-optional-locks", "status", "--porcelain", "--untracked-files=no")
         except (OSError, subprocess.SubprocessError):
             return UNKNOWN
-        return done.stdout.strip()
+        return f"{tree}-dirty" if changed else tree
     try:
         origin = importlib.metadata.distribution(PROGRAM).read_text("direct_url.json")
     except importlib.metadata.PackageNotFoundError:
         return UNKNOWN
     found = json.loads(origin or "{}").get("vcs_info", {}).get("commit_id", UNKNOWN)
     return str(found)
+
+
+def _git(*words: str) -> str:
+    command = ["git", "-C", str(_ROOT), *words]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=_GIT_S, check=True
+    ).stdout.strip()
 
 
 def headline() -> str:

@@ -148,7 +148,7 @@ def bench(
                 "no deadlines there."
             )
         for name, path in files.items():
-            console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+            console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
         sound = [] if told["endings"] else ["run CONTROLLER.yaml --bus can0"]
         lead_on(console, f"monitor {shown(out)}", *sound)
     if failures:

@@ -86,7 +86,7 @@ def campaign(
     else:
         _print(loaded, groups, failed)
         console = Console()
-        console.print(f"results: {shown(folder)}", soft_wrap=True)
+        console.print(f"results: {escape(shown(folder))}", soft_wrap=True)
         lead_on(console, f"campaign {shown(study)} --resume", f"report {shown(folder)}")
     if interrupted:
         notes.print("interrupted: the same command with --resume goes on from here")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
@@ -99,9 +100,9 @@ def controller(
     for point in result.points:
         if point.factor == 1:
             for failure in point.robustness.failures():
-                console.print(f"[red]missed by the design:[/red] {failure}")
+                console.print(f"[red]missed by the design:[/red] {escape(failure)}")
     for name, path in files.items():
-        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
 
 
 def _trade_table(result: "Trade", title: str) -> Table:

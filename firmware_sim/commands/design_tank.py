@@ -112,7 +112,7 @@ def tank(
     for each in sweep_tables(points) if points else ():
         print_table(console, each)
     for key, file in files.items():
-        console.print(f"{key:>10}: {shown(file)}", soft_wrap=True)
+        console.print(f"{key:>10}: {escape(shown(file))}", soft_wrap=True)
 
 
 def _left_out(ship: "RollShip") -> str:
@@ -167,7 +167,7 @@ def _table(
     from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost
 
-    table = new_table(f"Tank of {escape(vessel.name)}", *tanks, caption=escape(caption))
+    table = new_table(f"Tank of {vessel.name}", *tanks, caption=caption)
     columns = []
     for name, tank in tanks.items():
         rows = [

@@ -155,7 +155,7 @@ def init(
     if little:
         console.print(f"[yellow]little help:[/yellow] {little}", soft_wrap=True)
     for path in files.values():
-        console.print(f"written: {shown(path)}", soft_wrap=True)
+        console.print(f"written: {escape(shown(path))}", soft_wrap=True)
     steps = (("check", "controller.yaml"), ("bench", "scenario.yaml"))
     lead_on(console, *(f"{command} {shown(files[file])}" for command, file in steps))
 
@@ -230,7 +230,7 @@ def _table(project: "StarterProject") -> Table:
     caption = (
         f"roll: linear prediction in a sea of {sea}, with a gentler law than the self-tuned one"
     )
-    table = new_table(escape(project.vessel.name), "", caption=caption)
+    table = new_table(project.vessel.name, "", caption=caption)
     table.show_header = False
     ship, tank = project.vessel.ship, project.vessel.tank
     rows = [

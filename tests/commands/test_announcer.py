@@ -204,8 +204,10 @@ def test_process_that_dies_at_its_start_is_an_error_at_once(
     announcer = Announcer()
     assert announcer.error is not None
     assert "did not start" in announcer.error
+    reason = announcer.error
     announcer.write(TRIAL, 0)
     announcer.stop()
+    assert announcer.error == reason
 
 
 def test_process_that_died_is_an_error_and_nothing_waits_for_it() -> None:

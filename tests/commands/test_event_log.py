@@ -1,6 +1,7 @@
 """The log of a run: JSON lines with both clocks, in plain words."""
 
 import json
+import resource
 import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -54,3 +55,20 @@ def test_a_full_disk_is_an_error_for_the_caller() -> None:
     with pytest.raises(OSError, match="No space left"):
         log.write(AlarmEvent(0, Fault.LEVEL_LIMIT, AlarmState.NORMAL, Mode.STANDBY), 0)
     log.close()
+
+
+def test_a_line_that_fits_in_part_is_an_error_and_leaves_no_half_of_it(tmp_path: Path) -> None:
+    file = tmp_path / "log.jsonl"
+    log, event = EventLog(file), AlarmEvent(0, Fault.LEVEL_LIMIT, AlarmState.NORMAL, Mode.STANDBY)
+    log.write(event, 0)
+    for _ in range(2):
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 50, before[1]))
+            with pytest.raises(OSError, match="File too large"):
+                log.write(event, 0)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    log.write(event, 0)
+    log.close()
+    assert [json.loads(line)["code"] for line in file.read_text().splitlines()] == [event.code] * 2

@@ -1,6 +1,7 @@
 """Configurations of ships that were found: they load, say what was found, and stay."""
 
 import dataclasses
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -83,3 +84,18 @@ def test_next_start_has_the_law_that_was_retuned(tmp_path: Path) -> None:
         np.testing.assert_array_equal(
             getattr(retuned.matrices(), part), getattr(again.matrices(), part)
         )
+
+
+@pytest.mark.parametrize("which", ["vessel", "config"])
+def test_no_half_of_a_ship_is_left_on_a_full_disk(tmp_path: Path, which: str) -> None:
+    keep, limits = ships(tmp_path), resource.getrlimit(resource.RLIMIT_FSIZE)
+    files = keep.write(FOUND)
+    vessel_bytes, bytes_there = (files[name].stat().st_size for name in ("vessel", which))
+    assert bytes_there >= vessel_bytes
+    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_there - 1, limits[1]))
+    try:
+        with pytest.raises(OSError, match=f"File too large: '{tmp_path}"):
+            keep.write(FOUND)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert {*tmp_path.iterdir()} == {*files.values()}

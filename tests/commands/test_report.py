@@ -5,16 +5,19 @@ import io
 import json
 import math
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
+from ports import QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.cli import app
+from utank_hil.commands import run as run_module
 from utank_hil.commands.report import write_page
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
@@ -25,6 +28,11 @@ from utank_hil.telemetry.recording import write_recording
 pytestmark = pytest.mark.slow
 
 ACTIVE_FROM_S, FAULT_FROM_S, END_S = 20.0, 200.0, 240.0
+
+EVENT = {
+    "time_s": FAULT_FROM_S, "event": "alarm", "state": "RAISED", "fault": "LEVEL_LIMIT",
+    "happened": "A reservoir is <full>.", "remedy": "Look at it.",
+}  # fmt: skip
 
 
 class _Links(HTMLParser):
@@ -63,12 +71,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     about = describe("run", config, folder, options={"bus": "can0"})
     file = folder / "run-20260101T000000Z.rrd"
     write_recording(file, SIGNALS, {"run": rows}, about=about)
-    event = {
-        "time_s": FAULT_FROM_S, "event": "alarm", "state": "RAISED", "fault": "LEVEL_LIMIT",
-        "happened": "A reservoir is <full>.", "remedy": "Look at it.",
-    }  # fmt: skip
     log = folder / "log-20260101T000000Z.jsonl"
-    log.write_text(json.dumps(event) + "\n" + '{"time_s": 3.0, "ev', encoding="utf-8")
+    log.write_text(json.dumps(EVENT) + "\n" + '{"time_s": 3.0, "ev', encoding="utf-8")
     return file
 
 
@@ -82,6 +86,31 @@ def test_the_page_of_a_recording_says_what_happened(recording: Path, tmp_path: P
     for begin, mode in ((0.0, "STANDBY"), (20.0, "ACTIVE"), (200.0, "FAULT")):
         assert re.search(rf"{begin:.1f} s</td><td[^>]*>{mode}<", page)
     assert "kind: gpc" in page  # the whole configuration
+
+
+def test_alarms_of_a_later_part_are_those_of_the_run_and_without_a_log_not_known(
+    recording: Path, tmp_path: Path
+) -> None:
+    for name in (recording.name, "log-20260101T000000Z.jsonl"):
+        shutil.copy(recording.with_name(name), tmp_path)
+    part = (tmp_path / recording.name).rename(tmp_path / "run-20260101T000000Z-part002.rrd")
+    page = write_page([part], tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "A reservoir is &lt;full&gt;. Look at it." in page
+    (tmp_path / "log-20260101T000000Z.jsonl").unlink()
+    page = write_page([part], tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Not known: there is no log-20260101T000000Z.jsonl beside it." in page
+
+
+def test_the_log_of_a_run_is_found_by_the_name_of_its_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_module, "SocketCanPort", QuietBus)
+    words = ["run", "configs/controllers/gpc.yaml", "--bus", "any0", "--duration", "0.5"]
+    assert CliRunner().invoke(app, [*words, "--out", str(tmp_path)]).exit_code == 0
+    (log,), (file,) = tmp_path.glob("log-*.jsonl"), tmp_path.glob("run-*.rrd")
+    log.write_text(json.dumps(EVENT) + "\n", encoding="utf-8")
+    page = write_page([file], tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "A reservoir is &lt;full&gt;. Look at it." in page
 
 
 def of_roll(path: Path, roll_rad: np.ndarray, runs: tuple[str, ...] = ("run",)) -> Path:

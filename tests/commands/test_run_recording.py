@@ -15,6 +15,7 @@ from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.recorder import RecorderError, RecorderReport
 from utank_hil.telemetry.recording import read_recording
+from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.rotation import Rotation
 
 SHM = Path("/dev/shm")
@@ -115,6 +116,25 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
     assert summary.file is None
     assert summary.error is not None
     assert "did not start" in summary.error
+
+
+def test_without_a_recorder_viewers_still_see_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(ring: str, file: Path, **others: object) -> Instant:
+        raise RecorderError(f"the recorder of {file} did not start: no room")
+
+    monkeypatch.setattr(module, "RecorderProcess", full)
+    before = rings()
+    recording = RunRecording(tmp_path, head={"x": 1})
+    assert not recording.keeps_records
+    (ring,) = rings() - before
+    with RingReader(ring) as viewer:
+        recording.write(rows(1)[0])
+        assert viewer.columns == SIGNALS
+        assert len(viewer.read()) == 1
+    recording.stop()
+    assert rings() <= before
 
 
 def test_recorder_that_fails_on_the_way_is_told_with_its_file(

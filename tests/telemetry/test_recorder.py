@@ -273,6 +273,29 @@ sys.stdin.read()
     assert len(recorded(file)) == 1
 
 
+def test_recorder_whose_starter_is_gone_ends_without_a_complaint(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "run.rrd"
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, file)
+        recorder._output.close()  # as if this process were dead
+        feed(ring, table(5))
+    assert recorder._process.wait(20) == 0
+    assert capfd.readouterr().err == ""
+    RrdReader(file).store()  # needs the footer
+
+
+def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path: Path) -> None:
+    command = ["-m", "utank_hil.telemetry.recorder", "--ring", "utank-none", "--file", "run.rrd"]
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(
+            [sys.executable, *command], stdout=subprocess.PIPE, stderr=full, cwd=tmp_path
+        )
+    assert ended.returncode == 1
+    assert "is its writer running" in json.loads(ended.stdout)["error"]
+
+
 def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     limit = 400_000  # the layout takes most of it
@@ -315,6 +338,8 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
         feed(ring, table(rows)[100:])
     with pytest.raises(RecorderError, match="the recorder failed: ") as caught:
         recorder.stop()
+    with pytest.raises(RecorderError, match="the recorder failed: "):
+        recorder.close()
     assert "exit code" not in str(caught.value)
     assert len(recorded(file)) >= 100
     if rows == 300:

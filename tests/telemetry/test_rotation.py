@@ -164,3 +164,13 @@ def test_what_is_removed_is_the_oldest_and_no_more_than_needed(
     assert total <= keep_bytes
     if removed:
         assert total + sizes[len(removed) - 1] > keep_bytes
+
+
+def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path: Path) -> None:
+    """As at a start without a battery behind the clock: the new files look the oldest."""
+    file, before = tmp_path / "run-20000101T000000Z.rrd", tmp_path / "run-20261101T000000Z.rrd"
+    for path, time_s in ((before, 2e9), (file, 1e9), (part_of(file, 2), 1e9 + 3600)):
+        path.write_bytes(bytes(1000))
+        os.utime(path, (time_s, time_s))
+    assert remove_oldest(part_of(file, 3), 2500) == [before]
+    assert remove_oldest(part_of(file, 3), 1500) == [file]

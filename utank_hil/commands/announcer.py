@@ -72,8 +72,9 @@ class Announcer:
                 return
             finally:
                 says.close()  # the process has its own, so that its death is heard, too
-            self._process = process
-            if not _ready(heard):
+            if _ready(heard):
+                self._process = process
+            else:
                 process.kill()
                 process.join()
                 self.error = f"the process that tells events did not start ({process.exitcode})"

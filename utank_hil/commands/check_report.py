@@ -70,7 +70,8 @@ def print_controller(judged: JudgedLaw) -> None:
     """Print a controller's margins."""
     config, report = judged.config, judged.robustness
     console = Console(highlight=False)
-    console.print(f"{config.name} for {config.vessel.name}: the configuration is valid.")
+    names = escape(f"{config.name} for {config.vessel.name}")
+    console.print(f"{names}: the configuration is valid.", soft_wrap=True)
     console.print(ship_line(config.vessel), soft_wrap=True)
     if report is None:
         if judged.law.unjudged:
@@ -119,7 +120,8 @@ def _print_remedy(console: Console, judged: JudgedLaw, whose: str = "") -> None:
 def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     """Print the margins of all controllers of a file."""
     console = Console(highlight=False)
-    console.print(f"{collection.name}, {collection.vessel.name}: the {kind} is valid.")
+    names = escape(f"{collection.name}, {collection.vessel.name}")
+    console.print(f"{names}: the {kind} is valid.", soft_wrap=True)
     console.print(ship_line(collection.vessel), soft_wrap=True)
     for line in collection.meaning():
         console.print(line, soft_wrap=True)

@@ -1,6 +1,8 @@
 """The log of a run: one JSON object a line for each event, with monotonic time and UTC."""
 
+import contextlib
 import json
+import os
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -33,7 +35,7 @@ class EventLog:
         Raises
         ------
         OSError
-            If there is no room.
+            If there is no room; then no part of it is left.
         """
         monotonic_ns = start_ns + event.time_ns
         utc_ns = time.time_ns() - time.monotonic_ns() + monotonic_ns
@@ -43,7 +45,15 @@ class EventLog:
             "time_s": event.time_ns * 1e-9,
             **_content(event),
         }
-        self._file.write((json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace"))
+        left = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
+        begin = self._file.seek(0, os.SEEK_END)
+        try:
+            while left:  # what fits is written; what is left tells why it does not
+                left = left[self._file.write(left) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                self._file.truncate(begin)
+            raise
 
     def close(self) -> None:
         """Close the file; idempotent."""

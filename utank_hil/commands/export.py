@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from utank_hil.commands.common import Json, fail, notes, print_json, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
@@ -64,7 +65,7 @@ def export(
     if json_:
         print_json({"file": str(to), unit: count})
     else:
-        notes.print(f"{shown(to)}: {count} {unit}", soft_wrap=True)
+        notes.print(f"{escape(shown(to))}: {count} {unit}", soft_wrap=True)
 
 
 def _entries(recording: Path) -> Iterable[Entry]:

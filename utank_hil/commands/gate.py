@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from rich.markup import escape
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
@@ -112,7 +113,8 @@ def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
     """The law of a configuration, judged; a refused one ends the command with exit code 2."""
     judged = judge(config, path, key, with_delay_margin=False)
     for failure in judged.failures:
-        notes.print(f"[yellow]{config.name}, margins:[/yellow]", failure, soft_wrap=True)
+        name = escape(config.name)
+        notes.print(f"[yellow]{name}, margins:[/yellow]", escape(failure), soft_wrap=True)
     if not judged.accepted:
         if judged.step_s > MOST_STEP_S:
             fail(f"{config.name}: the law's step is too slow for the loop: make it faster")

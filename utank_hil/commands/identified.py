@@ -13,6 +13,7 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.provenance import headline
 from utank_hil.retuning import ModelSummary
 from utank_hil.runtime.redundancy import NO_REDUNDANCY
+from utank_hil.whole_file import left_whole
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"
@@ -104,8 +105,10 @@ def _write(
 ) -> dict[str, Path]:
     found = vessel.model_copy(update={"ship": ship, "tank": tank})
     controller = content | {"vessel": vessel_file.name}
-    for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):
-        file.write_text(f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}")
+    with left_whole(controller_file), left_whole(vessel_file):
+        for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):
+            text = f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}"
+            file.write_text(text, encoding="utf-8")
     return {"vessel": vessel_file, "config": controller_file}
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from utank_hil.assembly import retuning_task
 from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, print_json
@@ -97,7 +98,7 @@ def identify_log(
     try:
         found = identify(record, task)
     except IdentificationError as error:
-        notes.print(f"[red]refused:[/red] {error}", soft_wrap=True)
+        notes.print(f"[red]refused:[/red] {escape(str(error))}", soft_wrap=True)
         if json_:
             print_json({"accepted": False, "reasons": [str(error)]})
         raise typer.Exit(ExitCode.REFUSED) from None

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from utank_hil.commands.common import finite, shown
@@ -95,9 +96,9 @@ def print_report(
         )
     else:
         for reason in answer.reasons:
-            console.print(f"[red]refused:[/red] {reason}", soft_wrap=True)
+            console.print(f"[red]refused:[/red] {escape(reason)}", soft_wrap=True)
     for name, path in files.items():
-        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
 
 
 def _waves(found: Identification) -> str:

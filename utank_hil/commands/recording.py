@@ -69,6 +69,8 @@ class RunRecording:
         Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional
         The folder's oldest recordings are removed beyond so much; without it none are.
+    log : Path, optional
+        Log of the run's events, whose time the recording is named by: a report looks for it there.
 
     Attributes
     ----------
@@ -83,6 +85,7 @@ class RunRecording:
         about: Mapping[str, Any] | None = None,
         head: Mapping[str, Any] | None = None,
         keep_bytes: int | None = None,
+        log: Path | None = None,
     ) -> None:
         self.summary = RecordingSummary()
         self._ring: RingWriter | None = None
@@ -99,8 +102,9 @@ class RunRecording:
         if reason is not None:
             self.summary.error = reason
             return
+        stamp = None if log is None else log.stem.partition("-")[2]
         try:
-            files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]))
+            files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]), stamp=stamp)
         except OSError as error:
             self.summary.error = str(error)
             return
@@ -117,7 +121,7 @@ class RunRecording:
             )
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
-            self.stop()
+            self._close_records()
         for file in files:
             if file.exists() and file.stat().st_size == 0:
                 file.unlink()  # nothing in it
@@ -148,9 +152,7 @@ class RunRecording:
 
     def stop(self) -> None:
         """Have the summary completed; idempotent."""
-        records, self._records = self._records, None
-        if records is not None:
-            records.close()  # before the other, whose end is what ends the recorder
+        self._close_records()  # before the other, whose end is what ends the recorder
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()
@@ -164,3 +166,8 @@ class RunRecording:
                 self.summary.rows, self.summary.lost = report.rows, report.lost
                 self.summary.records_lost = report.records_lost
                 self.summary.parts = report.parts
+
+    def _close_records(self) -> None:
+        records, self._records = self._records, None
+        if records is not None:
+            records.close()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+from rich.markup import escape
 
 from utank_hil.commands.common import Json, fail, notes, print_json, shown
 
@@ -43,7 +44,7 @@ def report(
         result: dict[str, Any] = {"page": str(written), "bytes": written.stat().st_size}
         print_json(result)
     else:
-        notes.print(f"report: {shown(written)}", soft_wrap=True)
+        notes.print(f"report: {escape(shown(written))}", soft_wrap=True)
 
 
 def write_page(runs: list[Path], page: Path) -> Path:

@@ -21,6 +21,7 @@ from utank_hil.pictures.report_page import (
 )
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry.highlight import in_service
+from utank_hil.telemetry.rotation import whole_of
 
 STEP_S: Final = 0.05
 """Between the samples that are drawn: ample for a ship."""
@@ -159,9 +160,8 @@ def _modes(rows: dict[str, FloatArray]) -> ReportTable:
 
 def _alarms(file: Path) -> list[dict[str, Any]]:
     """Events of the run's log, if there is one; a last line that was cut is left out."""
-    log = file.with_name(file.name.replace(RUN, LOG, 1)).with_suffix(".jsonl")
-    found = []
-    if log.exists() and log != file:
+    log, found = _log_of(file), []
+    if log.exists():
         for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
             try:
                 found.append(json.loads(line))
@@ -170,9 +170,17 @@ def _alarms(file: Path) -> list[dict[str, Any]]:
     return [event for event in found if event.get("event") != "retuning"]
 
 
+def _log_of(file: Path) -> Path:
+    """The log of a run, by the name of its recording or of a part of it."""
+    whole, _ = whole_of(file)
+    return whole.with_name(whole.name.replace(RUN, LOG, 1)).with_suffix(".jsonl")
+
+
 def _alarm_section(alarms: list[dict[str, Any]], file: Path) -> ReportSection:
     if not alarms:
-        return ReportSection("Alarms", [f"None in the log of {file.name}."])
+        log = _log_of(file)
+        absent = f"Not known: there is no {log.name} beside it."
+        return ReportSection("Alarms", [f"None in {log.name}." if log.exists() else absent])
     rows = [
         [
             f"{alarm['time_s']:.1f} s",

@@ -7,6 +7,7 @@ from typing import Annotated, Final
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -63,7 +64,7 @@ def reproduce(
     console = Console(highlight=False)
     print_table(console, _summary(entries, made, seconds))
     for name, path in files.items():
-        console.print(f"{name:>10}: {shown(path)}", soft_wrap=True)
+        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
 
 
 def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str, float]]:

@@ -117,12 +117,13 @@ def run(
         manager = _service_manager(stack)
         port = _port(stack, bus)
         stop = stack.enter_context(stop_on_signals())
-        announcer = _announcer(stack, config, loaded, out)
+        log = None if out is None else _log(out)
+        announcer = _announcer(stack, config, loaded, out, log)
         commissioned = not refused
         head = None
         if out is not None:
             head = _replay_head(loaded, law, out, context.params, commissioned=commissioned)
-        recording = _recording(stack, context, loaded, out, keep, announcer, head)
+        recording = _recording(stack, context, loaded, out, keep, announcer, head, log)
         if view:
             _show(stack)
         retuner, estimating = _desks(stack, loaded)
@@ -159,7 +160,7 @@ def run(
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.print(line, soft_wrap=True)
-            notes.print(f"{loaded.name} on {bus}; Ctrl-C ends it.")
+            notes.print(escape(f"{loaded.name} on {bus}; Ctrl-C ends it."), soft_wrap=True)
             manager.ready(f"{loaded.name} on {bus}")
             RealTimeLoop([on_bus], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
@@ -208,19 +209,29 @@ def _port(stack: ExitStack, bus: str) -> SocketCanPort:
     return port
 
 
+def _log(folder: Path) -> Path | None:
+    """File for the log of events; `folder` is made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (log,) = claimed_files(folder.resolve(), event_log.NAME)
+    except OSError as error:
+        notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
+        return None
+    return log
+
+
 def _announcer(
-    stack: ExitStack, config: Path, loaded: ControllerConfig, folder: Path | None
+    stack: ExitStack,
+    config: Path,
+    loaded: ControllerConfig,
+    folder: Path | None,
+    log: Path | None,
 ) -> Announcer | None:
-    """What prints events, and keeps in `folder` their log and the ships that retuning found."""
+    """What prints events, and keeps in `folder` the ships that retuning found."""
     if folder is None and all(work is None for work in works_of(loaded)):
         return None
-    log, ships = None, None
+    ships = None
     if folder is not None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            (log,) = claimed_files(folder.resolve(), event_log.NAME)
-        except OSError as error:
-            notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
         ships = IdentifiedShips(folder.resolve(), loaded.vessel, read_controller(config))
     announcer = Announcer(ships, log)
     stack.callback(announcer.stop)
@@ -258,6 +269,7 @@ def _recording(
     keep_mb: float | None,
     announcer: Announcer | None,
     head: dict[str, Any] | None,
+    log: Path | None,
 ) -> RunRecording:
     """The ring that monitors read, and the recorder that keeps it in `folder`."""
     if head is None:
@@ -270,6 +282,7 @@ def _recording(
         about=about,
         head=head,
         keep_bytes=None if keep_mb is None else round(keep_mb * 1e6),
+        log=log,
     )
     stack.callback(recording.stop)
     if recording.summary.error is not None:

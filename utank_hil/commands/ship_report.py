@@ -156,7 +156,7 @@ def print_ship(vessel: Vessel) -> None:
     """Print what ship, tank and pump are to each other."""
     figures = ship_figures(vessel)
     columns = ("frequency\nrad/s", "period\ns", "damping\nratio")
-    table = new_table(f"{escape(vessel.name)}, linear model", *columns)
+    table = new_table(f"{vessel.name}, linear model", *columns)
     motions = [
         ("roll of the ship without water", figures["roll_frequency_rad_s"], "roll_damping_ratio"),
         ("water in the ship held still", figures["tank_frequency_rad_s"], "tank_damping_ratio"),
@@ -167,7 +167,7 @@ def print_ship(vessel: Vessel) -> None:
         motion = _motion(mode["frequency_rad_s"], mode["damping_ratio"])
         table.add_row("ship and water moving together", *motion)
     console = Console(highlight=False)
-    console.print(f"{vessel.name}: the ship is valid.")
+    console.print(f"{escape(vessel.name)}: the ship is valid.", soft_wrap=True)
     print_table(console, table)
     rest = new_table(None, "")
     rest.show_header = False
@@ -191,7 +191,7 @@ def print_ship(vessel: Vessel) -> None:
             rest.add_row(text, value)
     print_table(console, rest)
     for assumption in vessel.assumptions:
-        console.print(f"Assumed: {assumption}.", soft_wrap=True)
+        console.print(f"Assumed: {escape(assumption)}.", soft_wrap=True)
 
 
 def ship_line(vessel: Vessel) -> str:

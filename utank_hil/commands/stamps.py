@@ -5,7 +5,7 @@ from itertools import count
 from pathlib import Path
 
 
-def claimed_files(folder: Path, *names: str) -> tuple[Path, ...]:
+def claimed_files(folder: Path, *names: str, stamp: str | None = None) -> tuple[Path, ...]:
     """Files named by the time (UTC), numbered where that is taken; all are made, and empty.
 
     Parameters
@@ -13,13 +13,15 @@ def claimed_files(folder: Path, *names: str) -> tuple[Path, ...]:
     folder : Path
     *names : str
         With `{}` in the time's place.
+    stamp : str, optional
+        In the place of the present time, for files that belong to others.
 
     Raises
     ------
     OSError
         If one can't be made.
     """
-    now = stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    now = stamp = stamp or f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     for number in count(2):
         files = tuple(folder / name.format(stamp) for name in names)
         made: list[Path] = []

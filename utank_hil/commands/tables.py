@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from rich.console import Console
+from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
@@ -13,7 +14,11 @@ UNLIMITED: Final = 10_000
 def new_table(
     title: str | None, *figures: str, names: Iterable[str] = ("",), caption: str | None = None
 ) -> Table:
-    """A table without rows: columns of names to the left, of figures to the right."""
+    """A table without rows: columns of names to the left, of figures to the right.
+
+    Title and caption are plain text; cells may have Rich's markup.
+    """
+    title, caption = (None if text is None else escape(text) for text in (title, caption))
     table = Table(title=title, caption=caption)
     for heading in names:
         table.add_column(heading, no_wrap=True)

@@ -18,7 +18,7 @@ import numpy as np
 
 from utank_hil.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Records, pack, unpack
-from utank_hil.telemetry.rotation import part_of
+from utank_hil.telemetry.rotation import part_of, whole_of
 from utank_hil.whole_file import errors_name
 
 SUFFIX: Final = ".frames"
@@ -140,8 +140,11 @@ class FrameLog:
     """
 
     def __init__(self, path: Path) -> None:
-        self._paths = _parts_from(path)
-        self.first_part = _number_of(path) == 1
+        first, number = whole_of(path)
+        self.first_part = number == 1
+        self._paths = [path]
+        while (following := part_of(first, number + len(self._paths))).exists():
+            self._paths.append(following)
         self.cut = ""
         kind, payload = next(self._read(path), (b"", b""))
         if kind != _HEAD:
@@ -173,19 +176,3 @@ class FrameLog:
                     self.cut = f"{path.name} is damaged at byte {place}"
                     return
                 yield kind, payload
-
-
-def _number_of(path: Path) -> int:
-    """Number of a part, from its name."""
-    number = path.stem.rpartition("-part")[2]
-    return int(number) if "-part" in path.stem and number.isdecimal() else 1
-
-
-def _parts_from(path: Path) -> list[Path]:
-    """The part that is named, and those that follow it."""
-    number = _number_of(path)
-    first = path if number == 1 else path.with_stem(path.stem.rpartition("-part")[0])
-    paths = [path]
-    while (following := part_of(first, number + len(paths))).exists():
-        paths.append(following)
-    return paths

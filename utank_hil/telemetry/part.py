@@ -1,6 +1,7 @@
 """One file of a live recording."""
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -52,6 +53,7 @@ class RecordingPart(Closing):
         _reserve_file(file)
         self._file = file
         self._rows = 0
+        self._lost = Counter[str]()
         self._open = True
         self._recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
         size = scene_size(columns, about)
@@ -72,9 +74,11 @@ class RecordingPart(Closing):
         """Log events of retuning and alarms."""
         self._log.write_events(events)
 
-    def note(self, text: str) -> None:
-        """Log a warning about the recording itself."""
-        self._log.note(text)
+    def note_lost(self, what: str, lost: int) -> None:
+        """Log a warning if more of a kind were lost in all than at the last call."""
+        if more := lost - self._lost[what]:
+            self._log.note(f"{more} {what} lost: the recorder was too slow")
+            self._lost[what] = lost
 
     def flush(self) -> None:
         """Bring it to the disk, so that a kill does not lose it."""

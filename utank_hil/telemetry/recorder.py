@@ -165,7 +165,7 @@ def record_part(
         if number == 1:
             _print_json({"ready": 1})
         time = reader.columns.index("time_s")
-        recorded = reported_rows = reported_events = 0
+        recorded = 0
         begin_s: float | None = None
         last = full = False
         while not (last or full):
@@ -179,16 +179,12 @@ def record_part(
             if log is not None:
                 log.write()
             if part is not None:
-                if reader.lost > reported_rows:
-                    part.note(f"{reader.lost - reported_rows} rows lost: the recorder was too slow")
-                    reported_rows = reader.lost
+                part.note_lost("rows", reader.lost)
                 if len(rows):
                     part.write(rows)
                 part.write_events(new_events)
-                if event_reader is not None and event_reader.lost > reported_events:
-                    lost = event_reader.lost - reported_events
-                    part.note(f"{lost} events lost: the recorder was too slow")
-                    reported_events = event_reader.lost
+                if event_reader is not None:
+                    part.note_lost("events", event_reader.lost)
                 if len(rows) or new_events:
                     part.flush()
         if part is not None:
@@ -289,7 +285,7 @@ class RecorderProcess(Closing):
             command += ["--part-s", str(rotation.part_s)]
             if rotation.keep_bytes is not None:
                 command += ["--keep-bytes", str(rotation.keep_bytes)]
-        self._report: RecorderReport | None = None
+        self._end: RecorderReport | RecorderError | None = None
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL if head is None else subprocess.PIPE,
@@ -326,24 +322,29 @@ class RecorderProcess(Closing):
         RecorderError
             If the process failed, with the reason, or does not end.
         """
-        if self._report is None:
-            self._process.terminate()
-            try:
-                code = self._process.wait(_STOP_TIMEOUT_S)
-            except subprocess.TimeoutExpired:
-                self._kill()
-                raise RecorderError("the recorder did not end and was killed") from None
-            with self._output:
-                reply = json.loads(self._output.readline() or "{}")
-                if code != 0:
-                    reason = reply.get("error", f"exit code {code}")
-                    raise RecorderError(f"the recorder failed: {reason}")
-                self._report = RecorderReport(**reply)
-        return self._report
+        if self._end is None:
+            self._end = self._ended()
+        if isinstance(self._end, RecorderError):
+            raise self._end
+        return self._end
 
     def close(self) -> None:
         """Same as `stop`."""
         self.stop()
+
+    def _ended(self) -> RecorderReport | RecorderError:
+        self._process.terminate()
+        try:
+            code = self._process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            return RecorderError("the recorder did not end and was killed")
+        with self._output:
+            reply = json.loads(self._output.readline() or "{}")
+        if code != 0:
+            reason = reply.get("error", f"exit code {code}")
+            return RecorderError(f"the recorder failed: {reason}")
+        return RecorderReport(**reply)
 
     def _kill(self) -> None:
         self._process.kill()
@@ -384,7 +385,8 @@ def _main() -> None:
             _go_on(content | {"before": asdict(report), "places": asdict(places)})
         _print_json(asdict(report))
     except (OSError, RuntimeError) as error:
-        print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # a terminal that is gone
+            print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
         _print_json({"error": str(error)})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
 
@@ -401,8 +403,9 @@ def _go_on(content: Mapping[str, Any]) -> NoReturn:
 
 
 def _print_json(message: Mapping[str, int | str]) -> None:
-    """Send a message to the parent: one JSON object a line on standard output."""
-    print(json.dumps(message), flush=True)
+    """Send a message to the parent, if it lives: one JSON object a line on standard output."""
+    with contextlib.suppress(BrokenPipeError):  # nothing is buffered, or it would fail at the end
+        os.write(sys.stdout.fileno(), f"{json.dumps(message)}\n".encode())
 
 
 if __name__ == "__main__":

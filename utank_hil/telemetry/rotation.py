@@ -31,6 +31,12 @@ def part_of(file: Path, number: int) -> Path:
     return file if number == 1 else file.with_stem(f"{file.stem}-part{number:03d}")
 
 
+def whole_of(file: Path) -> tuple[Path, int]:
+    """Return the first part of a recording, by the name of one, and the number of that one."""
+    stem, mark, number = file.stem.rpartition("-part")
+    return (file.with_stem(stem), int(number)) if mark and number.isdecimal() else (file, 1)
+
+
 def make_room(file: Path, number: int, rotation: Rotation | None) -> None:
     """Remove the oldest recordings before a part of one begins, if its rotation says so.
 
@@ -58,8 +64,8 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     Parameters
     ----------
     file : Path
-        A recording of the folder, there or to come, which stays. Others are those whose names begin
-        alike, up to the first hyphen.
+        A recording of the folder, there or to come, which stays; other parts of it go last. Others
+        are those whose names begin alike, up to the first hyphen.
 
     Returns
     -------
@@ -72,7 +78,14 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
             if path.stem != file.stem:
                 alike.setdefault(path.stem, []).append(path)
     found = [([path.stat() for path in paths], paths) for paths in alike.values()]
-    found.sort(key=lambda each: (max(s.st_mtime_ns for s in each[0]), each[1][0].stem))
+    own, _ = whole_of(file)  # newer than all others, even by a clock that was set back
+    found.sort(
+        key=lambda each: (
+            whole_of(each[1][0])[0].stem == own.stem,
+            max(status.st_mtime_ns for status in each[0]),
+            each[1][0].stem,
+        )
+    )
     left = sum(status.st_size for statuses, _ in found for status in statuses)
     removed = []
     for statuses, paths in found:
