@@ -143,6 +143,9 @@ class Scenario(Section):
             )
             problems.append(("controllers", reason))
         for name, controller in self.controllers.items():
+            if "/" in name:
+                reason = f"names one {name!r}: files are named by it, so it can't be a path"
+                problems.append(("controllers", reason))
             problems += self._controller_problems(name, controller)
         refuse(
             "",

@@ -92,6 +92,8 @@ def test_shipped_scenarios_are_valid(path: Path) -> None:
          "full or empty at one side: lower offset_moment_nm or wind_moment_nm"),
         ({"controllers": {}}, "controllers", "must have 1 or more"),
         ({"operator": None}, "operator", "is required but missing"),
+        ({"controllers": {"../x": str(CONFIGS / "controllers" / "gpc.yaml")}}, "controllers",
+         "it can't be a path"),
         ({"controllers": {"passive": str(CONFIGS / "controllers" / "gpc.yaml")}}, "controllers",
          "names one 'passive'"),
         ({"settle_s": 60.0}, "settle_s", "must be less than duration_s"),

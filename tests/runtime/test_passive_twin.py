@@ -128,32 +128,48 @@ def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
     assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
 
 
-def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
-    ship, tank = FIRST.ship, FIRST.tank
+def made_by_pump(t: np.ndarray, phasor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pressure whose steady roll at 0.6 rad/s is `phasor_rad`, and the roll that it makes."""
+    ship, tank, w = FIRST.ship, FIRST.tank, 0.6
     mass, damping, stiffness = coupled_matrices(ship, tank)
-    w, begins_s, ends_s = 0.6, 30 * PERIOD_S, 41 * PERIOD_S
-    response = np.linalg.solve(
-        stiffness - w**2 * mass + 1j * w * damping, [0.0, tank.reservoir_area_m2]
-    )[0]
-    t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
-    # the pump halves the roll of the waves; in the lull it doubles them
-    waves = np.where(t < begins_s, 0.1, 0.04)
-    phasor = np.where(t < begins_s, -0.05, 0.04) / response
+    area = [0.0, tank.reservoir_area_m2]
+    response = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, area)[0]
+    phasor = phasor_rad / response
     pressure_pa = np.abs(phasor) * np.sin(w * t + np.angle(phasor))
     inverse = np.linalg.inv(mass)
     system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
-    force = np.concatenate([np.zeros(2), inverse @ [0.0, tank.reservoir_area_m2]])[:, None]
-    observed = np.eye(1, 4), np.zeros((1, 1))
-    _, made, _ = scipy.signal.lsim((system, force, *observed), pressure_pa, t)
-    roll_rad = waves * np.sin(w * t) + made.ravel()
-    twin, ratios, amplified = PassiveTwin(ship, tank, STEP_S, LEAST_RAD), [], []
-    for own_rad, effort_pa in zip(roll_rad, pressure_pa, strict=True):
+    force = np.concatenate([np.zeros(2), inverse @ area])[:, None]
+    _, roll_rad, _ = scipy.signal.lsim((system, force, np.eye(1, 4), 0.0), pressure_pa, t)
+    return pressure_pa, roll_rad
+
+
+def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
+    begins_s, ends_s = 30 * PERIOD_S, 41 * PERIOD_S
+    t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
+    # the pump halves the roll of the waves; in the lull it doubles them
+    waves_rad = np.where(t < begins_s, 0.1, 0.04) * np.sin(0.6 * t)
+    pressure_pa, made_rad = made_by_pump(t, np.where(t < begins_s, -0.05, 0.04))
+    twin, ratios, amplified = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD), [], []
+    for own_rad, effort_pa in zip(waves_rad + made_rad, pressure_pa, strict=True):
         twin.update(own_rad, 0.0, 0.0, effort_pa)
         ratios.append(twin.ship_rms_rad / twin.rms_rad if twin.rms_rad else 0.0)
         amplified.append(twin.amplified)
-    lost = t[np.argmax(amplified)]
-    patient = np.argmax((t > begins_s) & (np.array(ratios) > AMPLIFIED))
-    assert t[patient] < ends_s < lost < begins_s + 17 * PERIOD_S
+    patient = t[np.argmax((t > begins_s) & (np.array(ratios) > AMPLIFIED))]
+    assert patient < ends_s < t[np.argmax(amplified)] < begins_s + 17 * PERIOD_S
+
+
+def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_found() -> None:
+    ends_s, bad_s = 20 * PERIOD_S, 45 * PERIOD_S
+    t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
+    waves_rad = 0.015 * np.sin(0.6 * t)
+    pressure_pa, made_rad = made_by_pump(t, np.select([t < ends_s, t > bad_s], [0.1, 0.05]))
+    twin, amplified = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD), []
+    for time_s, own_rad, effort_pa in zip(t, waves_rad + made_rad, pressure_pa, strict=True):
+        if time_s < ends_s:
+            twin.excuse()
+        twin.update(own_rad, 0.0, 0.0, effort_pa)
+        amplified.append(twin.amplified)
+    assert bad_s < t[np.argmax(amplified)] < bad_s + 6 * PERIOD_S
 
 
 def test_mean_squares_are_those_of_some_roll_periods() -> None:

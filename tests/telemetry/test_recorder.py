@@ -178,6 +178,21 @@ def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path:
     ]
 
 
+def test_lost_events_are_noted_in_the_recording(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    with EventWriter() as events, RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, file, events=events.name)
+        os.kill(recorder._process.pid, signal.SIGSTOP)
+        for number in range(1000):
+            events.write(RetuningEvent(number, RetuningState.IDENTIFY, ("ordered",)), 0)
+        feed(ring, table(2))
+        os.kill(recorder._process.pid, signal.SIGCONT)
+    recorder.stop()
+    texts = [line.text for line in text_log(file)]
+    (lost,) = (int(text.split()[0]) for text in texts if "events lost" in text)
+    assert lost + sum("ordered" in text for text in texts) == 1000 > lost > 0
+
+
 def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     began = RetuningEvent(5_000_000_000, RetuningState.IDENTIFY, ("ordered by the operator",))

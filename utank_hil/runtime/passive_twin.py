@@ -80,11 +80,9 @@ class PassiveTwin:
         self._least_power = least_roll_rad**2
         self._pressure_pa = 0.0
         self._mean_rad = self._twin_mean_rad = 0.0
-        self._power = self._twin_power = 0.0
         self._record_share = period_s / (RECORD_PERIODS * roll_period_s)
-        self._record_power = self._twin_record_power = 0.0
+        self._forget()
         self._losing_s = 0.0
-        self._unknown = UNKNOWN
         self.roll_rad = 0.0
         self.amplified = False
 
@@ -116,7 +114,7 @@ class PassiveTwin:
     @property
     def share(self) -> float:
         """How near the comparison is to its threshold, 1; NaN where nothing is judged."""
-        if self._power <= self._least_power or not self._twin_power:
+        if self._losing_s < 0 or self._power <= self._least_power or not self._twin_power:
             return math.nan
         lately = math.sqrt(self._power / self._twin_power) / (AMPLIFIED + self._unknown)
         return min(lately, math.sqrt(self._record_power / self._twin_record_power) / RECORD)
@@ -154,15 +152,26 @@ class PassiveTwin:
         self._judge()
 
     def excuse(self) -> None:
-        """Roll that is caused on purpose: not judged until it is forgotten."""
+        """Roll that is caused on purpose: not judged until it has decayed, and then forgotten."""
         self._losing_s = -self._patience_s * MEMORY_PERIODS / LASTS_PERIODS
+        self.amplified = False
+
+    def _forget(self) -> None:
+        self._power = self._twin_power = 0.0
+        self._record_power = self._twin_record_power = 0.0
+        self._unknown = UNKNOWN
 
     def _judge(self) -> None:
+        if self._losing_s < 0:
+            self._losing_s = min(self._losing_s + self._period_s, 0.0)
+            if self._losing_s == 0:
+                self._forget()
+            return
         self._unknown -= self._share * self._unknown
         ratio = RECOVERED if self.amplified else AMPLIFIED + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
         on_record = self.amplified or self._record_power > RECORD**2 * self._twin_record_power
-        if self._losing_s < 0 or (on_record and self._power > least_power):
+        if on_record and self._power > least_power:
             self._losing_s += self._period_s
         else:
             self._losing_s = 0.0
