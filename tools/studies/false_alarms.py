@@ -39,6 +39,8 @@ SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
 """Share of the scenario's wave slope: the storm's is what the laws were made for."""
 SCENARIOS = ("storm", "patti_b", "naval_vessel", "semi_active")
 VOYAGE = "voyage"
+RIGHTLY_FOUND = ("feedback_linearization", "pd", "stimulate")
+"""Laws that roll the ship more than the passive tank, or on purpose: none of `by_monitor`."""
 
 
 def scenario_of(config: ControllerConfig) -> Scenario:
@@ -95,10 +97,11 @@ def rate_per_hour(maxima: list[float]) -> float:
 def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
     """Rates of one law in one sea, by monitor."""
     monitors = sorted({monitor for run in runs for monitor in run["largest"]})
-    rates = {
-        monitor: rate_per_hour([run["largest"].get(monitor, 0.0) for run in runs])
+    maxima = {
+        monitor: [round(run["largest"].get(monitor, 0.0), 4) for run in runs]
         for monitor in monitors
     }
+    rates = {monitor: rate_per_hour(values) for monitor, values in maxima.items()}
     found: dict[str, int] = {}
     for run in runs:
         for finding in run["found_s"]:
@@ -108,8 +111,26 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
         "sea": sea,
         "hours": len(runs),
         "found_in_hours": found,
+        "maxima": maxima,
         "rate_per_hour": rates,
         "worst": max(rates, key=rates.__getitem__) if rates else "",
+    }
+
+
+def by_monitor(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Largest statistic and rate of each monitor over all hours of the laws that are sound."""
+    pooled: dict[str, list[float]] = {}
+    for row in rows:
+        if row["law"] not in RIGHTLY_FOUND:
+            for monitor, maxima in row["maxima"].items():
+                pooled.setdefault(monitor, []).extend(maxima)
+    return {
+        monitor: {
+            "hours": len(maxima),
+            "largest": max(maxima),
+            "rate_per_hour": rate_per_hour(maxima),
+        }
+        for monitor, maxima in pooled.items()
     }
 
 
@@ -135,7 +156,10 @@ def main() -> int:
     spawn = get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(options.workers, mp_context=spawn) as pool:
         rows = list(pool.map(rated, cases))
-    show({"aim_per_hour": AIM_PER_HOUR, "runs": rows}, options)
+    show(
+        {"aim_per_hour": AIM_PER_HOUR, "by_monitor": by_monitor(rows), "runs": rows},
+        options,
+    )
     return 0
 
 
