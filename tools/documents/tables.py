@@ -406,6 +406,50 @@ def fault_times(result: dict[str, Any]) -> Rows:
     ]  # fmt: skip
 
 
+def false_alarms(result: dict[str, Any]) -> Rows:
+    """What was found in the hours of each law, sea by sea."""
+    seas = list(dict.fromkeys(run["sea"] for run in result["runs"]))
+    found: dict[str, dict[str, str]] = {}
+    for run in result["runs"]:
+        words = [f"{name} in {hours}" for name, hours in run["found_in_hours"].items()]
+        found.setdefault(run["law"], {})[run["sea"]] = f"{', '.join(words) or 'none'}"
+    return [
+        ["law", *seas],
+        *([f"`{law}`", *(cells.get(sea, "") for sea in seas)] for law, cells in found.items()),
+    ]
+
+
+def false_alarm_rates(result: dict[str, Any]) -> Rows:
+    """Tail of the hourly maxima, a row a monitor."""
+    rows = sorted(result["by_monitor"].items(), key=lambda item: -item[1]["rate_per_hour"])
+    return [
+        ["statistic", "hours", "largest over its threshold", "beyond it, times in 1000 h"],
+        *(
+            [
+                name,
+                str(each["hours"]),
+                f"{each['largest']:.2f}",
+                f"{1e3 * each['rate_per_hour']:.2g}",
+            ]
+            for name, each in rows
+        ),
+    ]
+
+
+def week(result: dict[str, Any]) -> Rows:
+    """What the process took at the beginning, in the middle and at the end of the week."""
+    samples = [dict(zip(result["samples"]["head"], row, strict=True))
+               for row in result["samples"]["rows"]]  # fmt: skip
+    return [
+        ["hour", "resident, MB", "objects", "descriptors", "tick, us"],
+        *(
+            [f"{each['hours']:.0f}", f"{each['resident_mb']:.1f}", f"{each['objects']:.0f}",
+             f"{each['descriptors']:.0f}", f"{each['tick_us']:.2f}"]
+            for each in (samples[0], *samples[23::24])
+        ),
+    ]  # fmt: skip
+
+
 # name in the document: the part it is made from, and how
 TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "law margins": ("linear_law_tables", law_margins),
@@ -422,6 +466,9 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
     "storm shares": ("share_of_possible", storm_shares),
     "february hours": ("february_hours", february_hours),
     "fault times": ("fault_campaign", fault_times),
+    "false alarms": ("false_alarms", false_alarms),
+    "false alarm rates": ("false_alarms", false_alarm_rates),
+    "week": ("week", week),
     "shipped scenarios": ("shipped_scenarios", scenarios),
     "errata terms": ("thesis_derivation", errata_terms),
     "thesis figures": ("thesis_figures", thesis_figures),
