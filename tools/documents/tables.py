@@ -18,6 +18,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 PLACE = re.compile(r"(<!-- table: (.*?) -->\n)(.*?)(<!-- end of table -->)", re.S)
 Rows = list[list[str]]  # the heading first
 Law = dict[str, float | None]
+LEAST_RATE = 0.01
 GRID = "+-30 % roll period, 0.8 to 1.25 of the inertia, +-20 % gain, 0 or 20 ms later"
 
 
@@ -422,17 +423,14 @@ def false_alarms(result: dict[str, Any]) -> Rows:
 def false_alarm_rates(result: dict[str, Any]) -> Rows:
     """Tail of the hourly maxima, a row a monitor."""
     rows = sorted(result["by_monitor"].items(), key=lambda item: -item[1]["rate_per_hour"])
+
+    def rate(each: dict[str, float]) -> str:
+        times = 1e3 * each["rate_per_hour"]
+        return f"{float(f'{times:.2g}'):g}" if times >= LEAST_RATE else f"below {LEAST_RATE}"
+
     return [
         ["statistic", "hours", "largest over its threshold", "beyond it, times in 1000 h"],
-        *(
-            [
-                name,
-                str(each["hours"]),
-                f"{each['largest']:.2f}",
-                f"{1e3 * each['rate_per_hour']:.2g}",
-            ]
-            for name, each in rows
-        ),
+        *([name, str(each["hours"]), f"{each['largest']:.2f}", rate(each)] for name, each in rows),
     ]
 
 
@@ -481,7 +479,7 @@ TABLES: dict[str, tuple[str, Callable[[Any], Rows]]] = {
 def source(part: Part, kept: Record) -> str:
     """Where the numbers are from."""
     data = f"evidence/{kept['part']}.json"
-    command = part.command.removesuffix(" --json")
+    command = kept["command"].removesuffix(" --json")
     before = "" if kept["command"] == part.command else f" as it was at {kept['commit']}"
     return f"`{command}`{before}, {kept['date']}; machine, versions and commit: [{data}]({data})."
 
