@@ -172,6 +172,22 @@ def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_fo
     assert bad_s < t[np.argmax(amplified)] < bad_s + 6 * PERIOD_S
 
 
+def test_share_is_1_where_the_law_has_lost_and_unknown_where_nothing_is_judged() -> None:
+    t = np.arange(0.0, 40 * PERIOD_S, STEP_S)
+    pressure_pa, made_rad = made_by_pump(t, np.full(len(t), 0.04))
+    twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
+    assert math.isnan(twin.share)
+    shares = []
+    for own_rad, effort_pa in zip(0.1 * np.sin(0.6 * t) + made_rad, pressure_pa, strict=True):
+        twin.update(own_rad, 0.0, 0.0, effort_pa)
+        shares.append(math.nan if twin.amplified else twin.share)
+    last = np.flatnonzero(np.isfinite(shares))[-1]  # before it is found, which takes T / 4
+    assert t[last] < 39 * PERIOD_S
+    assert shares[last] == pytest.approx(1.0, abs=0.03)
+    twin.excuse()
+    assert math.isnan(twin.share)
+
+
 def test_mean_squares_are_those_of_some_roll_periods() -> None:
     twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
     for k in range(round(5 * MEMORY_PERIODS * PERIOD_S / STEP_S)):

@@ -7,7 +7,7 @@ from scipy.stats import gumbel_r
 
 from tools.evidence.sources import ROOT
 from tools.studies import false_alarms
-from tools.studies.false_alarms import hours, judged, rate_per_hour, sail
+from tools.studies.false_alarms import by_monitor, hours, judged, rate_per_hour, sail
 
 
 def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
@@ -51,3 +51,16 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     assert [run["largest"]["drift"] for run in runs] == pytest.approx(0.1 * np.arange(1, 7))
     row = judged("adaptive_gpc", sea, runs)
     assert (row["hours"], row["worst"], row["found_in_hours"]) == (6, "drift", {"DRIFT": 1})
+
+
+def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:
+    rows = [
+        {"law": "gpc", "maxima": {"drift": [0.2, 0.4]}},
+        {"law": "dpc", "maxima": {"drift": [0.6], "noise": [0.1]}},
+        {"law": "pd", "maxima": {"drift": [5.0]}},
+    ]
+    found = by_monitor(rows)
+    assert {name: (each["hours"], each["largest"]) for name, each in found.items()} == {
+        "drift": (3, 0.6),
+        "noise": (1, 0.1),
+    }
