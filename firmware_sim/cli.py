@@ -8,7 +8,6 @@ with quietly_interruptible():
     from typing import Annotated
 
     import typer
-    from rich.console import Console
 
     import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
     from utank_hil.commands.failures import failures_named
@@ -34,11 +33,10 @@ with quietly_interruptible():
             fail,
             load,
             new_app,
-            notes,
             print_json,
         )
         from utank_hil.commands.exit_codes import ExitCode
-        from utank_hil.commands.tables import print_table
+        from utank_hil.commands.terminal import Terminal, notes
         from utank_hil.commands.timing import timing_table
         from utank_hil.runtime import (
             LoopStatistics,
@@ -113,14 +111,14 @@ def firmware_sim(
         }
         print_json(summary)
         return
-    console = Console(highlight=False)
-    print_table(console, timing_table({"ship": statistics}))
+    console = Terminal()
+    console.table(timing_table({"ship": statistics}))
     drive = (
         f"pressure reported in {external.reported_share:.1%} of the time"
         if external
         else f"{ship.refused_commands} commands refused"
     )
-    console.print(
+    console.say(
         f"roll RMS {roll.rms_rad:.4f} rad, largest {roll.maximum_rad:.4f} rad; "
         f"pressure RMS {pump.pressure_rms_pa / 1e3:.1f} kPa; {drive}"
     )
@@ -137,9 +135,9 @@ def _run(
     try:
         with stop_on_signals() as stop, real_time_scheduling() as scheduling:
             for line in scheduling.lines():
-                notes.print(line, soft_wrap=True)
+                notes.say(line)
             emulated = ", ".join(node.name for node in nodes if node.name in NODE_NAMES)
-            notes.print(
+            notes.say(
                 f"{name} on {bus}, emulated: {emulated or 'no node, nothing is sent'}; "
                 "Ctrl-C ends it."
             )

@@ -4,12 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from rich.markup import escape
 from rich.table import Table as RichTable
 
 from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.scenario import PASSIVE
-from utank_hil.commands.tables import new_table
+from utank_hil.commands.terminal import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 NO_TANK: Final = "no tank"
@@ -70,7 +69,7 @@ def _compared(content: Content) -> list[Content]:
 def _motion_cells(run: Content) -> tuple[str, ...]:
     passive = run["name"] == PASSIVE
     return (
-        escape(run["name"]),
+        run["name"],
         *_roll_cells(run["roll"]),
         _percent(run["roll_below_no_tank"]) if run["mark"] is None else run["mark"]["word"],
         "" if passive else _percent(run["roll_below_passive"]),
@@ -100,7 +99,7 @@ def pump_table(content: Content) -> RichTable:
     table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
     for index, run in enumerate(runs):
         table.add_row(
-            escape(run["name"]),
+            run["name"],
             *(cells[index] for _, _, cells in columns),
             f"{run['pump']['level_peak_m']:.2f}",
             f"{run['bus_load']:.1%}",
@@ -149,7 +148,7 @@ def on_board_table(content: Content) -> RichTable:
     for name, each in judged["runs"].items():
         felt, above = each["comfort"], each["exceedance"]
         table.add_row(
-            escape(name),
+            name,
             *("" if above is None else f"{above[index]:.1%}" for index in _SHOWN),
             f"{felt['lateral_rms_m_s2'] / GRAVITY_M_S2:.3f}",
             f"{felt['interruptions_per_min']:.2f}",
@@ -179,7 +178,7 @@ def retuning_table(content: Content) -> RichTable:
     )
     for run in content["runs"]:
         if run["retuning"] is not None:
-            table.add_row(escape(run["name"]), *_retuning_cells(run["retuning"]))
+            table.add_row(run["name"], *_retuning_cells(run["retuning"]))
     return table
 
 
@@ -201,7 +200,7 @@ def _retuning_cells(retuning: Content) -> tuple[str, ...]:
         ship,
         tank,
         state if attempts <= 1 else f"{state}, attempt {attempts}",
-        escape("; ".join(retuning["reasons"])),
+        "; ".join(retuning["reasons"]),
     )
 
 

@@ -11,7 +11,7 @@ from utank_hil.analysis.tank_design import TankFigures
 from utank_hil.analysis.tank_prediction import LoadingPoint, RollPrediction, SweepPoint
 from utank_hil.analysis.tank_sizing import TankCost
 from utank_hil.commands.common import finite
-from utank_hil.commands.tables import new_table
+from utank_hil.commands.terminal import new_table
 from utank_hil.dynamics.water import water_moments
 
 Rows = list[tuple[str, str]]

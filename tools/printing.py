@@ -5,12 +5,10 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from utank_hil.commands.common import print_json
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal
 
 WIDTH: Final = 160  # of what goes to a file
 LISTED: Final = 12  # a cell with more values than these says how many there are
@@ -32,7 +30,7 @@ def show(figures: Any, arguments: argparse.Namespace) -> None:
     if arguments.json:
         print_json(figures)
         return
-    console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
+    console = Terminal() if sys.stdout.isatty() else Terminal(width=WIDTH)
     _show("", figures, console)
 
 
@@ -45,20 +43,20 @@ def print_tables(text: str | None, tables: Mapping[str, Callable[[], Any]]) -> N
     show({name: tables[name]() for name in wanted}, arguments)
 
 
-def _show(title: str, figures: Any, console: Console) -> None:
+def _show(title: str, figures: Any, console: Terminal) -> None:
     """Single figures as lines, rows as one table, then what has parts of its own."""
     if not isinstance(figures, Mapping):
-        print_table(console, _table(title, list(figures)))
+        console.table(_table(title, list(figures)))
         return
     rows = [{"": name, **each} for name, each in figures.items() if _is_row(each)]
     parts = {name: each for name, each in figures.items() if _has_rows(each) and not _is_row(each)}
     single = [name for name, each in figures.items() if not _has_rows(each)]
     if title and single and not rows:
-        console.print(escape(title), style="italic")
+        console.print(title, style="italic")
     for name in single:
-        console.print(escape(f"{name}: {_cell(figures[name])}"), soft_wrap=True)
+        console.say(f"{name}: {_cell(figures[name])}")
     if rows:
-        print_table(console, _table(title, rows))
+        console.table(_table(title, rows))
     for name, each in parts.items():
         _show(f"{title}, {name}" if title else str(name), each, console)
 
@@ -79,9 +77,9 @@ def _has_rows(value: Any) -> bool:
 def _table(title: str, rows: Sequence[Row]) -> Table:
     flat = [dict(_flat(row)) for row in rows]
     columns = list(dict.fromkeys(name for row in flat for name in row))
-    table = Table(title=escape(title), title_justify="left")
+    table = Table(title=title, title_justify="left")
     for name in columns:
-        table.add_column(escape(name), justify="right" if name else "left")
+        table.add_column(name, justify="right" if name else "left")
     for row in flat:
         table.add_row(*(_cell(row.get(name)) for name in columns))
     return table
@@ -101,4 +99,4 @@ def _cell(value: Any) -> str:
     if isinstance(value, list | tuple):
         short = len(value) <= LISTED and not any(isinstance(each, Mapping) for each in value)
         return ", ".join(map(_cell, value)) if short else f"{len(value)} values"
-    return f"{value:.4g}" if isinstance(value, float) else escape(str(value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

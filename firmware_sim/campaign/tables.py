@@ -3,11 +3,10 @@
 import math
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from firmware_sim.report_tables import NO_TANK
-from utank_hil.commands.tables import new_table
+from utank_hil.commands.terminal import new_table
 
 Figure = dict[str, Any]
 
@@ -37,7 +36,7 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
             worst = found["worst"]["roll_max_rad"]
             passive = "" if run == "passive" else interval(found["roll_below_passive"], 100, 1)
             table.add_row(
-                escape(run),
+                run,
                 *(_short(value) for value in group["parameters"].values()),
                 str(found["roll_rms_rad"]["cases"]),
                 interval(found["roll_rms_rad"], 180 / math.pi, 3),
@@ -63,8 +62,8 @@ def pairs_table(groups: list[dict[str, Any]]) -> Table:
         pairs += [("first row's", pair) for pair in group["beside_first"]]
         for against, pair in pairs:
             table.add_row(
-                escape(pair["run"]),
-                escape(against),
+                pair["run"],
+                against,
                 *(_short(value) for value in group["parameters"].values()),
                 str(pair["roll_rms_difference_rad"]["cases"]),
                 interval(pair["share_below"], 100, 1),

@@ -5,8 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from utank_hil.commands.common import (
@@ -16,17 +14,14 @@ from utank_hil.commands.common import (
     Json,
     View,
     fail,
-    lead_on,
     load,
-    notes,
     prepare_out,
     print_json,
-    shown,
 )
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.monitor import watch
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.provenance import describe
 
@@ -104,7 +99,7 @@ def bench(
     length_s = loaded.duration_s if duration is None else duration
     about = _about(loaded, options, out, context.params)
     bar = Progress(
-        TextColumn("{task.description:>10}"),
+        TextColumn("{task.description:>10}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TextColumn("{task.completed:.0f} of {task.total:.0f} s"),
@@ -130,27 +125,26 @@ def bench(
     if json_:
         print_json(told)
     else:
-        console = Console()
+        console = Terminal()
         for table in tables(told):
-            print_table(console, table)
+            console.table(table)
         for ending in told["endings"]:
-            console.print(f"[red]{escape(ending)}[/red]", soft_wrap=True)
+            console.say(red=ending)
         for limit in told["limits_passed"]:
-            console.print(f"[yellow]{escape(limit)}[/yellow]", soft_wrap=True)
+            console.say(yellow=limit)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:
-            print_table(console, timing_table(loops))
+            console.table(timing_table(loops))
         else:
             simulated_s = sum(run.end_s for run in result.runs)
-            console.print(
+            console.say(
                 f"Simulated {len(result.runs)} runs, {simulated_s:.0f} s in all, in "
                 f"{result.wall_s:.1f} s, {simulated_s / result.wall_s:.0f} times real time; "
                 "no deadlines there."
             )
-        for name, path in files.items():
-            console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
+        console.files(files)
         sound = [] if told["endings"] else ["run CONTROLLER.yaml --bus can0"]
-        lead_on(console, f"monitor {shown(out)}", *sound)
+        console.lead_on(f"monitor {shown(out)}", *sound)
     if failures:
         fail("; ".join(failures))
     if view:

@@ -4,23 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.common import (
-    OUT,
-    Json,
-    fail,
-    fail_with,
-    lead_on,
-    notes,
-    prepare_out,
-    print_json,
-    shown,
-)
+from utank_hil.commands.common import OUT, Json, fail, fail_with, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration import ConfigError
 from utank_hil.provenance import describe
 
@@ -85,11 +73,11 @@ def campaign(
         print_json(content)
     else:
         _print(loaded, groups, failed)
-        console = Console()
-        console.print(f"results: {escape(shown(folder))}", soft_wrap=True)
-        lead_on(console, f"campaign {shown(study)} --resume", f"report {shown(folder)}")
+        console = Terminal()
+        console.say(f"results: {shown(folder)}")
+        console.lead_on(f"campaign {shown(study)} --resume", f"report {shown(folder)}")
     if interrupted:
-        notes.print("interrupted: the same command with --resume goes on from here")
+        notes.say("interrupted: the same command with --resume goes on from here")
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 
@@ -151,12 +139,11 @@ def _print(loaded: "LoadedStudy", groups: list[dict[str, Any]], failed: dict[str
     from firmware_sim.campaign.metrics import LEAVES_OUT
     from firmware_sim.campaign.tables import pairs_table, runs_table
 
-    console, study = Console(), loaded.study
-    print_table(console, runs_table(groups, f"{study.name}, simulation: {study.simulation}"))
+    console, study = Terminal(), loaded.study
+    console.table(runs_table(groups, f"{study.name}, simulation: {study.simulation}"))
     if any(group["paired"] for group in groups):
-        print_table(console, pairs_table(groups))
+        console.table(pairs_table(groups))
     for reason, number in failed.items():
-        console.print(f"[red]{number} cases without a result: {escape(reason)}[/red]",
-                      soft_wrap=True)  # fmt: skip
+        console.say(reason, red=f"{number} cases without a result:")
     if left_out := LEAVES_OUT[study.simulation]:
-        console.print(f"Not computed: {'; '.join(left_out)}.", soft_wrap=True)
+        console.say(f"Not computed: {'; '.join(left_out)}.")

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.commands.common import Json, fail, print_json, shown
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.common import Json, fail, print_json
+from utank_hil.commands.terminal import Terminal, new_table, shown
 
 if TYPE_CHECKING:
     from firmware_sim.comparison.difference import Comparison, Difference
@@ -60,12 +58,12 @@ def compare(
         content = {"reference": str(reference), "comparisons": [asdict(each) for each in found]}
         print_json(content)
         return
-    console = Console()
+    console = Terminal()
     for source in dict.fromkeys(each.source for each in found):
         of_source = [each for each in found if each.source == source]
-        print_table(console, _table(reference, of_source))
+        console.table(_table(reference, of_source))
         for remark in dict.fromkeys(remark for each in of_source for remark in each.remarks):
-            console.print(f"[yellow]{escape(remark)}[/yellow]", soft_wrap=True)
+            console.say(yellow=remark)
 
 
 def _recording(place: Path) -> Path:

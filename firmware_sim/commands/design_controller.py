@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
+from rich.text import Text
 
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
 from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
-from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, print_json, shown
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.commands.terminal import Terminal, new_table, notes
 from utank_hil.configuration import ControllerConfig
 from utank_hil.provenance import describe
 from utank_hil.whole_file import write_whole
@@ -95,14 +94,13 @@ def controller(
     if json_:
         print_json(figures)
         return
-    console = Console(highlight=False)
-    print_table(console, _trade_table(result, title))
+    console = Terminal()
+    console.table(_trade_table(result, title))
     for point in result.points:
         if point.factor == 1:
             for failure in point.robustness.failures():
-                console.print(f"[red]missed by the design:[/red] {escape(failure)}")
-    for name, path in files.items():
-        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
+                console.say(failure, red="missed by the design:")
+    console.files(files)
 
 
 def _trade_table(result: "Trade", title: str) -> Table:
@@ -132,9 +130,9 @@ def _trade_table(result: "Trade", title: str) -> Table:
     return table
 
 
-def _trade_cells(point: "TradePoint") -> tuple[str, ...]:
+def _trade_cells(point: "TradePoint") -> tuple[str | Text, ...]:
     motion, less, judged = point.motion, point.roll_below_passive, point.robustness
-    verdict = "[red]refused[/red]" if point.refused else "[green]ok[/green]"
+    verdict = Text("refused", "red") if point.refused else Text("ok", "green")
     predicted = ("unstable", "", "", "")
     if motion is not None and less is not None:
         predicted = (

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
-from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json, shown
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import Tank
 from utank_hil.provenance import describe
@@ -66,7 +64,7 @@ def tank(
         fail(error)
     tanks = {"present": loaded.tank, "best": best}
     path = scenario or shipped_scenario(loaded)
-    console = Console(highlight=False)
+    console = Terminal()
     figures: dict[str, Any] = {"vessel": loaded.name, "scenario": None}
     if path is None:
         if sweep:
@@ -75,8 +73,8 @@ def tank(
         if json_:
             print_json(figures)
             return
-        print_table(console, _table(loaded, tanks, {}))
-        console.print("Name a sea with --scenario for the roll to be expected.")
+        console.table(_table(loaded, tanks, {}))
+        console.say("Name a sea with --scenario for the roll to be expected.")
         return
     chosen, sea = _sea(path, loaded)
     name = chosen.name
@@ -105,14 +103,13 @@ def tank(
     if json_:
         print_json(figures)
         return
-    print_table(console, _table(loaded, tanks, found, f"roll: linear prediction for {name}"))
+    console.table(_table(loaded, tanks, found, f"roll: linear prediction for {name}"))
     if left_out := _left_out(loaded.ship):
-        console.print(f"left out of the roll: {left_out}; utank-hil bench has it", soft_wrap=True)
-    print_table(console, loading_table(loadings))
+        console.say(f"left out of the roll: {left_out}; utank-hil bench has it")
+    console.table(loading_table(loadings))
     for each in sweep_tables(points) if points else ():
-        print_table(console, each)
-    for key, file in files.items():
-        console.print(f"{key:>10}: {escape(shown(file))}", soft_wrap=True)
+        console.table(each)
+    console.files(files)
 
 
 def _left_out(ship: "RollShip") -> str:

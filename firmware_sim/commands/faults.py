@@ -9,14 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from utank_hil.commands.common import CONFIGS, Json, fail, load, notes, prepare_out, shown, why
+from utank_hil.commands.common import CONFIGS, Json, fail, load, prepare_out, why
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.failures import KILLED
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
@@ -123,7 +121,7 @@ def faults(
     else:
         _print(results, on_bus)
         failed = sum(not result.passed for result in results)
-        Console().print(
+        Terminal().say(
             f"{len(results)} rows in {seeds} seas, {failed} failed, {len(not_run)} not run; roll "
             f"compared over {window.stopped_s:g} s, in charge over {window.running_s:g} s; "
             f"{time.monotonic() - began:.0f} s."
@@ -152,7 +150,7 @@ def _on_bus(
     try:
         while bus is not None and waiting:
             row = waiting[0]
-            notes.print(f"{row.id} on {bus}")
+            notes.say(f"{row.id} on {bus}")
             results.append(run_live(row, bus, requirement_text(campaign, row.meets)))
             del waiting[0]
     except OSError as why_not:
@@ -163,13 +161,13 @@ def _on_bus(
 def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> None:
     from firmware_sim.fault_campaign.report import table
 
-    console = Console()
-    print_table(console, table(results))
+    console = Terminal()
+    console.table(table(results))
     for result in results:
         for problem in result.problems:
-            console.print(f"[red]{result.row.id}: {escape(problem)}[/red]", soft_wrap=True)
+            console.say(problem, red=f"{result.row.id}:")
     for told in on_bus:
-        console.print(
+        console.say(
             f"{told['id']}: {told['verdict']}, found {told['found_ms']} ms, drive off "
             f"{told['zero_ms']} ms, limit {told['limit_ms']} ms {'; '.join(told['problems'])}"
         )

@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NoReturn
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
-from utank_hil.commands.common import Json, fail, lead_on, notes, prepare_out, print_json, shown
+from utank_hil.commands.common import Json, fail, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.terminal import Terminal, new_table, notes, shown
 from utank_hil.parameters import ParameterError
 from utank_hil.whole_file import write_whole
 
@@ -134,7 +132,7 @@ def init(
     except (TankImpossibleError, NoLawError) as error:
         if json_:
             print_json({"possible": False, "reason": str(error)})
-        notes.print("[red]no tank:[/red]", escape(str(error)), soft_wrap=True)
+        notes.say(str(error), red="no tank:")
         raise typer.Exit(ExitCode.REFUSED) from None
     except CalmSeaError as error:
         fail(f"--tp: {error}")
@@ -150,14 +148,14 @@ def init(
         told = {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
         print_json(told)
         return
-    console = Console(highlight=False)
-    print_table(console, _table(project))
+    console = Terminal()
+    console.table(_table(project))
     if little:
-        console.print(f"[yellow]little help:[/yellow] {little}", soft_wrap=True)
+        console.say(little, yellow="little help:")
     for path in files.values():
-        console.print(f"written: {escape(shown(path))}", soft_wrap=True)
+        console.say(f"written: {shown(path)}")
     steps = (("check", "controller.yaml"), ("bench", "scenario.yaml"))
-    lead_on(console, *(f"{command} {shown(files[file])}" for command, file in steps))
+    console.lead_on(*(f"{command} {shown(files[file])}" for command, file in steps))
 
 
 def _little_help(project: "StarterProject") -> str | None:
@@ -179,7 +177,7 @@ def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
     """Name the options that are wrong, and end with exit code 2."""
     for name, reason in error.problems:
         place = f"--{_OPTIONS[name]}" if name in _OPTIONS else _place(name, prefix)
-        notes.print("[red]error:[/red]", escape(f"{place}: {reason}"), soft_wrap=True)
+        notes.say(f"{place}: {reason}", red="error:")
     raise typer.Exit(ExitCode.USAGE)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from rich.table import Table
+from rich.text import Text
 
 from firmware_sim.fault_campaign.campaign import Campaign
 from firmware_sim.fault_campaign.verdict import Result
@@ -97,7 +98,7 @@ def table(results: Sequence[Result]) -> Table:
             milliseconds(result.zero_limit_ms),
             "" if math.isnan(result.roll_ratio) else f"{result.roll_ratio:.2f}",
             " ".join(result.codes),
-            "[green]pass[/green]" if result.passed else "[red]fail[/red]",
+            Text("pass", "green") if result.passed else Text("fail", "red"),
         )
     return drawn
 

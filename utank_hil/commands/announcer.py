@@ -4,7 +4,6 @@ The loop writes an event into shared memory. This process logs it, prints it if 
 and keeps the ship that was found in files. It reads what is left when the loop was killed, too.
 """
 
-import contextlib
 import multiprocessing
 import os
 import signal
@@ -15,12 +14,10 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Final
 
-from rich.markup import escape
-
 from utank_hil.canbus import RetuningState
-from utank_hil.commands.common import notes, shown
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
+from utank_hil.commands.terminal import notes, shown
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
@@ -109,7 +106,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
             try:
                 events = EventLog(log)
             except OSError as error:
-                _print(f"[red]no log of events:[/red] {escape(str(error))}")
+                notes.say(str(error), red="no log of events:")
             else:
                 stack.callback(events.close)
         ready.send_bytes(b"ready")
@@ -130,7 +127,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
                 break
             time.sleep(LOOK_S)
         if reader.lost:
-            _print(f"[red]{reader.lost} events were lost[/red]")
+            notes.say(red=f"{reader.lost} events were lost")
 
 
 def _ready(heard: Connection) -> bool:
@@ -145,25 +142,19 @@ def _log(events: EventLog, event: Event, start_ns: int) -> None:
     try:
         events.write(event, start_ns)
     except OSError as error:  # a full disk is no reason to end
-        _print(f"[red]an event was not logged:[/red] {escape(str(error))}")
+        notes.say(str(error), red="an event was not logged:")
 
 
 def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
-    kept = ""
+    failed = kept = ""
     if ships is not None and event.found is not None and event.state is RetuningState.RETUNED:
         # first of all: a terminal may be held up, or gone
         try:
             files = ships.write(event.found)
         except (OSError, ValueError) as error:  # no room; or found beyond what a file may hold
-            kept = f"[red]the ship that was found could not be written:[/red] {escape(str(error))}"
+            failed, kept = "the ship that was found could not be written:", str(error)
         else:
-            kept = escape(f"the ship that was found: {', '.join(map(shown, files.values()))}")
-    _print(f"{event.time_ns * 1e-9:8.1f} s {escape(event_text(event))}")
+            kept = f"the ship that was found: {', '.join(map(shown, files.values()))}"
+    notes.say(f"{event.time_ns * 1e-9:8.1f} s {event_text(event)}")
     if kept:
-        _print(kept)
-
-
-def _print(text: str) -> None:
-    # a terminal that is gone is no reason to keep no files; at a broken pipe Rich would exit
-    with contextlib.suppress(OSError, SystemExit):
-        notes.print(text, soft_wrap=True)
+        notes.say(kept, red=failed)

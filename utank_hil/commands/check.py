@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 from pydantic import BaseModel
-from rich.console import Console
 
-from utank_hil.commands.common import Json, fail, lead_on, load, print_json, shown, warnings_of
+from utank_hil.commands.common import Json, fail, load, print_json, warnings_of
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import judge
+from utank_hil.commands.terminal import Terminal, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
@@ -67,4 +67,4 @@ def check(
         raise typer.Exit(ExitCode.REFUSED)
     if not json_:
         following = {"ship": "design tank {}", "controller": "run {} --bus can0"}
-        lead_on(Console(), following.get(kind, "bench {}").format(shown(config)))
+        Terminal().lead_on(following.get(kind, "bench {}").format(shown(config)))

@@ -4,8 +4,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.loop.robustness import Robustness
@@ -13,7 +12,7 @@ from utank_hil.commands.common import finite
 from utank_hil.commands.gate import JudgedLaw
 from utank_hil.commands.remedy import remedy
 from utank_hil.commands.ship_report import ship_figures, ship_line
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
 from utank_hil.control import BuiltLaw
 
@@ -69,16 +68,16 @@ def collection_json(collection: Any, judged: Judged) -> dict[str, Any]:
 def print_controller(judged: JudgedLaw) -> None:
     """Print a controller's margins."""
     config, report = judged.config, judged.robustness
-    console = Console(highlight=False)
-    names = escape(f"{config.name} for {config.vessel.name}")
-    console.print(f"{names}: the configuration is valid.", soft_wrap=True)
-    console.print(ship_line(config.vessel), soft_wrap=True)
+    console = Terminal()
+    names = f"{config.name} for {config.vessel.name}"
+    console.say(f"{names}: the configuration is valid.")
+    console.say(ship_line(config.vessel))
     if report is None:
         if judged.law.unjudged:
             _print_verdict(console, judged)
         else:
             text = DISSIPATES if judged.law.dissipates else NO_LOOP
-            console.print(text, soft_wrap=True)
+            console.say(text)
         return
     margin = report.nominal
     table = new_table(MARGINS, "value", "required")
@@ -94,37 +93,37 @@ def print_controller(judged: JudgedLaw) -> None:
         "grid: roll period 0.7 to 1.3, or inertia 0.8 to 1.25;\n"
         "pump gain 0.8 to 1.2, 0 or 20 ms more delay"
     )
-    print_table(console, table)
+    console.table(table)
     for remark in _remarks(judged.law, report):
-        console.print(remark, soft_wrap=True)
+        console.say(remark)
     _print_verdict(console, judged)
 
 
-def _print_verdict(console: Console, judged: JudgedLaw) -> None:
+def _print_verdict(console: Terminal, judged: JudgedLaw) -> None:
     for failure in judged.failures:
-        console.print(f"[red]missed:[/red] {escape(failure)}", soft_wrap=True)
+        console.say(failure, red="missed:")
     if judged.failures:
         verdict = "accepted by the configuration" if judged.accepted else "refused"
-        console.print(f"This law is {verdict}.")
+        console.say(f"This law is {verdict}.")
         _print_remedy(console, judged)
     else:
-        console.print(_met(judged.law))
+        _print_met(console, judged.law)
 
 
-def _print_remedy(console: Console, judged: JudgedLaw, whose: str = "") -> None:
+def _print_remedy(console: Terminal, judged: JudgedLaw, whose: str = "") -> None:
     found = remedy(judged)
     if found is not None:
-        console.print(f"[yellow]remedy{whose}:[/yellow] {escape(found)}", soft_wrap=True)
+        console.say(found, yellow=f"remedy{whose}:")
 
 
 def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     """Print the margins of all controllers of a file."""
-    console = Console(highlight=False)
-    names = escape(f"{collection.name}, {collection.vessel.name}")
-    console.print(f"{names}: the {kind} is valid.", soft_wrap=True)
-    console.print(ship_line(collection.vessel), soft_wrap=True)
+    console = Terminal()
+    names = f"{collection.name}, {collection.vessel.name}"
+    console.say(f"{names}: the {kind} is valid.")
+    console.say(ship_line(collection.vessel))
     for line in collection.meaning():
-        console.print(line, soft_wrap=True)
+        console.say(line)
     if not judged:  # a passive tank has no law
         return
     figures = (
@@ -139,11 +138,11 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
     for each, one in judged.items():
         verdict = _verdict(one)
         if one.robustness is None:
-            table.add_row(escape(each), *5 * ("",), verdict)
+            table.add_row(each, *5 * ("",), verdict)
             continue
         report, margin = one.robustness, one.robustness.nominal
         table.add_row(
-            escape(each),
+            each,
             f"{margin.peak_sensitivity:.2f}",
             _gain(margin),
             _phase(margin),
@@ -151,23 +150,23 @@ def print_collection(kind: str, collection: Any, judged: Judged) -> None:
             f"{report.worst_radius:.4f}",
             verdict,
         )
-    print_table(console, table)
+    console.table(table)
     for each, one in judged.items():
         for remark in () if one.robustness is None else _remarks(one.law, one.robustness):
-            console.print(f"{escape(each)}: {remark}", soft_wrap=True)
+            console.say(f"{each}: {remark}")
     for each, one in judged.items():
         for failure in one.failures:
-            console.print(f"[red]missed by {escape(each)}:[/red] {escape(failure)}", soft_wrap=True)
-        _print_remedy(console, one, f" of {escape(each)}")
+            console.say(failure, red=f"missed by {each}:")
+        _print_remedy(console, one, f" of {each}")
 
 
-def _verdict(judged: JudgedLaw) -> str:
+def _verdict(judged: JudgedLaw) -> str | Text:
     """The verdict on a law in a word."""
     if judged.failures:
-        return "[yellow]accepted[/yellow]" if judged.accepted else "[red]refused[/red]"
+        return Text("accepted", "yellow") if judged.accepted else Text("refused", "red")
     if judged.robustness is None:
         return "dissipates" if judged.law.dissipates else "no loop"
-    return "at rest" if judged.law.adapts else "[green]ok[/green]"
+    return "at rest" if judged.law.adapts else Text("ok", "green")
 
 
 def _gain(margin: Margins) -> str:
@@ -201,11 +200,11 @@ def _remarks(law: BuiltLaw, report: Robustness) -> list[str]:
     return notes
 
 
-def _met(law: BuiltLaw) -> str:
-    """The verdict on a law that misses nothing."""
+def _print_met(console: Terminal, law: BuiltLaw) -> None:
     if law.adapts:
-        return "Met by what it starts from; [yellow]what it learns is not judged.[/yellow]"
-    return "[green]All requirements are met.[/green]"
+        console.say("met by what the law starts from", yellow="What it learns is not judged:")
+    else:
+        console.say(green="All requirements are met.")
 
 
 def _at_rest(law: BuiltLaw) -> str | None:

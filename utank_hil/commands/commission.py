@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.commissioning_record import make_record, record_path, write_record
-from utank_hil.commands.common import Json, fail, lead_on, load, notes, shown, why_not_writable
+from utank_hil.commands.common import Json, fail, load, why_not_writable
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runtime import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
@@ -81,16 +80,15 @@ def commission(
         except ValueError as error:
             fail(f"{config}: vessel: {error}")
         guide = Guide(node, lines)
-        notes.print(
+        notes.say(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
-            "nothing is recorded.",
-            soft_wrap=True,
+            "nothing is recorded."
         )
         with suppress(PortError):  # the loop meets it too, and its node reacts
             port.receive()  # what came before is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
-                notes.print(line, soft_wrap=True)
+                notes.say(line)
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
         fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)
@@ -142,7 +140,7 @@ class Guide:
 
 def _print(record: dict[str, Any], path: Path, config: Path) -> None:
     """The checks as a table, then what to do about those that failed."""
-    console = Console(highlight=False)
+    console = Terminal()
     table = Table(title=f"Commissioning of {record['vessel']}")
     for heading in ("check", "measured", "expected", "unit", "verdict"):
         table.add_column(heading, justify="right" if "ed" in heading else "left", no_wrap=True)
@@ -153,17 +151,17 @@ def _print(record: dict[str, Any], path: Path, config: Path) -> None:
             "none" if measured is None else f"{measured:.3g}",
             f"{check['expected']:.3g} ± {check['tolerance']:.2g}",
             check["unit"],
-            check["verdict"] if check["verdict"] == "pass" else "[red]FAIL[/red]",
+            check["verdict"] if check["verdict"] == "pass" else Text("FAIL", "red"),
         )
-    print_table(console, table)
+    console.table(table)
     for check in record["checks"]:
         if check["verdict"] != "pass":
-            console.print(
-                f"[red]{escape(check['what'])}:[/red] {escape(check['remedy'])}", soft_wrap=True
-            )
+            console.say(check["remedy"], red=f"{check['what']}:")
     if record["ended"]:
-        console.print(f"[red]ended early:[/red] {escape(record['ended'])}", soft_wrap=True)
-    verdict = "passed" if record["passed"] else "[red]not passed: arming is refused[/red]"
-    console.print(f"{verdict}; record: {escape(shown(path))}", soft_wrap=True)
-    if record["passed"]:
-        lead_on(console, f"run {shown(config)} --bus {record['bus']} --out log")
+        console.say(record["ended"], red="ended early:")
+    where = f"record: {shown(path)}"
+    if not record["passed"]:
+        console.say(where, red="not passed: arming is refused;")
+    else:
+        console.say(where, green="passed;")
+        console.lead_on(f"run {shown(config)} --bus {record['bus']} --out log")

@@ -6,17 +6,15 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn, TypeVar
 
 import typer
 from pydantic import BaseModel
-from rich.console import Console
-from rich.markup import escape
 from typer.core import TyperGroup
 
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.terminal import notes
 from utank_hil.configuration.files import (
     ConfigError,
     ConfigProblem,
@@ -60,21 +58,6 @@ Duration = Annotated[
 ]
 
 
-class _Notes(Console):
-    """What goes to standard error; where that is full or gone, the command goes on without."""
-
-    def print(self, *objects: Any, **how: Any) -> None:
-        with suppress(OSError):
-            super().print(*objects, **how)
-
-    def on_broken_pipe(self) -> None:
-        self.quiet = True
-
-
-# progress, notes and errors; standard output is for results
-notes: Final = _Notes(stderr=True, highlight=False)
-
-
 def finite(value: Any) -> Any:
     """The same for JSON, which has no infinity: a number that is none is null."""
     if isinstance(value, Mapping):
@@ -113,7 +96,7 @@ def why(error: object) -> str:
 
 def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     """Print an error and end."""
-    notes.print("[red]error:[/red]", escape(why(message)), soft_wrap=True)
+    notes.say(why(message), red="error:")
     raise typer.Exit(code)
 
 
@@ -127,7 +110,7 @@ def load(path: Path, model: type[ModelT]) -> ModelT:
     except ConfigError as error:
         fail_with(error)
     for warning in warnings_of(loaded, path):
-        notes.print("[yellow]warning:[/yellow]", escape(str(warning)), soft_wrap=True)
+        notes.say(str(warning), yellow="warning:")
     return loaded
 
 
@@ -140,7 +123,7 @@ def warnings_of(loaded: BaseModel, path: Path) -> list[ConfigProblem]:
 def fail_with(error: ConfigError) -> NoReturn:
     """List everything that is wrong with a configuration and end with exit code 2."""
     for problem in error.problems:
-        notes.print("[red]error:[/red]", escape(str(problem)), soft_wrap=True)
+        notes.say(str(problem), red="error:")
     raise typer.Exit(ExitCode.USAGE) from None
 
 
@@ -175,16 +158,3 @@ def prepare_out(folder: Path, files: Iterable[str]) -> None:
     reason = why_not_writable(folder, files)
     if reason is not None:
         fail(f"{reason}; choose another folder with --out")
-
-
-def lead_on(console: Console, *commands: str) -> None:
-    """Print which commands come next, the last thing that a command says."""
-    console.print("Next:")
-    for command in commands:
-        console.print(f"  utank-hil {escape(command)}", soft_wrap=True)
-
-
-def shown(path: Path) -> str:
-    """A path as short as it can be said from here."""
-    relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") else relative

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
-from utank_hil.commands.common import Json, fail, notes, print_json, shown
+from utank_hil.commands.common import Json, fail, print_json
+from utank_hil.commands.terminal import notes, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of
@@ -65,7 +65,7 @@ def export(
     if json_:
         print_json({"file": str(to), unit: count})
     else:
-        notes.print(f"{escape(shown(to))}: {count} {unit}", soft_wrap=True)
+        notes.say(f"{shown(to)}: {count} {unit}")
 
 
 def _entries(recording: Path) -> Iterable[Entry]:

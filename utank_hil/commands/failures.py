@@ -8,10 +8,9 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import Final
 
-from rich.markup import escape
-
-from utank_hil.commands.common import notes, why
+from utank_hil.commands.common import why
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.terminal import notes
 
 EXTRA_OF: Final = {
     "clarabel": "bench",
@@ -43,17 +42,16 @@ def failures_named() -> Iterator[None]:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRA_OF:
             raise
-        notes.print(
-            f"[red]error:[/red] this needs {name}, which is not installed: "
-            f"pip install 'utank-hil\\[{EXTRA_OF[name]}]'",
-            soft_wrap=True,
+        notes.say(
+            f"this needs {name}, which is not installed: pip install 'utank-hil[{EXTRA_OF[name]}]'",
+            red="error:",
         )
         raise SystemExit(ExitCode.USAGE) from None
     except BrokenExecutor:
-        notes.print(f"[red]error:[/red] {KILLED}", soft_wrap=True)
+        notes.say(KILLED, red="error:")
         raise SystemExit(ExitCode.SYSTEM) from None
     except OSError as error:
         if error.filename is None and error.errno != errno.ENOSPC:
             raise
-        notes.print("[red]error:[/red]", escape(why(error)), soft_wrap=True)
+        notes.say(why(error), red="error:")
         raise SystemExit(ExitCode.USAGE) from None

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from rich.markup import escape
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
-from utank_hil.commands.common import fail, fail_with, notes
+from utank_hil.commands.common import fail, fail_with
+from utank_hil.commands.terminal import notes
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import located
 from utank_hil.control import BuiltLaw
@@ -113,8 +113,7 @@ def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
     """The law of a configuration, judged; a refused one ends the command with exit code 2."""
     judged = judge(config, path, key, with_delay_margin=False)
     for failure in judged.failures:
-        name = escape(config.name)
-        notes.print(f"[yellow]{name}, margins:[/yellow]", escape(failure), soft_wrap=True)
+        notes.say(failure, yellow=f"{config.name}, margins:")
     if not judged.accepted:
         if judged.step_s > MOST_STEP_S:
             fail(f"{config.name}: the law's step is too slow for the loop: make it faster")

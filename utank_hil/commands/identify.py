@@ -5,11 +5,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from utank_hil.assembly import retuning_task
-from utank_hil.commands.common import OUT, Json, fail, load, notes, prepare_out, print_json
+from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.identified import (
     CONTROLLER,
@@ -18,6 +16,7 @@ from utank_hil.commands.identified import (
     write_identified,
 )
 from utank_hil.commands.identify_report import figures, print_report
+from utank_hil.commands.terminal import Terminal, notes
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
@@ -98,7 +97,7 @@ def identify_log(
     try:
         found = identify(record, task)
     except IdentificationError as error:
-        notes.print(f"[red]refused:[/red] {escape(str(error))}", soft_wrap=True)
+        notes.say(str(error), red="refused:")
         if json_:
             print_json({"accepted": False, "reasons": [str(error)]})
         raise typer.Exit(ExitCode.REFUSED) from None
@@ -112,7 +111,7 @@ def identify_log(
     if json_:
         print_json(about | figures(found, answer, files))
     else:
-        print_report(Console(highlight=False), found, task, answer, files)
+        print_report(Terminal(), found, task, answer, files)
     if not isinstance(answer, Candidate):
         raise typer.Exit(ExitCode.REFUSED)
 

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.commands.common import finite, shown
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.common import finite
+from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -77,28 +75,27 @@ def _mode_figures(found: ModalConfidence) -> list[dict[str, float]]:
 
 
 def print_report(
-    console: Console,
+    console: Terminal,
     found: Identification,
     task: RetuningTask,
     answer: Candidate | Refusal,
     files: Mapping[str, Path],
 ) -> None:
     """Print what an engineer asks: which ship, how sure, does it hold, and is it accepted."""
-    print_table(console, _ship_table(found, task))
-    print_table(console, _mode_table(found, task))
-    print_table(console, _check_table(found, task))
-    console.print(_waves(found), soft_wrap=True)
+    console.table(_ship_table(found, task))
+    console.table(_mode_table(found, task))
+    console.table(_check_table(found, task))
+    console.say(_waves(found))
     if isinstance(answer, Candidate):
-        console.print(
-            f"[green]Accepted:[/green] peak sensitivity {answer.summary.peak_sensitivity:.2f}; in "
-            f"the recorded waves {answer.summary.roll_below_passive:.0%} less roll than passive.",
-            soft_wrap=True,
+        console.say(
+            f"peak sensitivity {answer.summary.peak_sensitivity:.2f}; in the recorded waves "
+            f"{answer.summary.roll_below_passive:.0%} less roll than passive.",
+            green="Accepted:",
         )
     else:
         for reason in answer.reasons:
-            console.print(f"[red]refused:[/red] {escape(reason)}", soft_wrap=True)
-    for name, path in files.items():
-        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
+            console.say(reason, red="refused:")
+    console.files(files)
 
 
 def _waves(found: Identification) -> str:

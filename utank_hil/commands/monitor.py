@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from utank_hil.commands.common import fail, notes
+from utank_hil.commands.common import fail
+from utank_hil.commands.terminal import notes
 
 if TYPE_CHECKING:
     from utank_hil.telemetry.live import LiveRun
@@ -69,7 +70,7 @@ def watch(
         while not stopped():
             if send is not None and not send():
                 send = None
-                notes.print("the run has ended; the viewer keeps what it has got")
+                notes.say("the run has ended; the viewer keeps what it has got")
             if not viewer.wait(_LOOK_S) or stopped():
                 continue
             if not viewer.failed:
@@ -82,27 +83,26 @@ def watch(
                     "the viewer failed; what it says is above; "
                     f"if a port was in use, {again} takes another"
                 )
-            notes.print(
-                "[yellow]no window:[/yellow] the reason is above; a graphics driver for any "
-                "machine: apt-get install mesa-vulkan-drivers",
-                soft_wrap=True,
+            notes.say(
+                "the reason is above; a graphics driver for any machine: "
+                "apt-get install mesa-vulkan-drivers",
+                yellow="no window:",
             )
             viewer = _said(stack.enter_context(open_viewer(source, at_s, window=False)), at_s)
-    notes.print("viewer closed")
+    notes.say("viewer closed")
 
 
 def _said(viewer: "Viewer", at_s: float | None) -> "Viewer":
     """A viewer, after it was said where a browser finds it, and where in time to look."""
     if viewer.url is not None:
         tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in viewer.ports)
-        notes.print(
+        notes.say(
             f"Open {viewer.url}{LOOKS} in a browser; Ctrl-C ends the viewer.\n"
-            f"From another machine first: ssh {tunnel} THIS_MACHINE",
-            soft_wrap=True,
+            f"From another machine first: ssh {tunnel} THIS_MACHINE"
         )
         if at_s is not None:
             # Rerun 0.41 moves the cursor of a page neither by its address nor by a layout
-            notes.print(f"Something happens at {at_s:.1f} s: type it into the field at the bottom.")
+            notes.say(f"Something happens at {at_s:.1f} s: type it into the field at the bottom.")
     return viewer
 
 

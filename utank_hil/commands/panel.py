@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from utank_hil.canbus import SocketCanPort, Station, load_catalogue
-from utank_hil.commands.common import Duration, fail, load, notes
+from utank_hil.commands.common import Duration, fail, load
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.keyboard import HELP, Keyboard
+from utank_hil.commands.terminal import notes
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.runtime import RealTimeLoop, stop_on_signals
 from utank_hil.runtime.panel import OperatorPanel
@@ -41,9 +42,9 @@ def panel(
         port = SocketCanPort(bus, can_ids=node.hears)
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
-    notes.print(HELP, markup=False)
+    notes.say(HELP)
     descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdin is None else sys.stdin.fileno()
-    keyboard = Keyboard(node, descriptor, _say, terminal=os.isatty(descriptor))
+    keyboard = Keyboard(node, descriptor, notes.say, terminal=os.isatty(descriptor))
     try:
         with stop_on_signals() as signalled:
             RealTimeLoop([node], port).run(
@@ -52,7 +53,3 @@ def panel(
             )
     finally:
         port.close()
-
-
-def _say(text: str) -> None:
-    notes.print(text, markup=False, soft_wrap=True)

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from utank_hil.assembly import build_law
 from utank_hil.commands.common import Json, fail, load
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.terminal import Terminal
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.parameters import ParameterError
 from utank_hil.telemetry.bus_logs import (
@@ -73,7 +72,7 @@ def replay(
     if json_:
         sys.stdout.write(json.dumps(_as_json(result, why, cut, exact)) + "\n")
     else:
-        _print(Console(highlight=False), result, why, cut)
+        _print(Terminal(), result, why, cut)
     raise typer.Exit(ExitCode.OK if exact else ExitCode.REFUSED)
 
 
@@ -118,19 +117,19 @@ def _as_json(result: ReplayResult, why: list[str], cut: str, exact: bool) -> dic
     }
 
 
-def _print(console: Console, result: ReplayResult, why: list[str], cut: str) -> None:
+def _print(console: Terminal, result: ReplayResult, why: list[str], cut: str) -> None:
     said = f"{result.ticks} ticks, {result.frames} frames of the controller"
     if result.first is None:
-        console.print(f"[green]equal bit for bit:[/green] {said}", soft_wrap=True)
+        console.say(said, green="equal bit for bit:")
     else:
         counts = ", ".join(f"{name} {count}" for name, count in result.different.items())
-        console.print(f"[red]different:[/red] {escape(counts)}, of {said}", soft_wrap=True)
-        console.print(f"first at {escape(str(result.first))}", soft_wrap=True)
+        console.say(f"{counts}, of {said}", red="different:")
+        console.say(f"first at {result.first!s}")
     if why:
-        console.print("not the same as when it was recorded:")
+        console.say("not the same as when it was recorded:")
         for line in why:
-            console.print(f"  {escape(line)}", soft_wrap=True)
+            console.say(f"  {line}")
     elif result.first is not None:
-        console.print("version, configuration and law are the same: the program was changed")
+        console.say("version, configuration and law are the same: the program was changed")
     if cut:
-        console.print(f"[yellow]{escape(cut)}[/yellow]: compared up to there", soft_wrap=True)
+        console.say("compared up to there", yellow=f"{cut}:")

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
-from rich.markup import escape
 
-from utank_hil.commands.common import Json, fail, notes, print_json, shown
+from utank_hil.commands.common import Json, fail, print_json
+from utank_hil.commands.terminal import notes, shown
 
 if TYPE_CHECKING:
     from utank_hil.commands.report_parts import Report, ReportKind
@@ -44,7 +44,7 @@ def report(
         result: dict[str, Any] = {"page": str(written), "bytes": written.stat().st_size}
         print_json(result)
     else:
-        notes.print(f"report: {escape(shown(written))}", soft_wrap=True)
+        notes.say(f"report: {shown(written)}")
 
 
 def write_page(runs: list[Path], page: Path) -> Path:

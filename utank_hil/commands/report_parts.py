@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import yaml
 from rich.table import Table
-from rich.text import Text
 
 from utank_hil.arrays import FloatArray
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
@@ -43,12 +42,12 @@ class ReportKind:
 def printed(table: Table) -> ReportTable:
     """A table of the terminal."""
 
-    def plain(markup: object) -> str:
-        return " ".join(Text.from_markup(str(markup or "")).plain.split())
+    def line(text: object) -> str:
+        return " ".join(str(text or "").split())
 
-    rows = zip(*([plain(cell) for cell in column.cells] for column in table.columns), strict=True)
-    caption = ": ".join(filter(None, (plain(table.title), plain(table.caption))))
-    return ReportTable([plain(column.header) for column in table.columns], list(rows), caption)
+    rows = zip(*([line(cell) for cell in column.cells] for column in table.columns), strict=True)
+    caption = ": ".join(filter(None, (line(table.title), line(table.caption))))
+    return ReportTable([line(column.header) for column in table.columns], list(rows), caption)
 
 
 def roll_figure(rolls: Mapping[str, FloatArray], step_s: float, scratch: Path) -> ReportSection:

@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from utank_hil.commands.common import OUT, Json, fail, notes, prepare_out, print_json, shown
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.common import OUT, Json, fail, prepare_out, print_json
+from utank_hil.commands.terminal import Terminal, new_table, notes
 from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
 from utank_hil.whole_file import write_whole
@@ -61,10 +59,9 @@ def reproduce(
     if json_:
         print_json(result)
         return
-    console = Console(highlight=False)
-    print_table(console, _summary(entries, made, seconds))
-    for name, path in files.items():
-        console.print(f"{name:>10}: {escape(shown(path))}", soft_wrap=True)
+    console = Terminal()
+    console.table(_summary(entries, made, seconds))
+    console.files(files)
 
 
 def _make(entries: list[Entry], out: Path) -> tuple[dict[str, Figure], dict[str, float]]:
@@ -101,10 +98,10 @@ def _list(entries: tuple[Entry, ...], as_object: bool) -> None:
         listed = [entry.as_json() for entry in entries]
         print_json({"figures": listed})
         return
-    console = Console(highlight=False)
+    console = Terminal()
     for entry in entries:
         word = f" ({entry.word}: nothing to compute)" if entry.word else ""
-        console.print(f"{entry.key:>12}  {entry.title}{word}", soft_wrap=True)
+        console.say(f"{entry.key:>12}  {entry.title}{word}")
 
 
 def _summary(

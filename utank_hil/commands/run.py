@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
@@ -20,24 +18,14 @@ from utank_hil.commands import event_log
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
-from utank_hil.commands.common import (
-    Duration,
-    Json,
-    View,
-    fail,
-    lead_on,
-    load,
-    notes,
-    print_json,
-    shown,
-)
+from utank_hil.commands.common import Duration, Json, View, fail, load, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.commands.stamps import claimed_files
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.control import BuiltLaw
@@ -108,10 +96,10 @@ def run(
     loaded = load(config, ControllerConfig)
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
-        notes.print("[yellow]repeated late ticks are not judged:[/yellow] safety.overruns_in_ten")
+        notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")
     refused = why_not_commissioned(loaded, bus, config, record)
     if refused:
-        notes.print("[yellow]arming will be refused:[/yellow]", escape(refused), soft_wrap=True)
+        notes.say(refused, yellow="arming will be refused:")
     statistics = LoopStatistics()
     with _refusals_named(), ExitStack() as stack:
         manager = _service_manager(stack)
@@ -159,8 +147,8 @@ def run(
             port.receive()  # what came while the node was built is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
-                notes.print(line, soft_wrap=True)
-            notes.print(escape(f"{loaded.name} on {bus}; Ctrl-C ends it."), soft_wrap=True)
+                notes.say(line)
+            notes.say(f"{loaded.name} on {bus}; Ctrl-C ends it.")
             manager.ready(f"{loaded.name} on {bus}")
             RealTimeLoop([on_bus], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
@@ -170,8 +158,7 @@ def run(
     # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
     with suppress(OSError, SystemExit):
         if announcer is not None and announcer.error is not None:
-            said = escape(announcer.error)
-            notes.print(f"[red]events were not logged:[/red] {said}", soft_wrap=True)
+            notes.say(announcer.error, red="events were not logged:")
         if json_:
             print_json(_as_json(node, statistics, kept, refused))
         else:
@@ -215,7 +202,7 @@ def _log(folder: Path) -> Path | None:
         folder.mkdir(parents=True, exist_ok=True)
         (log,) = claimed_files(folder.resolve(), event_log.NAME)
     except OSError as error:
-        notes.print(f"[red]no log of events:[/red] {escape(str(error))}", soft_wrap=True)
+        notes.say(str(error), red="no log of events:")
         return None
     return log
 
@@ -236,7 +223,7 @@ def _announcer(
     announcer = Announcer(ships, log)
     stack.callback(announcer.stop)
     if announcer.error is not None:
-        notes.print(f"[red]no log of events:[/red] {escape(announcer.error)}")
+        notes.say(announcer.error, red="no log of events:")
     return announcer
 
 
@@ -286,7 +273,7 @@ def _recording(
     )
     stack.callback(recording.stop)
     if recording.summary.error is not None:
-        notes.print(f"[red]no recording:[/red] {escape(recording.summary.error)}", soft_wrap=True)
+        notes.say(recording.summary.error, red="no recording:")
     return recording
 
 
@@ -294,7 +281,7 @@ def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Des
     """The retuner's and the estimator's end in this process, where they are configured."""
     desks = stack.enter_context(retuner_process(loaded))
     if any(desk is not None and not desk.alive for desk in desks):
-        notes.print("[red]the retuner did not start:[/red] nothing will be retuned or estimated")
+        notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
     return desks
 
 
@@ -341,22 +328,19 @@ def _print_summary(
     recording: RecordingSummary | None,
 ) -> None:
     """What became of a run, for people."""
-    console = Console(highlight=False)
-    print_table(console, timing_table({name: statistics}))
+    console = Terminal()
+    console.table(timing_table({name: statistics}))
     for event in node.retuning_events:
-        console.print(
-            f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {escape(event_text(event))}",
-            soft_wrap=True,
-        )
-    console.print(f"ended in {node.mode.name}, fault {fault_text(node.fault)}", soft_wrap=True)
+        console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
+    console.say(f"ended in {node.mode.name}, fault {fault_text(node.fault)}")
     if node.law_error:
-        console.print(f"[red]the law failed:[/red] {escape(node.law_error)}", soft_wrap=True)
+        console.say(node.law_error, red="the law failed:")
     if node.fallbacks:
-        console.print(f"{node.fallbacks} plans were not found in time; the one before went on")
+        console.say(f"{node.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:
         _tell(console, recording)
         if recording.file is not None and recording.error is None:
-            lead_on(console, f"report {shown(Path(recording.file))}")
+            console.lead_on(f"report {shown(Path(recording.file))}")
 
 
 def _show(stack: ExitStack) -> None:
@@ -365,23 +349,23 @@ def _show(stack: ExitStack) -> None:
     try:
         process = stack.enter_context(subprocess.Popen(command, stdin=subprocess.DEVNULL))
     except OSError as error:
-        notes.print(f"[red]no viewer:[/red] {escape(str(error))}", soft_wrap=True)
+        notes.say(str(error), red="no viewer:")
         return
     stack.callback(process.terminate)
 
 
-def _tell(console: Console, recording: RecordingSummary) -> None:
+def _tell(console: Terminal, recording: RecordingSummary) -> None:
     if recording.file is not None:
         said = f"recording: {shown(Path(recording.file))}"
         if recording.rows is not None:
             said += f", {recording.rows} rows, {recording.lost} lost"
         if recording.parts is not None and recording.parts > 1:
             said += f", in {recording.parts} files"
-        console.print(escape(said), soft_wrap=True)
+        console.say(said)
     if recording.frames is not None:
         said = f"frame log: {shown(Path(recording.frames))}"
         if recording.records_lost:
             said += f", {recording.records_lost} rows lost"
-        console.print(escape(said), soft_wrap=True)
+        console.say(said)
     if recording.error is not None:
-        console.print(f"[red]recording failed:[/red] {escape(recording.error)}", soft_wrap=True)
+        console.say(recording.error, red="recording failed:")

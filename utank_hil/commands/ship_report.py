@@ -5,11 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
 
 from utank_hil.analysis.tank_design import tank_figures
-from utank_hil.commands.tables import new_table, print_table
+from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.dynamics.linear import state_matrices
@@ -166,9 +164,9 @@ def print_ship(vessel: Vessel) -> None:
     for mode in figures["modes"]:
         motion = _motion(mode["frequency_rad_s"], mode["damping_ratio"])
         table.add_row("ship and water moving together", *motion)
-    console = Console(highlight=False)
-    console.print(f"{escape(vessel.name)}: the ship is valid.", soft_wrap=True)
-    print_table(console, table)
+    console = Terminal()
+    console.say(f"{vessel.name}: the ship is valid.")
+    console.table(table)
     rest = new_table(None, "")
     rest.show_header = False
     share = figures["water_share"]
@@ -189,9 +187,9 @@ def print_ship(vessel: Vessel) -> None:
     ):
         if value:
             rest.add_row(text, value)
-    print_table(console, rest)
+    console.table(rest)
     for assumption in vessel.assumptions:
-        console.print(f"Assumed: {escape(assumption)}.", soft_wrap=True)
+        console.say(f"Assumed: {assumption}.")
 
 
 def ship_line(vessel: Vessel) -> str:

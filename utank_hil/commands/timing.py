@@ -1,9 +1,8 @@
 """The table of how real-time loops kept their time."""
 
-from rich.markup import escape
 from rich.table import Table
 
-from utank_hil.commands.tables import new_table
+from utank_hil.commands.terminal import new_table
 from utank_hil.runtime import LoopStatistics
 
 
@@ -16,7 +15,7 @@ def timing_table(loops: dict[str, LoopStatistics]) -> Table:
             summary = histogram.summary()
             counts = (str(loop.ticks), f"{loop.overruns} / {loop.skipped}")
             table.add_row(
-                escape(name) if what == "wake-up late" else "",
+                name if what == "wake-up late" else "",
                 what,
                 *(f"{summary[key] / 1e3:.0f}" for key in ("p50_ns", "p99_ns", "p99_9_ns")),
                 f"{summary['max_ns'] / 1e3:.0f}",

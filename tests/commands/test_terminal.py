@@ -5,10 +5,9 @@ import io
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.console import Console
 from rich.table import Table
 
-from utank_hil.commands.tables import print_table
+from utank_hil.commands.terminal import Terminal
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
 
@@ -21,7 +20,7 @@ def printed(width: int) -> str:
     for name, cells in CELLS.items():
         table.add_row(name, *cells)
     output = io.StringIO()
-    print_table(Console(file=output, width=width), table)
+    Terminal(file=output, width=width).table(table)
     return output.getvalue()
 
 

@@ -1,0 +1,100 @@
+"""What the commands print for people: text as it is, and tables at any width."""
+
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from rich.console import Console
+from rich.measure import Measurement
+from rich.table import Table
+from rich.text import Text
+
+UNLIMITED: Final = 10_000
+
+
+def shown(path: Path) -> str:
+    """A path as short as it can be said from here."""
+    relative = os.path.relpath(path)
+    return str(path) if relative.startswith("..") else relative
+
+
+def new_table(
+    title: str | None, *figures: str, names: Iterable[str] = ("",), caption: str | None = None
+) -> Table:
+    """A table without rows: columns of names to the left, of figures to the right."""
+    table = Table(title=title, caption=caption)
+    for heading in names:
+        table.add_column(heading, no_wrap=True)
+    for heading in figures:
+        table.add_column(heading, justify="right", no_wrap=True)
+    return table
+
+
+class Terminal(Console):
+    """Rich's console without its markup: names and paths are the user's, brackets and all.
+
+    Parameters
+    ----------
+    **options
+        Of `rich.console.Console`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def say(self, text: str = "", *, red: str = "", yellow: str = "", green: str = "") -> None:
+        """Print a line, however long, after words in a colour."""
+        colours = {"red": red, "yellow": yellow, "green": green}
+        parts = [Text(words, colour) for colour, words in colours.items() if words]
+        self.print(*parts, *([text] if text or not parts else []), soft_wrap=True)
+
+    def files(self, files: Mapping[str, Path]) -> None:
+        """Print which files were written, by what they hold."""
+        for name, path in files.items():
+            self.say(f"{name:>10}: {shown(path)}")
+
+    def lead_on(self, *commands: str) -> None:
+        """Print which commands come next, the last thing that a command says."""
+        self.say("Next:")
+        for command in commands:
+            self.say(f"  utank-hil {command}")
+
+    def table(self, table: Table) -> None:
+        """Print a table, or the same as a list where the terminal is too narrow for it.
+
+        Nothing is cut: each row becomes its name with one line a figure.
+        """
+        unlimited = self.options.update(max_width=UNLIMITED)  # else the answer is what there is
+        if Measurement.get(self, unlimited, table).maximum <= self.width:
+            self.print(table)
+            return
+        if table.title:
+            self.print(table.title, style="italic")
+        headings = [" ".join(str(column.header).split()) for column in table.columns]
+        wide = max(len(heading) for heading in headings)
+        for cells in zip(*(column.cells for column in table.columns), strict=True):
+            name, *figures = cells
+            self.print(name, style="bold")
+            for heading, figure in zip(headings[1:], figures, strict=True):
+                if str(figure):
+                    self.print(f"  {heading:{wide}}  {figure}")
+        if table.caption:
+            self.print(table.caption, style="dim")
+        self.print()
+
+
+class _Notes(Terminal):
+    """What goes to standard error; where that is full or gone, the command goes on without."""
+
+    def print(self, *objects: Any, **how: Any) -> None:
+        with suppress(OSError):
+            super().print(*objects, **how)
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+
+
+# progress, notes and errors; standard output is for results
+notes: Final = _Notes(stderr=True)
