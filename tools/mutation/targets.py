@@ -21,6 +21,11 @@ _FIRST = "before the first levels one more update by nothing, and after them a f
 _AS_MANY = "a law answers as many commands as it names"
 _LOSS = "a pascal at a metre a second: the valve does not move by that"
 _NOT_NONE = "for the type checker: it is not None, and no place is 0"
+_LONG_AGO = "any time so long ago is as good"
+_LONGER_WAY = "what is not there adds nothing, to rounding: the longer way to the same"
+_DIFFERENCES = "only differences of it are used"
+_NEVER_THERE = "no computed value is exactly there"
+_AT_THE_BOUND = "a value at the bound is the bound"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
@@ -197,6 +202,111 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
     },
+    "utank_hil/runtime/monitors/level_stuck.py": {
+        "LevelStuck.restart: self._moved_m = self._rate_m_s = 0.0 -> ": _SET_FIRST,
+        "LevelStuck.restart: self._moved_m = self._rate_m_s = 0.0 -> "
+        "self._moved_m = self._rate_m_s = 1.0": _SET_FIRST,
+        "LevelStuck.update: return _LEVEL_STUCK if abs(self._moved_m) > BANDS * self._band_m "
+        "else 0 -> return _LEVEL_STUCK if abs(self._moved_m) >= BANDS * self._band_m else 0": (
+            _NEVER_THERE
+        ),
+    },
+    "utank_hil/runtime/monitors/noise.py": {
+        "within: return -most if value < -most else most if value > most else value -> "
+        "return -most if value <= -most else most if value > most else value": _AT_THE_BOUND,
+        "within: return -most if value < -most else most if value > most else value -> "
+        "return -most if value < -most else most if value >= most else value": _AT_THE_BOUND,
+    },
+    "utank_hil/runtime/monitors/spikes.py": {
+        "SpikeGate.__init__: self._value_ns = -(1 << 62) -> self._value_ns = -(2 << 62)": _LONG_AGO,
+        "SpikeGate.__init__: self._value_ns = -(1 << 62) -> self._value_ns = -(1 << 63)": _LONG_AGO,
+        "SpikeGate.__init__: self._in_a_row = 0 -> ": _SET_FIRST,
+        "SpikeGate.__init__: self._in_a_row = 0 -> self._in_a_row = 1": _SET_FIRST,
+    },
+    "utank_hil/runtime/monitors/senders.py": {
+        "Senders.__init__: self._now_s = 0.0 -> self._now_s = 1.0": _DIFFERENCES,
+        "Senders.__init__: self._damaged_s = [-math.inf] * DAMAGED_FRAMES -> "
+        "self._damaged_s = [-3.141592653589793] * DAMAGED_FRAMES": _LONG_AGO,
+        "Senders.update: if stream.damaged: -> if True:": "no frames more are no change",
+    },
+    "utank_hil/runtime/monitors/drive.py": {
+        "DriveFollowing.__init__: self._enabled = False -> self._enabled = True": (
+            "what has just begun may begin again"
+        ),
+        "DriveFollowing._judge: along_pa = pressure_pa if expected_pa > 0 else -pressure_pa -> "
+        "along_pa = pressure_pa if expected_pa >= 0 else -pressure_pa": (
+            "where none is expected both ways are judged alike"
+        ),
+        "Saturation.__init__: self._found = False -> self._found = True": (
+            "the first update is of no side yet, and sets it"
+        ),
+        "Saturation.update: side = math.copysign(1.0, command_pa) -> "
+        "side = math.copysign(1.25, command_pa)": "only its sign is used",
+    },
+    "utank_hil/runtime/monitors/motion.py": {
+        "Stuck.update: self._sum_rad = keep * (self._sum_rad + left_rad) -> "
+        "self._sum_rad = keep * (self._sum_rad - left_rad)": "the same sum with the other sign",
+        "RollAgainstRate.update: if abs(summed_rad) < 0.5 * limit_rad: -> "
+        "if abs(summed_rad) <= 0.5 * limit_rad:": _NEVER_THERE,
+    },
+    "utank_hil/runtime/monitors/motion_watch.py": {
+        "MotionWatch.__init__: self._last_rate_rad_s = 0.0 -> self._last_rate_rad_s = 1.0": (
+            "the first sample has none before it to be compared with"
+        ),
+    },
+    "utank_hil/runtime/monitors/motion_pair.py": {
+        "MotionPair.update: over = abs(self._roll_rad) > self._roll_limit_rad or "
+        "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) >= "
+        "self._roll_limit_rad or abs(self._rate_rad_s) > self._rate_limit_rad_s": _NEVER_THERE,
+        "MotionPair.update: over = abs(self._roll_rad) > self._roll_limit_rad or "
+        "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) > "
+        "self._roll_limit_rad or abs(self._rate_rad_s) >= self._rate_limit_rad_s": _NEVER_THERE,
+    },
+    "utank_hil/runtime/monitors/thresholds.py": {
+        "SensorFigures: @dataclass(frozen=True, slots=True) -> "
+        "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
+        "MonitorThresholds: @dataclass(frozen=True, slots=True) -> "
+        "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
+    },
+    "utank_hil/runtime/passive_twin.py": {
+        **dict.fromkeys(
+            (
+                "PassiveTwin.take: self._straight = len(self._pieces) == 1 and "
+                f"(not any(self._pieces[0][:-2])) -> self._straight = {straight}"
+                for straight in (
+                    "len(self._pieces) != 1 and (not any(self._pieces[0][:-2]))",
+                    "len(self._pieces) == 2 and (not any(self._pieces[0][:-2]))",
+                    "len(self._pieces) == 1 and (not any(self._pieces[0][:2]))",
+                )
+            ),
+            _LONGER_WAY,
+        ),
+        "PassiveTwin.take: self._straight = len(self._pieces) == 1 and "
+        "(not any(self._pieces[0][:-2])) -> self._straight = not any(self._pieces[0][:-2])": (
+            "no table of levers begins with a piece that is exactly straight"
+        ),
+        "PassiveTwin.take: self._straight = len(self._pieces) == 1 and "
+        "(not any(self._pieces[0][:-2])) -> self._straight = len(self._pieces) == 1 and "
+        "(not any(self._pieces[0][:-3]))": "an odd polynomial has no even power",
+        "PassiveTwin.update: if self._damping or not self._straight: -> if True:": _LONGER_WAY,
+        "PassiveTwin.update: if self._loss: -> if True:": _LONGER_WAY,
+        "PassiveTwin._moment_beside_nm: if self._straight: -> if False:": _LONGER_WAY,
+        "PassiveTwin._moment_beside_nm: return moment_nm -> ": _LONGER_WAY,
+        "PassiveTwin._judge: on_record = self.amplified or self._record_power > RECORD ** 2 * "
+        "self._twin_record_power -> on_record = self.amplified or self._record_power >= "
+        "RECORD ** 2 * self._twin_record_power": _NEVER_THERE,
+        "PassiveTwin._judge: self.amplified = self._losing_s > self._patience_s -> "
+        "self.amplified = self._losing_s >= self._patience_s": _NEVER_THERE,
+        "PassiveTwin._righting_nm: if heel > self._piece_rad: -> if heel >= self._piece_rad:": (
+            "where two pieces meet they are equal"
+        ),
+        "PassiveTwin._righting_nm: index = min(int(heel / self._piece_rad), len(self._pieces) - 1) "
+        "-> index = min(int(heel / self._piece_rad), len(self._pieces) - 2)": (
+            "the last two pieces are one polynomial: there is no knot between them"
+        ),
+        "PassiveTwin._righting_nm: return value if roll_rad >= 0 else -value -> "
+        "return value if roll_rad > 0 else -value": "upright it is zero either way",
+    },
 }
 
 
@@ -219,6 +329,8 @@ class Target:
 
 _NODE = ("tests/runtime/test_controller_node.py", "tests/runtime/test_controller_faults.py")
 _SUPERVISOR = "tests/runtime/test_supervisor.py"
+_MONITORS = "utank_hil/runtime/monitors"
+_SMALL = "tests/runtime/monitors/test_small_monitors.py"
 
 TARGETS = (
     Target("utank_hil/runtime/supervisor.py", (_SUPERVISOR,), _NODE),
@@ -267,5 +379,35 @@ TARGETS = (
             "tests/firmware_sim/test_vessel_without_pump.py",
             "tests/faults/test_retuning_events.py",
         ),
+    ),
+    Target(
+        f"{_MONITORS}/level_stuck.py",
+        ("tests/runtime/monitors/test_level_stuck.py",),
+        ("tests/runtime/monitors/test_tank_equation.py",),
+    ),
+    Target(
+        f"{_MONITORS}/volume.py",
+        ("tests/runtime/monitors/test_volume.py", _SMALL),
+    ),
+    Target(f"{_MONITORS}/noise.py", ("tests/runtime/monitors/test_noise.py",), (_SMALL,)),
+    Target(f"{_MONITORS}/spikes.py", ("tests/runtime/monitors/test_spikes.py",), (_SMALL,)),
+    Target(f"{_MONITORS}/senders.py", ("tests/runtime/monitors/test_senders.py",)),
+    Target(
+        f"{_MONITORS}/drive.py",
+        ("tests/runtime/monitors/test_drive_following.py",),
+        (_SMALL,),
+    ),
+    Target(
+        f"{_MONITORS}/motion.py",
+        ("tests/runtime/monitors/test_motion_sums.py",),
+        ("tests/runtime/monitors/test_roll_against_rate.py",),
+    ),
+    Target(f"{_MONITORS}/motion_watch.py", ("tests/runtime/monitors/test_motion_watch.py",)),
+    Target(f"{_MONITORS}/motion_pair.py", ("tests/runtime/monitors/test_motion_pair.py",)),
+    Target(f"{_MONITORS}/thresholds.py", ("tests/runtime/monitors/test_thresholds.py",)),
+    Target(
+        "utank_hil/runtime/passive_twin.py",
+        ("tests/runtime/test_passive_twin_judging.py",),
+        ("tests/runtime/test_passive_twin.py",),
     ),
 )

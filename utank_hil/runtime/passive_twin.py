@@ -196,4 +196,4 @@ class PassiveTwin:
         value = 0.0
         for coefficient in piece:
             value = value * since + coefficient
-        return math.copysign(value, roll_rad)
+        return value if roll_rad >= 0 else -value

@@ -1,3 +1,4 @@
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import pytest
@@ -144,3 +145,142 @@ def test_three_frames_a_second_with_a_wrong_crc_are_found(every_s: float, found:
         counted.rejected[Rejection.REPEATED] = k  # others do not count
         seen |= senders.update(0, STEP_S)
     assert bool(seen & Finding.DAMAGED) is found
+
+
+CYCLE_NS = 125_000_000
+"""Four in a look of half a second: nothing is rounded."""
+
+
+def looks(*came: tuple[int, int], silent_s: float = 1.0) -> list[int]:
+    """What a stream finds, every half a second, of so many frames heard and lost since then."""
+    counted = Counted(CYCLE_NS, heard=7, lost=3)
+    stream, found = Stream(counted, silent_s=silent_s), []
+    for heard, lost in came:
+        counted.heard += heard
+        counted.lost += lost
+        found.append(stream.update(0.5))
+    return found
+
+
+SECOND, LOST, SILENT = Finding.SECOND_SENDER, Finding.FRAMES_LOST, Finding.NODE_SILENT
+
+
+@pytest.mark.parametrize("looks_before", [0, 3])
+def test_more_than_eight_frames_above_a_quarter_are_a_second_sender_and_soon_forgotten(
+    looks_before: int,
+) -> None:
+    before = [(4, 0)] * looks_before
+    none = [0] * looks_before
+    assert looks(*before, (5 + 8, 0)) == [*none, 0]
+    assert looks(*before, (5 + 9, 0)) == [*none, SECOND]
+    assert looks(*before, (5 + 4, 0), (5 + 5, 0)) == [*none, 0, SECOND]
+    assert looks(*before, (999, 0), (0, 0), (0, 0)) == [*none, SECOND, SECOND, 0]
+    # lost ones too, of which five are besides too many
+    assert looks(*before, (13, 1)) == [*none, SECOND]
+
+
+def test_fewer_than_three_quarters_for_more_than_two_seconds_are_frames_lost() -> None:
+    assert looks(*[(2, 0)] * 5) == [0, 0, 0, 0, LOST]
+    assert looks(*[(3, 0)] * 5) == looks(*[(1, 2)] * 1, *[(3, 0)] * 4) == [0] * 5
+    assert looks(*[(2, 0)] * 4, (3, 0), *[(2, 0)] * 5) == [0] * 9 + [LOST]
+    # a silence is not counted and ends nothing
+    assert looks(*[(2, 0)] * 4, (0, 0), (2, 0)) == [0] * 5 + [LOST]
+
+
+def test_a_silence_of_more_than_its_limit_is_found_until_a_frame_comes() -> None:
+    quiet = [(0, 0)] * 3
+    assert looks(*quiet, (4, 0), *quiet) == [0, 0, SILENT, 0, 0, 0, SILENT]
+    assert looks(*[(0, 0)] * 9, silent_s=3.75) == [0] * 7 + [SILENT] * 2
+    assert looks(*[(2, 0)] * 5, *quiet) == [0] * 4 + [LOST] * 3 + [LOST | SILENT]
+
+
+@pytest.mark.parametrize("looks_before", [0, 3])
+def test_more_than_five_above_a_thousandth_are_frames_lost_and_forgotten_in_a_thousand(
+    looks_before: int,
+) -> None:
+    before = [(4, 0)] * looks_before
+
+    def lost(*came: tuple[int, int]) -> list[bool]:
+        return [bool(found & LOST) for found in looks(*before, *came)[looks_before:]]
+
+    assert lost((994, 6)) == [False]
+    assert lost((993, 6)) == [True]
+    assert lost((4, 5)) == [False]
+    assert lost((4, 3), (4, 3)) == [False, True]
+    assert lost((4, 99), (999, 0), (4, 0)) == [True, True, False]
+    assert lost((4, 99), (1000, 0)) == [True, False]
+
+
+def test_a_stream_that_nobody_awaits_may_be_silent_and_has_no_damaged_frame_before_a_look() -> None:
+    counted = Counted(CYCLE_NS, rejected={Rejection.CRC: 5})
+    stream = Stream(counted)
+    assert stream.damaged == 0
+    assert not any(stream.update(10.0) for _ in range(10))
+    assert stream.damaged == 0
+
+
+@pytest.mark.parametrize("quiet", range(4))
+def test_every_stream_is_looked_at_in_every_second_call(quiet: int) -> None:
+    streams = [Counted(CYCLE_NS) for _ in range(4)]
+    senders = Senders([Stream(each, silent_s=1.0) for each in streams], 1600.0)
+    found = []
+    for k in range(10):
+        for index, each in enumerate(streams):
+            each.heard += 2 * (index != quiet or k >= 6)
+        found.append(senders.update(0, 0.25))
+    # half a second a look, in the first a quarter of the one, and said again in the next call
+    if quiet % 2 == 0:
+        assert found == [0] * 4 + [SILENT] * 2 + [0] * 4
+    else:
+        assert found == [0] * 5 + [SILENT] * 2 + [0] * 3
+
+
+def test_a_look_spans_both_calls_however_long_each_was() -> None:
+    senders = Senders([Stream(Counted(CYCLE_NS), silent_s=1.0), Stream(Counted())], 1600.0)
+    calls_s = (0.25, 0.125, 0.5, 0.125, 0.0625, 0.5)
+    assert [senders.update(0, each_s) for each_s in calls_s] == [0, 0, 0, 0, SILENT, SILENT]
+
+
+def damage(frames: Sequence[int], step_s: float = 0.25) -> list[bool]:
+    """Whether so many damaged frames in each call are found."""
+    counted = Counted(CYCLE_NS, heard=1)
+    senders, found = Senders([Stream(counted)], 1600.0), []
+    for each in frames:
+        counted.rejected[Rejection.CRC] += each
+        found.append(bool(senders.update(0, step_s) & Finding.DAMAGED))
+    return found
+
+
+def test_three_damaged_frames_within_a_second_are_found_and_forgotten_after_it() -> None:
+    # looked at in every second call
+    assert damage([3, *[0] * 7]) == [True] * 5 + [False] * 3
+    assert damage([2, *[0] * 7]) == [False] * 8
+    assert damage([99, *[0] * 7]) == [True] * 5 + [False] * 3
+    assert damage([1, 0, 1, 0, 1, 0, 0]) == [False] * 4 + [True] + [False] * 2
+    assert damage([2, 0, 0, 0, 1, 0, 0]) == [False] * 4 + [True] + [False] * 2
+    assert damage([2, 0, 0, 0, 0, 0, 1]) == [False] * 7
+    assert damage([1, 0, 2, 0, 0, 0, 0, 0]) == [False, False, True, True, True] + [False] * 3
+    assert damage([3, 0, 0, 0, 1], step_s=0.3125) == [True] * 4 + [False]
+
+
+@pytest.mark.parametrize("calls_before", [0, 3])
+def test_more_than_forty_frames_above_a_tenth_of_the_bus_are_a_flood_and_soon_forgotten(
+    calls_before: int,
+) -> None:
+    def floods(*new: int) -> list[int]:
+        senders, foreign, found = Senders((), 1600.0), 0, []
+        for each in (*[40] * calls_before, *new):
+            foreign += each
+            found.append(senders.update(foreign, 0.25))
+        assert found[:calls_before] == [0] * calls_before
+        return found[calls_before:]
+
+    assert floods(80) == [0]
+    assert floods(81, 40, 39) == [Finding.FLOOD, Finding.FLOOD, 0]
+    assert floods(999, 1, 0, 0) == [Finding.FLOOD, Finding.FLOOD, 0, 0]
+    assert floods(0, 0, 0, 80) == [0] * 4
+
+
+def test_a_flood_hides_nothing_else_that_is_found_in_this_call_or_the_one_before() -> None:
+    senders = Senders([Stream(Counted(CYCLE_NS), silent_s=0.125)], 1600.0)
+    assert [senders.update(999 * k, 0.25) for k in (1, 2)] == [Finding.FLOOD | SILENT] * 2
