@@ -133,6 +133,8 @@ class Row(Section):
         stop and within 1,040 ms of the beginning of a ramp.
     codes : tuple of str
         Faults that it may be called.
+    may_end : tuple of str
+        Faults in which a run may end later than `followed_s`, in the minutes of the roll.
     hardwired_stop : bool
         No command can take the pressure away: that needs the hard-wired stop, and is not judged.
     counts_from : dict of str to float
@@ -162,6 +164,7 @@ class Row(Section):
     halved_within_ms: Positive | None = None
     zero_within_ms: Positive | None = None
     codes: tuple[FaultName, ...] = ()
+    may_end: tuple[FaultName, ...] = ()
     hardwired_stop: bool = False
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
     roll_window_s: Positive | None = None

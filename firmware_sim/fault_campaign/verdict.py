@@ -178,7 +178,9 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         limit_ms = _zero_limit_ms(row, outcome)
         if limit_ms is not None and zero_ms > limit_ms:
             yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
-    if row.reaction in ("halve", "alarm", "note", "none") and outcome.mode != "ACTIVE":
+    ended_late = outcome.found_ms is None and outcome.code in row.may_end
+    in_charge = outcome.mode == "ACTIVE" or ended_late
+    if row.reaction in ("halve", "alarm", "note", "none") and not in_charge:
         yield f"ended in {outcome.mode}, {outcome.code}"
     if row.reaction in ("alarm", "note", "none") and outcome.halved_ms is not None:
         yield "halved the pressure"

@@ -137,6 +137,14 @@ def test_each_reaction_asks_for_its_own() -> None:
     assert not verdict("held-arm-bit", replace(refused, was_active=True)).passed
 
 
+def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
+    noisy = replace(GOOD, found_ms=None, halved_ms=50.0, alarms=("NOISE",), code="DRIFT")
+    assert verdict("noise-10-fold", noisy).passed
+    assert not verdict("noise-10-fold", replace(noisy, code="OVERRUN")).passed
+    assert not verdict("noise-10-fold", replace(noisy, found_ms=3000.0)).passed
+    assert not verdict("level-noise", noisy).passed
+
+
 def test_a_ramp_that_comes_before_the_stop_has_the_stops_time() -> None:
     ramp = replace(GOOD, code="DRIFT", found_ms=100.0, zero_ms=1200.0)
     assert verdict("roll-sign-flipped", ramp).passed
