@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from utank_hil.commands.terminal import Terminal
+from utank_hil.commands.terminal import Terminal, new_table
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
 
@@ -45,3 +45,17 @@ def test_an_empty_cell_has_no_line_of_its_own_in_a_list() -> None:
     text = printed(30)
     assert text.count("significant") == 1
     assert text.count("roll RMS") == 2
+
+
+def test_what_rich_would_take_for_markup_or_a_picture_is_printed_as_it_is() -> None:
+    output = io.StringIO()
+    terminal = Terminal(file=output, width=40)
+    name = "law [/b] [red] :warning:"
+    terminal.say(name)
+    terminal.say(f"{name} on a line that is longer than the terminal", red=f"{name}:")
+    table = new_table(name, name, names=(name,), caption=name)
+    table.add_row(name, name)
+    terminal.table(table)
+    lines = output.getvalue().splitlines()
+    assert lines[:2] == [name, f"{name}: {name} on a line that is longer than the terminal"]
+    assert output.getvalue().count(name) >= 6
