@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from utank_hil.canbus import Fault, Mode
 from utank_hil.cli import app
+from utank_hil.commands import commission as commissioning
 from utank_hil.commands import run as module
 from utank_hil.commands.exit_codes import ExitCode
 
@@ -64,6 +65,21 @@ def test_run_that_the_system_refuses_memory_is_started_again(
     assert result.stderr.splitlines()[-1] == "error: /psm_1: Too many open files"
     unit = Path("deploy/utank-hil.service").read_text(encoding="utf-8")
     assert f"RestartPreventExitStatus={ExitCode.USAGE:d}\n" in unit
+
+
+def test_commission_that_is_refused_a_process_can_be_started_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def refuse() -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(commissioning, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(commissioning, "AlarmLines", refuse)
+    words = ["commission", str(GPC), "--bus", "any0", "--record", str(tmp_path / "record.json")]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == ExitCode.SYSTEM
+    assert "Resource temporarily unavailable" in result.stderr
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("number", "named"), [(errno.ENOMEM, True), (errno.EBADF, False)])

@@ -77,7 +77,7 @@ def test_every_frame_is_in_the_log_in_its_order_with_its_time(
 ) -> None:
     expected = [
         (time_ns * 1e-9, number, data, kind == Kind.RECEIVED)
-        for kind, _, _, number, time_ns, data in entries
+        for number, data, kind, time_ns in entries
         if kind in (Kind.RECEIVED, Kind.SENT)
     ]
     found = frames_in(exported(tmp_path, name))
@@ -138,7 +138,7 @@ def test_a_table_of_the_frames_shows_what_the_telemetry_showed(entries: list[Ent
         node = build_controller_node(
             config, build_law(config), commissioned=True, sink=lambda row: rows.append(row.copy())
         )
-    for kind, _, _, number, time_ns, data in entries:
+    for number, data, kind, time_ns in entries:
         if kind == Kind.RECEIVED:
             node.receive(Frame(number, data), time_ns)
         elif kind == Kind.TICK:

@@ -84,7 +84,7 @@ def test_a_run_in_real_time_is_replayed_bit_for_bit(folder: Path) -> None:
     assert found["frames"] > found["ticks"] / 2
     drove = [
         data
-        for kind, _, _, number, _, data in entries_of(FrameLog(log_of(folder)).blocks())
+        for number, data, kind, _ in entries_of(FrameLog(log_of(folder)).blocks())
         if kind == Kind.SENT and number == COMMANDS.can_id and COMMANDS.decode(data).pressure_pa
     ]
     assert drove

@@ -29,7 +29,7 @@ MOST_BYTES = 600_000
 def statuses(name: str) -> tuple[ControllerStatus, ...]:
     """What the controller said of itself in a recording."""
     entries = entries_of(FrameLog(LOGS / f"{name}.frames").blocks())
-    sent = (STATUS.decode(data) for kind, _, _, number, _, data in entries
+    sent = (STATUS.decode(data) for number, data, kind, _ in entries
             if kind == Kind.SENT and number == STATUS.can_id)  # fmt: skip
     return tuple(status for status in sent if status is not None)
 
@@ -96,7 +96,7 @@ def test_a_changed_reaction_is_named_by_the_mode_that_differs() -> None:
 
 def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
     log = FrameLog(LOGS / "retuned-and-undone.frames")
-    entries = (entry for entry in entries_of(log.blocks()) if entry[0] != Kind.ANSWER)
+    entries = (entry for entry in entries_of(log.blocks()) if entry.kind != Kind.ANSWER)
     with recorded_config(log.head) as config:
         result = replay(entries, config, build_law(config), retuner=True, estimating=True)
     assert result.first is not None

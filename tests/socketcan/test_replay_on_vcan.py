@@ -73,7 +73,7 @@ def wait_for_listener() -> None:
 def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> None:
     path = first_that_can_be_judged(driven, tmp_path)
     log = FrameLog(path)
-    kinds = {entry[0] for entry in entries_of(log.blocks())}
+    kinds = {entry.kind for entry in entries_of(log.blocks())}
     assert {Kind.STARTED, Kind.LINK_ERROR, Kind.STOP} <= kinds
     with recorded_config(log.head) as config:
         law = build_law(config)
@@ -87,7 +87,7 @@ def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> 
 
 def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path) -> None:
     entries = list(entries_of(FrameLog(KEPT).blocks()))
-    first = list(takewhile(lambda entry: entry[4] < PLAYED_NS, entries))
+    first = list(takewhile(lambda entry: entry.time_ns < PLAYED_NS, entries))
     file = tmp_path / "kept.log"
     write_bus_log(file, first)
     candump = Candump(tmp_path)
@@ -109,7 +109,5 @@ def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path
         if (parts := re.fullmatch(LINE, line))
     ]
     assert heard == [
-        (number, data)
-        for kind, _, _, number, _, data in first
-        if kind in (Kind.RECEIVED, Kind.SENT)
+        (number, data) for number, data, kind, _ in first if kind in (Kind.RECEIVED, Kind.SENT)
     ]

@@ -118,7 +118,7 @@ def recorded(case: Case, told: set[Mode | Fault], processes: ProcessPoolExecutor
     controller = processes.submit(run_controller, job, CHANNEL, Together())
     processes.submit(run_ship, case).result()
     statistics = controller.result().loop.statistics
-    sent = (STATUS.decode(data) for kind, _, _, number, _, data in entries(file)
+    sent = (STATUS.decode(data) for number, data, kind, _ in entries(file)
             if kind == Kind.SENT and number == STATUS.can_id)  # fmt: skip
     statuses = [status for status in sent if status is not None]
     modes = [status.mode for status in statuses]

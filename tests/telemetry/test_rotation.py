@@ -174,3 +174,11 @@ def test_a_clock_that_was_set_back_does_not_cost_the_run_its_own_parts(tmp_path:
         os.utime(path, (time_s, time_s))
     assert remove_oldest(part_of(file, 3), 2500) == [before]
     assert remove_oldest(part_of(file, 3), 1500) == [file]
+
+
+def test_a_file_that_somebody_else_removes_meanwhile_ends_no_recording(tmp_path: Path) -> None:
+    """A link to nowhere is as such a file: it has a name, and nothing is known of it."""
+    (tmp_path / "run-1.rrd").symlink_to(tmp_path / "gone")
+    old = tmp_path / "run-2.rrd"
+    old.write_bytes(bytes(1000))
+    assert remove_oldest(tmp_path / "run-3.rrd", 500) == [old]

@@ -68,7 +68,7 @@ def commission(
         try:
             lines = AlarmLines()
         except OSError as error:
-            fail(f"no process to print on the terminal: {error}")
+            fail(f"no process to print on the terminal: {error}", ExitCode.SYSTEM)
         stack.callback(lines.close)
 
         def tell(event: RetuningEvent | AlarmEvent, start_ns: int) -> None:

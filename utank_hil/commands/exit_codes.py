@@ -29,8 +29,7 @@ class ExitCode(IntEnum):
         "`check`, `commission`, `identify`, `init`, `faults`, `replay`",
         "A law misses its margins, a commissioning is not passed, a model or its law is refused, "
         "no tank can be for a ship, a row of the fault campaign failed, or a replay differs. Of "
-        "any command, with a traceback: an "
-        "error in the program.",
+        "any command, with a traceback: an error in the program.",
     )
     USAGE = (
         2,
@@ -57,7 +56,7 @@ class ExitCode(IntEnum):
     )
     SYSTEM = (
         7,
-        "`run`, `bench`, `faults`",
+        "`run`, `commission`, `bench`, `faults`",
         "The system refused what the command needs, such as a process or shared memory, or a "
         "process of it was killed. `bench` and `faults` keep what there is. Starting again may "
         "help.",

@@ -58,7 +58,7 @@ def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
     suffix, count, begin_ns = path.suffix.lower(), 0, None
     mode = "wb" if suffix == ".blf" else "w"
     with left_whole(path), path.open(mode) as content, _writer(content, suffix) as writer:
-        for kind, _, _, number, time_ns, data in entries:
+        for number, data, kind, time_ns in entries:
             begin_ns = time_ns if begin_ns is None else begin_ns
             if kind not in (Kind.RECEIVED, Kind.SENT):
                 continue
@@ -100,44 +100,45 @@ def read_bus_log(path: Path) -> list[Entry]:
         time_ns = round((message.timestamp - begin_s) * 1e6) * 1000
         frame = Frame(message.arbitration_id, bytes(message.data))
         if not message.is_extended_id or message.is_remote_frame or message.is_error_frame:
-            received.append((Kind.OTHERS, 0, 0, 1, time_ns, b""))
+            received.append(Entry(1, b"", Kind.OTHERS, time_ns))
         elif not message.is_rx if marked else frame.can_id in own_ids:
             sent.append((time_ns, frame))
         else:
-            received.append((Kind.RECEIVED, len(frame.data), 0, frame.can_id, time_ns, frame.data))
+            received.append(Entry(*frame, Kind.RECEIVED, time_ns))
     return list(_in_ticks(received, sent))
 
 
 def begins_with_the_controller(entries: Iterable[Entry]) -> bool:
     """Whether the first frame that the controller sent is its address claim."""
     claim = load_catalogue().codec(AddressClaim, Address.CONTROLLER).can_id
-    first = next((entry for entry in entries if entry[0] == Kind.SENT), None)
-    return first is not None and first[3] == claim
+    first = next((entry for entry in entries if entry.kind == Kind.SENT), None)
+    return first is not None and first.number == claim
 
 
 def _in_ticks(received: list[Entry], sent: list[tuple[int, Frame]]) -> Iterator[Entry]:
     """Entries with the ticks between them; a tick's own frames follow it."""
-    begin_ns = sent[0][0] if sent else received[0][4]
+    begin_ns = sent[0][0] if sent else received[0].time_ns
     by_tick: dict[int, list[Frame]] = {}
     for time_ns, frame in sent:
         by_tick.setdefault((time_ns - begin_ns + _EARLY_NS) // TICK_NS, []).append(frame)
     status = load_catalogue().codec(ControllerStatus)
     said = next((status.decode(f.data) for _, f in sent if f.can_id == status.can_id), None)
-    yield Kind.STARTED, 1, 0, 0, begin_ns, bytes([said is None or not said.not_realtime])
-    last_ns = max([received[-1][4] if received else 0, sent[-1][0] if sent else 0])
+    real_time = said is None or not said.not_realtime
+    yield Entry(0, bytes([real_time]), Kind.STARTED, begin_ns)
+    last_ns = max(received[-1].time_ns if received else 0, sent[-1][0] if sent else 0)
     last_own = max(by_tick, default=-1)
     waiting = iter(received)
     entry = next(waiting, None)
     for tick in range(math.ceil((last_ns - begin_ns) / TICK_NS) + 1):
         now_ns = begin_ns + tick * TICK_NS
-        while entry is not None and entry[4] <= now_ns:
+        while entry is not None and entry.time_ns <= now_ns:
             yield entry
             entry = next(waiting, None)
         # the last frames of all may be what a controller leaves behind, after its last tick
         leaves = tick == last_own and _only_stops(by_tick[tick])
-        yield Kind.STOP if leaves else Kind.TICK, 0, 0, 0, now_ns, b""
-        for can_id, data in by_tick.get(tick, ()):
-            yield Kind.SENT, len(data), 0, can_id, now_ns, data
+        yield Entry(0, b"", Kind.STOP if leaves else Kind.TICK, now_ns)
+        for frame in by_tick.get(tick, ()):
+            yield Entry(*frame, Kind.SENT, now_ns)
 
 
 def _only_stops(frames: list[Frame]) -> bool:

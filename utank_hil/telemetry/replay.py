@@ -9,7 +9,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple
 
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, build_law
@@ -22,10 +22,16 @@ from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay_head import causes
 
-Entry: TypeAlias = tuple[int, int, int, int, int, bytes]
-"""kind, length, spare, number, time in ns, data."""
-
 _NOTHING: Final = "nothing"
+
+
+class Entry(NamedTuple):
+    """One record, its fields in the order of `LAYOUT`."""
+
+    number: int
+    data: bytes
+    kind: int
+    time_ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +142,7 @@ class RecordedRetuner:
 def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
     """Records one by one."""
     for block in blocks:
-        for number, data, kind, time_ns in LAYOUT.iter_unpack(block.tobytes()):
-            yield kind, len(data), 0, number, time_ns, data
+        yield from map(Entry._make, LAYOUT.iter_unpack(block.tobytes()))
 
 
 def replay_log(
@@ -194,7 +199,7 @@ def replay(
     sent: list[Frame] = []
     recorded: list[Frame] = []
     waiting = False
-    for kind, _, _, number, time_ns, data in entries:
+    for number, data, kind, time_ns in entries:
         if kind == Kind.SENT:
             recorded.append(Frame(number, data))
             continue

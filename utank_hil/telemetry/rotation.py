@@ -1,5 +1,8 @@
 """How long a file of a recording may be, and how many stay; imports no Rerun."""
 
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -54,8 +57,14 @@ def make_room(file: Path, number: int, rotation: Rotation | None) -> None:
 
 def bytes_of(file: Path) -> int:
     """Size of a recording, all its files together."""
-    files = (file.with_suffix(suffix) for suffix in SUFFIXES)
-    return sum(path.stat().st_size for path in files if path.exists())
+    return sum(status.st_size for _, status in _found(file.with_suffix(s) for s in SUFFIXES))
+
+
+def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, os.stat_result]]:
+    """Files and what is known of them; whoever else clears the folder may be quicker."""
+    for path in paths:
+        with suppress(FileNotFoundError):
+            yield path, path.stat()
 
 
 def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
@@ -72,27 +81,27 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     list of Path
         What was removed.
     """
-    alike: dict[str, list[Path]] = {}
+    alike: dict[str, dict[Path, os.stat_result]] = {}
     for suffix in SUFFIXES:
-        for path in file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}"):
+        for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
             if path.stem != file.stem:
-                alike.setdefault(path.stem, []).append(path)
-    found = [([path.stat() for path in paths], paths) for paths in alike.values()]
+                alike.setdefault(path.stem, {})[path] = status
     own, _ = whole_of(file)  # newer than all others, even by a clock that was set back
-    found.sort(
-        key=lambda each: (
-            whole_of(each[1][0])[0].stem == own.stem,
-            max(status.st_mtime_ns for status in each[0]),
-            each[1][0].stem,
-        )
-    )
-    left = sum(status.st_size for statuses, _ in found for status in statuses)
+
+    def age(stem: str) -> tuple[bool, int, str]:
+        of_own_run = whole_of(file.with_stem(stem))[0].stem == own.stem
+        return of_own_run, max(status.st_mtime_ns for status in alike[stem].values()), stem
+
+    sizes = {
+        stem: sum(status.st_size for status in files.values()) for stem, files in alike.items()
+    }
+    left = sum(sizes.values())
     removed = []
-    for statuses, paths in found:
+    for stem in sorted(alike, key=age):
         if left <= keep_bytes:
             break
-        for path in paths:
+        for path in alike[stem]:
             path.unlink(missing_ok=True)
-        left -= sum(status.st_size for status in statuses)
-        removed += paths
+        left -= sizes[stem]
+        removed += alike[stem]
     return removed

@@ -74,7 +74,7 @@ def signal_table(entries: Iterable[Entry]) -> dict[str, FloatArray]:
     codecs = load_catalogue().codecs
     heard = {codec.can_id: _Heard(codec) for codec in codecs.values()}
     times_ns = array("q")
-    for kind, _, _, number, time_ns, data in entries:
+    for number, data, kind, time_ns in entries:
         if kind == Kind.TICK:
             times_ns.append(time_ns)
         elif kind in (Kind.RECEIVED, Kind.SENT) and number in heard:
