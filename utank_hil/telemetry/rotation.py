@@ -96,7 +96,7 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
         stem: sum(status.st_size for status in files.values()) for stem, files in alike.items()
     }
     left = sum(sizes.values())
-    removed = []
+    removed: list[Path] = []
     for stem in sorted(alike, key=age):
         if left <= keep_bytes:
             break
