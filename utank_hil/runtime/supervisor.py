@@ -192,7 +192,6 @@ class Supervisor:
         self.drive_wanted = mode is Mode.PASSIVE
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
         self._reset_until_ns = None
-        self.reset_refused_by = Fault.NONE
 
     def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
         self.mode = Mode.FAULT
