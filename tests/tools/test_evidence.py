@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tools.documents import tables, write
+from tools.documents import sea_tables, tables, write
 from tools.evidence import record, sources
 from tools.evidence.__main__ import main
 from tools.evidence.parts import PARTS, Part
@@ -197,7 +197,7 @@ def test_measured_hours_are_counted_by_their_roll_and_judged_by_their_intervals(
         return {"runs": {"passive": passive, "self-tuning": law}}
 
     groups = [group(0.2, 0.5, 0.1, 100), group(1.5, -0.2, 0.1, 500), group(1.6, -0.1, 0.2, 700)]
-    heading, *rows = tables.february_hours({"groups": groups})
+    heading, *rows = sea_tables.february_hours({"groups": groups})
     assert [row[0] for row in rows] == ["below 0.25°", "above 1°", "all"]
     assert rows[1][1:] == ["2", "-15.0%", "-20% ± 10", "1", "600", "1.2"]
     assert rows[2][1:] == ["3", "6.7%", "-20% ± 10", "1", "433", "1.3"]
@@ -214,7 +214,7 @@ def test_seas_under_way_are_told_by_share_and_power_and_their_mean_is_last() -> 
     )
     mean = dict.fromkeys(renewed_seas.LAWS, storm["renewed"])
     result = {"seas": {"calm": calm, "storm": storm}, "mean of the first sixteen": mean}
-    heading, *rows = tables.renewed_seas(result)
+    heading, *rows = sea_tables.renewed_seas(result)
     half = round(100 * 0.1 * math.sqrt(2) * 12.706 / math.sqrt(2))  # Student's t, one of freedom
     assert rows[0][:5] == ["calm", "2.00", *3 * [f"30% ± {half}"]]
     assert rows[1][5:] == ["35.0%", "100", "100", "100"]
@@ -242,5 +242,5 @@ def test_a_ship_that_is_not_told_is_counted_and_has_no_error() -> None:
     parts = [part("GOOD", -0.06), part("GOOD", 0.04), part("UNCERTAIN", 0.5)]
     (row,) = sea_estimates.loadings([*parts, part("GOOD", 0.9, "passive")])
     assert (row["parts"], row["told"], row["within"], row["worst"]) == (3, 2, 1, 0.06)
-    told = tables.stiffness_by_loading({"loadings": [row]})[1]
+    told = sea_tables.stiffness_by_loading({"loadings": [row]})[1]
     assert told == ["20", "8.8", "3", "2", "1", "6.0%"]
