@@ -330,7 +330,6 @@ class Target:
 _NODE = ("tests/runtime/test_controller_node.py", "tests/runtime/test_controller_faults.py")
 _SUPERVISOR = "tests/runtime/test_supervisor.py"
 _MONITORS = "utank_hil/runtime/monitors"
-_SMALL = "tests/runtime/monitors/test_small_monitors.py"
 
 TARGETS = (
     Target("utank_hil/runtime/supervisor.py", (_SUPERVISOR,), _NODE),
@@ -385,17 +384,14 @@ TARGETS = (
         ("tests/runtime/monitors/test_level_stuck.py",),
         ("tests/runtime/monitors/test_tank_equation.py",),
     ),
-    Target(
-        f"{_MONITORS}/volume.py",
-        ("tests/runtime/monitors/test_volume.py", _SMALL),
-    ),
-    Target(f"{_MONITORS}/noise.py", ("tests/runtime/monitors/test_noise.py",), (_SMALL,)),
-    Target(f"{_MONITORS}/spikes.py", ("tests/runtime/monitors/test_spikes.py",), (_SMALL,)),
+    Target(f"{_MONITORS}/volume.py", ("tests/runtime/monitors/test_volume.py",)),
+    Target(f"{_MONITORS}/noise.py", ("tests/runtime/monitors/test_noise.py",)),
+    Target(f"{_MONITORS}/spikes.py", ("tests/runtime/monitors/test_spikes.py",)),
     Target(f"{_MONITORS}/senders.py", ("tests/runtime/monitors/test_senders.py",)),
     Target(
         f"{_MONITORS}/drive.py",
         ("tests/runtime/monitors/test_drive_following.py",),
-        (_SMALL,),
+        ("tests/runtime/monitors/test_drive_of_the_first_ship.py",),
     ),
     Target(
         f"{_MONITORS}/motion.py",

@@ -1,8 +1,10 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from moving_ship import THRESHOLDS
 
 from utank_hil.runtime.monitors.noise import Noise, SecondDifference, within
 
@@ -55,3 +57,16 @@ def test_second_difference_is_the_curvature_of_a_parabola_and_none_before_its_th
         values = [bend.update(a + b * k + c * k**2) for k in range(6)]
         assert values == pytest.approx([0, 0, 2 * c, 2 * c, 2 * c, 2 * c], abs=1e-12)
         bend.restart()
+
+
+@pytest.mark.parametrize(("times", "expected"), [(1, False), (2, False), (10, True), (100, True)])
+def test_noise_ten_times_the_figure_is_found_within_two_seconds(
+    times: float, expected: bool
+) -> None:
+    random = np.random.default_rng(1)
+    noise, smooth = Noise(math.sqrt(6) * THRESHOLDS.rate_noise_rad_s), SecondDifference()
+    found = False
+    for k in range(40):
+        rate = 0.06 * math.sin(0.6 * 0.05 * k) + times * 5e-4 * random.standard_normal()
+        found |= noise.update(smooth.update(rate), 0.05)
+    assert found is expected

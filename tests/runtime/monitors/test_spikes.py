@@ -1,11 +1,13 @@
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from moving_ship import THRESHOLDS
 
 from utank_hil.runtime.monitors.spikes import MotionGate, SpikeCount, SpikeGate, SpikeGates
 
-S = 1_000_000_000
+MS, S = 1_000_000, 1_000_000_000
 APART = replace(
     THRESHOLDS,
     roll_spike_rad=1.0, roll_most_rad_s=2.0,
@@ -100,3 +102,21 @@ def test_a_second_is_a_second_in_steps_of_any_length() -> None:
             assert not count.update(4, 1 / steps), k
         assert not count.update(5, 0.0)  # three and one
         assert count.update(6, 0.0)
+
+
+def test_one_spike_is_discarded_and_the_next_sample_is_taken() -> None:
+    gate = SpikeGate(0.01, 0.5)
+    assert gate.passes(0.1, 0)
+    assert not gate.passes(0.6, 10 * MS)
+    assert gate.passes(0.1, 20 * MS)
+    assert gate.discarded == 1
+
+
+@given(st.floats(-1, 1), st.integers(1, 1000), st.floats(0, 1))
+def test_what_moves_no_faster_than_it_can_always_passes(
+    start: float, elapsed_ms: int, share: float
+) -> None:
+    gate = SpikeGate(0.01, 0.5)
+    gate.passes(start, 0)
+    move = share * (0.01 + 0.5 * elapsed_ms * 1e-3) * 0.999
+    assert gate.passes(start + move, elapsed_ms * MS)

@@ -1,6 +1,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from moving_ship import THRESHOLDS
 
@@ -60,3 +61,38 @@ def test_noise_is_what_the_smoothed_sum_leaves_of_the_sum() -> None:
     volume.update(0.0, 0.0, 0.7)
     assert volume.update(1.0, 1.0, 0.7) == Finding.NOISE | Finding.VOLUME
     assert volume.update(8.0, 8.0, 0.7) == (Finding.NOISE | Finding.VOLUME | Finding.VOLUME_LASTS)
+
+
+def volume_findings(
+    port_error_m: float, seconds: float, noise_m: float = 0.005, port_noise_m: float = 0.0
+) -> list[int]:
+    random, volume = np.random.default_rng(1), Volume(THRESHOLDS)
+    found = []
+    for k in range(round(seconds / 0.1)):
+        level = 2.0 * math.sin(0.06 * k)
+        port, starboard = (max(noise_m, port_noise_m), noise_m) * random.standard_normal(2)
+        found.append(volume.update(port_error_m - level + port, level + starboard, 0.1))
+    return found
+
+
+def test_levels_that_mirror_one_another_are_left_alone() -> None:
+    assert not any(volume_findings(0.0, 600))
+    assert not any(volume_findings(0.8 * THRESHOLDS.volume_m, 60)[30:])
+
+
+def test_a_gauge_that_is_off_degrades_and_ends_if_it_lasts_or_is_far_off() -> None:
+    little = volume_findings(1.5 * THRESHOLDS.volume_m, 60)
+    assert little[50] & Finding.VOLUME
+    assert not little[50] & Finding.VOLUME_LASTS
+    assert little[-1] & Finding.VOLUME_LASTS
+    assert volume_findings(8 * THRESHOLDS.volume_m, 5)[-1] & Finding.VOLUME_LASTS
+
+
+def test_noise_of_one_gauge_is_seen_from_four_times_its_figure() -> None:
+    found = volume_findings(0.0, 60.0, port_noise_m=0.0225)
+    assert np.mean([bool(each & Finding.NOISE) for each in found]) > 0.6
+    assert not any(volume_findings(0.0, 600.0, port_noise_m=0.0075))
+
+
+def test_noise_of_the_gauges_is_seen_in_their_sum() -> None:
+    assert volume_findings(0.0, 2.0, noise_m=0.05)[-1] & Finding.NOISE
