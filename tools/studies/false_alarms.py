@@ -4,13 +4,14 @@
 
 Each law of configs/controllers sails for so many hours in each sea and, where its ship has one, on
 the voyage; a law that can be retuned is retuned every second hour, pulses included. The unit is an
-hour of its own seed. Of every ten minutes the largest statistic of each monitor over its threshold
-is kept (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the same
-command goes on. A Gumbel distribution is fitted to these maxima of one law in one sea; its tail
-beyond 1 is the rate of false alarms there. The aim is one in 1000 hours.
+hour of its own seed. Of each hour the largest statistic of each monitor over its threshold is kept
+(`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the same command goes
+on. A Gumbel distribution is fitted to the hourly maxima; its tail beyond 1 is the rate of false
+alarms. The aim is one in 1000 hours.
 """
 
 import json
+import math
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -32,11 +33,8 @@ from utank_hil.runtime.panel import Action, TimedAction
 
 CACHE = ROOT / ".cache" / "false_alarms"
 HOUR_S = 3600.0
-BLOCK_S = 600.0
 ORDER_RETUNING_S = 400.0
 AIM_PER_HOUR = 1e-3
-LEAST_BLOCKS = 5
-"""Of fewer no distribution is fitted: their share beyond 1 counts."""
 SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
 """Share of the scenario's wave slope: the storm's is what the laws were made for."""
 SCENARIOS = ("storm", "patti_b", "naval_vessel", "semi_active")
@@ -79,9 +77,7 @@ def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, 
     order = (TimedAction(ORDER_RETUNING_S, Action.RETUNE),)
     for seed in range(len(kept) + 1, count + 1):
         ordered = scenario.operator + (order if retunes and seed % 2 == 0 else ())
-        run = margins(
-            scenario.model_copy(update={"operator": ordered}), name, seed, HOUR_S, BLOCK_S
-        )
+        run = margins(scenario.model_copy(update={"operator": ordered}), name, seed, HOUR_S)
         with file.open("a", encoding="utf-8") as growing:
             growing.write(json.dumps(run) + "\n")
         kept.append(run)
@@ -90,21 +86,20 @@ def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, 
 
 
 def rate_per_hour(maxima: list[float]) -> float:
-    """Expected blocks with a statistic beyond 1 per hour, by the tail of their distribution."""
-    blocks = HOUR_S / BLOCK_S
-    if len(maxima) < LEAST_BLOCKS or np.ptp(maxima) == 0:
-        return blocks * float(np.mean(np.array(maxima) > 1)) if maxima else 0.0
-    place, scale = gumbel_r.fit(maxima)
-    return blocks * float(gumbel_r.sf(1.0, place, scale))
+    """Expected hours with a statistic beyond 1 per hour, by the tail of their distribution."""
+    values = np.array([value for value in maxima if math.isfinite(value)])
+    if len(values) < 5 or np.ptp(values) == 0:
+        return float(np.mean(values > 1)) if len(values) else 0.0
+    place, scale = gumbel_r.fit(values)
+    return float(gumbel_r.sf(1.0, place, scale))
 
 
 def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
     """Rates of one law in one sea, by monitor."""
-    blocks = [block for run in runs for block in run["blocks"]]
-    # a monitor that knew nothing in a block says nothing of its rate
+    monitors = sorted({monitor for run in runs for monitor in run["largest"]})
     maxima = {
-        monitor: [round(block[monitor], 4) for block in blocks if monitor in block]
-        for monitor in sorted({monitor for block in blocks for monitor in block})
+        monitor: [round(run["largest"].get(monitor, 0.0), 4) for run in runs]
+        for monitor in monitors
     }
     rates = {monitor: rate_per_hour(values) for monitor, values in maxima.items()}
     found: dict[str, int] = {}
@@ -122,25 +117,21 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def by_monitor(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Largest statistic and rates of each monitor over all laws that are sound."""
-    cases: dict[str, list[dict[str, Any]]] = {}
+def by_monitor(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Largest statistic and rate of each monitor over all hours of the laws that are sound."""
+    pooled: dict[str, list[float]] = {}
     for row in rows:
         if row["law"] not in RIGHTLY_FOUND:
-            for monitor in row["maxima"]:
-                cases.setdefault(monitor, []).append(row)
-    found = {}
-    for monitor, own in cases.items():
-        rates = [row["rate_per_hour"][monitor] for row in own]
-        worst = own[int(np.argmax(rates))]
-        found[monitor] = {
-            "hours": sum(len(row["maxima"][monitor]) for row in own) * BLOCK_S / HOUR_S,
-            "largest": max(max(row["maxima"][monitor]) for row in own),
-            "rate_per_hour": float(np.mean(rates)),
-            "worst": f"{worst['law']}, {worst['sea']}",
-            "worst_rate_per_hour": max(rates),
+            for monitor, maxima in row["maxima"].items():
+                pooled.setdefault(monitor, []).extend(maxima)
+    return {
+        monitor: {
+            "hours": len(maxima),
+            "largest": max(maxima),
+            "rate_per_hour": rate_per_hour(maxima),
         }
-    return found
+        for monitor, maxima in pooled.items()
+    }
 
 
 def rated(case: tuple[str, str, Scenario, int]) -> dict[str, Any]:

@@ -10,7 +10,6 @@ gain's margin is its distance from 1 over the distance at which it is found.
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from firmware_sim.run import SECOND_NS
 from firmware_sim.scenario import Scenario
@@ -48,16 +47,15 @@ def shares(monitors: Monitors) -> dict[str, float]:
 
 
 class Onlooker:
-    """Keeps the largest share of each monitor, block by block, and when each finding came first."""
+    """Keeps the largest share of each monitor, and when each finding came first."""
 
     name = "onlooker"
     period_ns = LOOK_TICKS * TICK_NS
 
-    def __init__(self, node: ControllerNode, block_s: float) -> None:
+    def __init__(self, node: ControllerNode) -> None:
         assert node.monitors is not None
         self._monitors = node.monitors
-        self._block_ns = round(block_s * SECOND_NS)
-        self.blocks: list[dict[str, float]] = []
+        self.largest: dict[str, float] = {}
         self.found_s: dict[str, float] = {}
 
     def receive(self, frame: Frame, now_ns: int) -> None:
@@ -65,28 +63,23 @@ class Onlooker:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Look at the monitors."""
-        if now_ns // self._block_ns >= len(self.blocks):
-            self.blocks.append({})
-        largest = self.blocks[-1]
         for name, share in shares(self._monitors).items():
-            if share > largest.get(name, 0.0):
-                largest[name] = share
+            if share > self.largest.get(name, 0.0):
+                self.largest[name] = share
         if self._monitors.found:
             for finding in Finding(self._monitors.found):
                 self.found_s.setdefault(str(finding.name), now_ns / SECOND_NS)
         return ()
 
 
-def margins(
-    scenario: Scenario, name: str, seed: int, seconds: float, block_s: float
-) -> dict[str, Any]:
-    """Margins of one run: of all of it, and of each block of it."""
+def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
+    """Margins of one run."""
     config = scenario.controllers[name]
     retuner, estimating = (
         work and SimulatedRetuner(work[0], scenario.retuner_latency_s) for work in works_of(config)
     )
     node = build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
-    onlooker = Onlooker(node, block_s)
+    onlooker = Onlooker(node)
     ship = build_ship_side(scenario, seed, scenario.operator)
     lockstep = Lockstep([*ship.nodes, node, onlooker], SimulatedBus(bit_rate=config.bit_rate))
     lockstep.run_until(round(seconds * SECOND_NS))
@@ -98,11 +91,7 @@ def margins(
         "mode": node.mode.name,
         "fault": node.fault.name,
         "found_s": onlooker.found_s,
-        "largest": {
-            name: max(block.get(name, 0.0) for block in onlooker.blocks)
-            for name in dict.fromkeys(name for block in onlooker.blocks for name in block)
-        },
-        "blocks": onlooker.blocks,
+        "largest": onlooker.largest,
     }
 
 
@@ -121,7 +110,7 @@ def main() -> int:
     except ConfigError as error:
         parser.error(str(error))
     runs = [
-        margins(scenario, name, options.seed, seconds, seconds)
+        margins(scenario, name, options.seed, seconds)
         for scenario in scenarios
         for name in scenario.controllers
     ]
