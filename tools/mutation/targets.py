@@ -112,6 +112,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ),
         "ControllerSettings: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
+        "ControllerNode._observe: held_pa = 0.0 if valve is None else valve.held_pa(self.inbox, "
+        "rate_m_s) -> held_pa = 1.0 if valve is None else valve.held_pa(self.inbox, rate_m_s)": (
+            "1 Pa beside the 5 kPa from which the tank's equation judges"
+        ),
         "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> ": _SET_FIRST,
         "ControllerNode.__init__: self.start_ns = self.last_ns = 0 -> "
         "self.start_ns = self.last_ns = 1": _SET_FIRST,
