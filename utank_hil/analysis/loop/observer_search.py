@@ -45,7 +45,7 @@ _POINTS: Final = 300
 """From there to the Nyquist frequency."""
 _UNSTABLE: Final = 1e3
 """J of a gain with which a loop is unstable: more than that of any that is stable and tried."""
-_ITERATIONS: Final = 150
+_ITERATIONS: Final = 400
 _MEMORY: Final = 30
 """Steps from which the search knows the curvature of J."""
 
