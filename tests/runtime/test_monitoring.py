@@ -22,11 +22,11 @@ FRESH = dict.fromkeys(("motion_age_ms", "tank_age_ms", "pump_age_ms"), 0.0)
 class Table:
     """Monitors and inbox without a node."""
 
-    def __init__(self) -> None:
+    def __init__(self, start_ns: int = 0) -> None:
         plant = DesignPlant(VESSEL.ship, VESSEL.tank)
         self.monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
         self.inbox = Inbox(CATALOGUE, VERSION, gates=self.monitors.gates)
-        self.now_ns = 0
+        self.now_ns = start_ns
         self._motion = CATALOGUE.transmitter(SensorMotion)
         self._tank = CATALOGUE.transmitter(SensorTank)
 
@@ -50,6 +50,22 @@ class Table:
     def say_levels(self, port_m: float, starboard_m: float) -> None:
         levels = SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD)
         self.inbox.receive(self._tank.frame(levels), self.now_ns)
+
+
+@pytest.mark.parametrize("start_ns", [0, 2 * 10**9, 10**13])
+@pytest.mark.parametrize("before", [0, 1, 500])
+def test_neither_the_clock_before_the_start_nor_frames_of_then_are_judged(
+    start_ns: int, before: int
+) -> None:
+    table = Table(start_ns)
+    table.monitors.watch(table.inbox.watched, ())
+    for _ in range(before):
+        table.say_roll(0.0, 0.01)
+    for k in range(50):
+        assert not table.tick()
+        table.say_roll(0.0)
+        if k % 2:
+            table.say_levels(0.0, 0.0)
 
 
 def test_spike_of_the_roll_never_reaches_the_law() -> None:

@@ -30,7 +30,7 @@ from utank_hil.runtime.monitors.volume import Volume
 from utank_hil.runtime.motion_sensors import MotionSensors
 from utank_hil.runtime.observations import MEAN_FRAME_BITS, Observations
 from utank_hil.runtime.passive_twin import PassiveTwin
-from utank_hil.tick import TICK_S
+from utank_hil.tick import TICK_NS, TICK_S
 
 ROUND_TICKS: Final = 10
 LONG_S: Final = ROUND_TICKS * TICK_S
@@ -122,6 +122,7 @@ class Monitors:
         self._senders = Senders((), self._frames_per_s)
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
+        self._begun = False
         self._of_pair = self._of_drive = self._of_level = self._of_volume = 0
         self._of_senders = self._of_twin = self._of_saturation = 0
         self.found = 0
@@ -205,6 +206,8 @@ class Monitors:
         int
             `found`.
         """
+        if not self._begun:
+            self._begin(now_ns, inbox)
         elapsed_s = (now_ns - self._last_ns) * 1e-9
         self._last_ns = now_ns
         motions, spare = inbox.motions, self._spare
@@ -260,6 +263,12 @@ class Monitors:
             | self._of_saturation
         )
         return found
+
+    def _begin(self, now_ns: int, inbox: Inbox) -> None:
+        """Count time, and frames, from the first tick on: the clock may be that of the machine."""
+        self._begun = True
+        self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = now_ns - TICK_NS
+        self._senders.begin(inbox.foreign)
 
     def _look_at_motion(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
         elapsed_s = (now_ns - self._motion_ns) * 1e-9

@@ -74,11 +74,16 @@ class Stream:
         self._receiver = receiver
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
-        self._heard, self._lost = receiver.heard, receiver.lost
-        self._damaged = receiver.rejected[_CRC]
+        self.begin()
         self.damaged = 0
         self.excess = self._missing = 0.0
         self._silent_s = self._slow_s = 0.0
+
+    def begin(self) -> None:
+        """Judge nothing of what was received until now."""
+        receiver = self._receiver
+        self._heard, self._lost = receiver.heard, receiver.lost
+        self._damaged = receiver.rejected[_CRC]
 
     def update(self, elapsed_s: float) -> int:
         """Judge what came since the last call; return what was found."""
@@ -127,6 +132,12 @@ class Senders:
         self._excess = 0.0
         self._now_s = 0.0
         self._damaged_s = [-math.inf] * DAMAGED_FRAMES
+
+    def begin(self, foreign: int) -> None:
+        """Judge nothing of what was received until now, nor of the foreign frames so far."""
+        self._foreign = foreign
+        for stream in (*self._due, *self._later):
+            stream.begin()
 
     def update(self, foreign: int, elapsed_s: float) -> int:
         """Take the foreign frames so far; return what was found."""
