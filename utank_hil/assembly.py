@@ -252,7 +252,6 @@ def build_commissioning_node(
         built,
         statistics=statistics,
         event_sink=event_sink,
-        commissioned=True,  # to be commissioned she has to be armed
         monitored=False,
     )
     return CommissioningNode(

@@ -1,6 +1,6 @@
 """Commissioning in lockstep: a ship that is as her files say passes; whatever is not is named."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +11,12 @@ from quay import ARM_S, another_ship, commissioned, controller, still_water
 from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
-from utank_hil.assembly import build_controller_node, build_law
-from utank_hil.canbus import Fault, Mode, PumpCommand, SensorTank, Switch
+from utank_hil.assembly import build_commissioning_node, build_controller_node, build_law
+from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, SensorTank, Switch
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
+from utank_hil.runtime.commissioning.node import ROW_S, CommissioningNode, Stage
 from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.runtime.commissioning.pulses import plan_pulses
 from utank_hil.runtime.panel import Action, TimedAction
@@ -175,6 +175,53 @@ def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(
     level_m = np.abs(record["starboard_level_m"] - record["port_level_m"]).max() / 2
     assert level_m == pytest.approx(plan.level_m, rel=0.15)
     assert healthy.node.command_pa == 0.0
+
+
+class LeavesTicksOut:
+    """A commissioning of whose ticks the loop leaves out one of so many."""
+
+    name = "controller"
+
+    def __init__(self, node: CommissioningNode, every: int) -> None:
+        self.period_ns = node.period_ns
+        self.receive = node.receive
+        self._node = node
+        self._every = every
+        self._ticks = 0
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        self._ticks += 1
+        return self._node.tick(now_ns) if self._ticks % self._every else ()
+
+
+@pytest.mark.parametrize("every", [10, 20])
+def test_ticks_that_the_loop_leaves_out_leave_out_no_check(every: int) -> None:
+    config = controller("pump_with_valve")
+    node = build_commissioning_node(config)
+    scenario = still_water(config)
+    ship = build_ship_side(scenario, 1, scenario.operator).nodes
+    lockstep = Lockstep([*ship, LeavesTicksOut(node, every)])
+    while node.stage is not Stage.DONE and lockstep.now_ns < 100 * SECOND:
+        lockstep.run_until(lockstep.now_ns + SECOND)
+    assert not node.ended
+    checks = node.checks()
+    assert len(checks) == 18
+    assert all(check.passed for check in checks)
+    # the stage ended when its time was over, with a row for each 50 ms of it
+    assert len(node.moved["roll_rad"]) == pytest.approx(node.length_s / ROW_S, abs=1)
+
+
+def test_who_arms_before_the_zeros_are_right_has_to_arm_again() -> None:
+    early = TimedAction(ARM_S - 10.0, Action.ARM)
+    again = (TimedAction(ARM_S + 4.0, Action.DISARM), TimedAction(ARM_S + 6.0, Action.ARM))
+    scenario = still_water(NAVAL).model_copy(update={"operator": (early, *again)})
+    ship = build_ship_side(scenario, 1, scenario.operator).nodes
+    node = build_commissioning_node(NAVAL)
+    lockstep = Lockstep([*ship, node])
+    lockstep.run_until(round((ARM_S + 4.0) * SECOND))
+    assert (node.stage, node.node.mode) == (Stage.ARM, Mode.STANDBY)
+    lockstep.run_until(round((ARM_S + 8.0) * SECOND))
+    assert (node.stage, node.node.mode) == (Stage.MOVING, Mode.ACTIVE)
 
 
 def test_the_operators_stop_ends_it() -> None:

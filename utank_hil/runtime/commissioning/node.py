@@ -25,7 +25,7 @@ from utank_hil.tick import TICK_NS, TICK_S
 
 ROW_TICKS: Final = 5
 ROW_S: Final = ROW_TICKS * TICK_S
-"""A row is the mean of so much time."""
+"""A row is the mean of so much time, also where the loop left out a tick of it."""
 REST_S: Final = 20.0
 SETTLE_S: Final = 1.0
 """From ACTIVE to the first pulse."""
@@ -131,14 +131,15 @@ class CommissioningNode:
         if not self.rest:
             return []
         checks = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
+        whole = bool(self.moved) and not self.ended
         begin = round(SETTLE_S / ROW_S)
         end = begin + round(self._pulses_s / ROW_S)
         record, plan, stroke = self.moved, self._plan, self._stroke
         rows = len(record.get("roll_rad", ()))
-        if plan is not None and rows >= begin + plan.period_s / ROW_S:
+        if plan is not None and (whole or rows >= begin + plan.period_s / ROW_S):
             pulses = {name: column[begin:end] for name, column in record.items()}
             checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
-        if stroke is not None and rows >= end + stroke.duration_s / ROW_S - 1:
+        if stroke is not None and (whole or rows >= end + stroke.duration_s / ROW_S - 1):
             checks += judge_valve(record["valve_opening"][end:], stroke, ROW_S)
         return checks
 
@@ -170,17 +171,20 @@ class CommissioningNode:
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Let the controller do its tick, and look at what came of it."""
+        # whoever arms sooner would have the pump move without having been asked to
+        self.node.seen.commissioned = self.stage in (Stage.ARM, Stage.MOVING)
         frames = self.node.tick(now_ns)
         if self.stage is not Stage.DONE:
-            self._note()
+            self._note(now_ns)
             self._go_on(now_ns)
         return frames
 
-    def _note(self) -> None:
+    def _note(self, now_ns: int) -> None:
         self._sum += self._values(self.node)
         self._ticks += 1
-        if self._ticks == ROW_TICKS:
-            self._rows.append(self._sum / ROW_TICKS)
+        due = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS)
+        if len(self._rows) < due:
+            self._rows += [self._sum / self._ticks] * (due - len(self._rows))
             self._sum = np.zeros(len(self._names))
             self._ticks = 0
 
