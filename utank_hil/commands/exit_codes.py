@@ -23,7 +23,12 @@ class ExitCode(IntEnum):
         member.commands, member.meaning = commands, meaning
         return member
 
-    OK = 0, "all", "Done as asked. `run` and `firmware-sim`: stopped by Ctrl-C or SIGTERM, too."
+    OK = (
+        0,
+        "all",
+        "Done as asked. `run` without a latched fault and `firmware-sim`: stopped by Ctrl-C or "
+        "SIGTERM, too.",
+    )
     REFUSED = (
         1,
         "`check`, `commission`, `identify`, `init`, `faults`, `replay`",
