@@ -234,6 +234,8 @@ class Value(MessageFault):
 
     kind: Literal["value"]
     values: Annotated[dict[str, float | bool | str | None], Field(min_length=1)]
+    every: Annotated[int, Field(ge=1)] = 1
+    """One message of so many says it."""
 
     @model_validator(mode="after")
     def _known_values(self) -> "Value":
@@ -244,7 +246,13 @@ class Value(MessageFault):
         """Alter the message where it leaves its node."""
         hints = get_type_hints(self.named.kind)
         values = {name: value_of(hints[name], written) for name, written in self.values.items()}
-        alter = _altered(self.named, lambda message, _: message._replace(**values))
+        count = [-1]
+
+        def say(message: Any, _: float) -> Any:
+            count[0] += 1
+            return message if count[0] % self.every else message._replace(**values)
+
+        alter = _altered(self.named, say)
         self.spoil_frames(bench, span, alter)
 
 

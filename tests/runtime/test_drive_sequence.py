@@ -2,7 +2,7 @@ import pytest
 
 from firmware_sim.drive_states import DriveStates
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
-from utank_hil.runtime.drive_sequence import DISABLES, QUICK_STOPS, DriveSequence
+from utank_hil.runtime.drive_sequence import AT_REST, DISABLES, QUICK_STOPS, RESETS, DriveSequence
 
 S, C = DriveState, ControlWord
 
@@ -115,5 +115,24 @@ def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_h
     assert not sequence.ignored
     sequence.next_word(S.OPERATION_ENABLED, wanted=False)
     assert sequence.ignored
-    sequence.next_word(S.SWITCH_ON_DISABLED, wanted=False)
+    for _ in range(AT_REST):
+        assert sequence.ignored
+        sequence.next_word(S.SWITCH_ON_DISABLED, wanted=False)
     assert not sequence.ignored
+
+
+@pytest.mark.parametrize("every", [2, 3, AT_REST])
+def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every: int) -> None:
+    sequence = DriveSequence()
+    states = [S.SWITCHED_ON if k % every == 0 else S.OPERATION_ENABLED for k in range(100)]
+    words = [sequence.next_word(state, wanted=False) for state in states]
+    assert sequence.ignored
+    assert words[-1] is C.DISABLE_VOLTAGE
+
+
+def test_a_drive_whose_cause_lasts_gets_an_edge_for_each_request() -> None:
+    sequence = DriveSequence()
+    for _ in range(3):
+        sequence.request_reset()
+        words = [sequence.next_word(S.FAULT, wanted=False) for _ in range(50)]
+        assert words == [C.FAULT_RESET] * RESETS + [C.DISABLE_VOLTAGE] * (50 - RESETS)

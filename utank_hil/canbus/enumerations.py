@@ -80,6 +80,7 @@ class Fault(IntEnum):
     BUS_DEGRADED = 38
     STABILITY_LOW = 39
     DRIVE_WARNING = 40
+    NODE_SILENT = 41
 
 
 class RetuningState(IntEnum):

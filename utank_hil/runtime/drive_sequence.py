@@ -9,6 +9,12 @@ QUICK_STOPS: Final = 26
 or stays in operation is told to be off."""
 DISABLES: Final = 10
 """Commands that tell it so, after which it does not obey."""
+AT_REST: Final = 10
+"""Commands to a drive that neither drives nor brakes, after which it has stopped: one status in
+between proves nothing of a drive whose enable chatters."""
+RESETS: Final = 5
+"""Commands that reset the drive's fault: the first is the edge, some may be lost. A drive whose
+cause lasts needs another edge later, so the bit is taken back."""
 
 
 _TOWARDS_ENABLED = {
@@ -32,13 +38,13 @@ class DriveSequence:
     """
 
     def __init__(self) -> None:
-        self._resetting = False
-        self._stops = 0
+        self._resets_left = 0
+        self._stops = self._rests = 0
         self.ignored = False
 
     def request_reset(self) -> None:
         """Reset the drive's fault with the next commands; only ever on an operator's order."""
-        self._resetting = True
+        self._resets_left = RESETS
 
     def next_word(self, state: DriveState | None, *, wanted: bool) -> ControlWord:
         """Return the control word that leads from `state` towards operation enabled, or off.
@@ -50,14 +56,21 @@ class DriveSequence:
         wanted : bool
             Whether the supervisor wants the drive in operation enabled.
         """
-        if self._resetting and state is DriveState.FAULT:
+        if self._resets_left and state is DriveState.FAULT:
+            self._resets_left -= 1
             return ControlWord.FAULT_RESET
-        self._resetting = False
+        self._resets_left = 0
         word = ControlWord.DISABLE_VOLTAGE
         if wanted and state is not None:
             word = _TOWARDS_ENABLED.get(state, word)
         elif state in _STOPPING:
             word = ControlWord.QUICK_STOP
-        self._stops = self._stops + 1 if word is ControlWord.QUICK_STOP else 0
+        if word is ControlWord.QUICK_STOP:
+            self._stops += 1
+            self._rests = 0
+        else:
+            self._rests += 1
+            if wanted or self._rests >= AT_REST:
+                self._stops = 0
         self.ignored = self._stops > QUICK_STOPS + DISABLES
         return ControlWord.DISABLE_VOLTAGE if self._stops > QUICK_STOPS else word

@@ -182,7 +182,8 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "drive reports a fault, or is out of operation enabled for over "
-            "{drive_enabled_within_ms:g} ms",
+            "{drive_enabled_within_ms:g} ms, or from its third departure on: one a second is "
+            "forgotten",
             lambda seen, limits: (
                 seen.drive_fault or seen.drive_out_ms > limits.drive_enabled_within_ms
             ),
@@ -212,9 +213,16 @@ FAULTS: Final = (
             ),
             awaited=6,
         ),
+    ),
+    _row(
+        Fault.NODE_SILENT,
+        "A device on the bus sends no heartbeat, or the drive no DRIVE_STATUS_2.",
+        "Find the identifier that is missing on the bus (candump), and in docs/can-catalogue.md "
+        "whose it is; check that device's supply, bus connection and firmware.",
         _found(
             Reaction.HALVE,
-            "DRIVE_STATUS_2, or a heartbeat of drive or sensors, silent for 1 s",
+            "DRIVE_STATUS_2, or a heartbeat of drive, sensors, valve or hard-wired inputs, silent "
+            "for 1 s",
             Finding.NODE_SILENT,
         ),
     ),

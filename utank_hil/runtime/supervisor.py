@@ -23,6 +23,8 @@ DISARMED_ZERO_WITHIN_MS: Final = 1000
 """When the pressure is cut after disarming, even if the ramp has not come to its end."""
 RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
+DEPARTURES: Final = 2.0
+"""A drive that left operation enabled more often counts as out of it; one a second is forgotten."""
 _NEVER_NS: Final = 1 << 62
 
 
@@ -64,7 +66,9 @@ class Supervisor:
         self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
-        self._drive_enabled_ns = 0
+        self._drive_enabled_ns = self._noted_ns = 0
+        self._was_enabled = False
+        self._departures = 0.0
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
     @property
@@ -173,7 +177,9 @@ class Supervisor:
             self._disarm(Mode.STANDBY, refusal[0])
         elif seen.drive_enabled:
             self._arming_since_ns = None
-            self._drive_enabled_ns = now_ns
+            self._drive_enabled_ns = self._noted_ns = now_ns
+            self._was_enabled = True
+            self._departures = 0.0
             self.mode = Mode.ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
@@ -210,6 +216,13 @@ class Supervisor:
             self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
 
     def _note_drive(self, seen: Observations, now_ns: int) -> None:
-        if seen.drive_enabled:
+        enabled = seen.drive_enabled
+        departures = max(self._departures - (now_ns - self._noted_ns) * 1e-9, 0.0)
+        self._noted_ns = now_ns
+        if self._was_enabled and not enabled:
+            departures += 1.0
+        self._departures = departures
+        self._was_enabled = enabled
+        if enabled and departures <= DEPARTURES:
             self._drive_enabled_ns = now_ns
         seen.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS

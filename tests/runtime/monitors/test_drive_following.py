@@ -45,6 +45,25 @@ def update(
     )
 
 
+@pytest.mark.parametrize("changes_s", [0.05, 0.1, 0.3, 0.45])
+@pytest.mark.parametrize("commanded_pa", [0.0, 6000.0])
+def test_an_enable_that_chatters_excuses_no_pressure_that_stays(
+    changes_s: float, commanded_pa: float
+) -> None:
+    monitor, found = DriveFollowing(0.0, BOUNDS, 0.05), 0
+    for k in range(100):
+        enabled = int(k * 0.05 / changes_s + 1e-9) % 2 == 0
+        found |= update(monitor, commanded_pa, -6000.0, enabled=enabled)
+    assert found & LOST == LOST
+
+
+def test_a_drive_switched_on_and_off_again_is_excused() -> None:
+    monitor = drive(0.0, 0.05)
+    for enabled in (False, True, False):
+        for _ in range(5):
+            assert not update(monitor, 6000.0, -6000.0, enabled=enabled)
+
+
 @given(st.floats(-4e4, 4e4), st.floats(0.01, 1.0), st.floats(0.01, 0.2), st.integers(1, 50))
 def test_the_model_is_a_lag_one_step_behind_the_command(
     command_pa: float, lag_s: float, period_s: float, steps: int

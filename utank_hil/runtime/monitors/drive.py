@@ -15,6 +15,9 @@ REVERSED_SHARE: Final = 1 / 3
 """Of the threshold: so much the other way is reversed."""
 SETTLED_S: Final = 0.5
 """The drive is not judged before it has been enabled, or off, for so long: a rotor runs down."""
+HASTY: Final = 3
+"""Changes, each before the last had settled, from which on they are no excuse: an enable that
+chatters."""
 FULL_SHARE: Final = 0.98
 HELD_S: Final = 10.0
 DEGRADED_SHARE: Final = 0.45
@@ -57,6 +60,8 @@ class DriveFollowing:
         self._free_pa_m = thresholds.free_rotor_pa_m
         self._period_s = period_s
         self._enabled = False
+        self._same_s = 0.0
+        self._hasty = 0
         self._begin()
 
     def _begin(self) -> None:
@@ -90,12 +95,17 @@ class DriveFollowing:
         """
         if enabled is not self._enabled:
             self._enabled = enabled
-            self._begin()
+            self._hasty = self._hasty + 1 if self._same_s < SETTLED_S else 0
+            self._same_s = 0.0
+            if self._hasty < HASTY:
+                self._begin()
+        self._same_s += self._period_s
         limit_pa = self._limit_pa
         if enabled:
             self.expected_pa += self._share * (self._command_pa - self.expected_pa)
             self._command_pa = command_pa
         else:
+            self.expected_pa = self._command_pa = 0.0
             limit_pa += self._free_pa_m * abs(level_m)
         self._settled_s += self._period_s
         if self._settled_s >= SETTLED_S and pressure_pa == pressure_pa:
