@@ -4,10 +4,6 @@ PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 # a worker on each core; a file's tests stay together, for their fixtures
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
-ON_VCAN := tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence"
-# these in one kernel, the others in another: both take as long
-LONG_ON_VCAN := $(addprefix tests/socketcan/,test_retuning.py test_own_law.py test_replay_on_vcan.py \
-	test_valve_on_vcan.py)
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
@@ -18,7 +14,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-retuning test-bus test-fast evidence search check format benchmark peers site sbom docs lock clean
+.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -68,15 +64,8 @@ check: setup
 test: setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
 	$(PARALLEL) -m "not socketcan and not evidence"
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=target test-retuning test-bus
+	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan
 	$(PYTHON) -m tools.mutation.run --not-judged --within 60
-
-# they mostly wait, each in a kernel of its own on a core of its own
-test-retuning:
-	$(ON_VCAN) $(LONG_ON_VCAN)
-
-test-bus:
-	$(ON_VCAN) tests/socketcan $(addprefix --ignore=,$(LONG_ON_VCAN))
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few
