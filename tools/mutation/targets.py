@@ -31,9 +31,11 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/supervisor.py": {
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 1 << 63": _NEVER,
-        "Supervisor.__init__: self._drive_enabled_ns = 0 -> ": _SET_FIRST,
-        "Supervisor.__init__: self._drive_enabled_ns = 0 -> self._drive_enabled_ns = 1": _SET_FIRST,
+        "Supervisor.__init__: self._begin_noting(0) -> ": _SET_FIRST,
+        "Supervisor.__init__: self._begin_noting(0) -> self._begin_noting(1)": _SET_FIRST,
         "Supervisor.__init__: self._zero_at_ns = _NEVER_NS -> ": _SET_FIRST,
+        "Supervisor._note_drive: if enabled and departures <= DEPARTURES: -> "
+        "if enabled and departures < DEPARTURES:": _NEVER_THERE,
         "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
         "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
     },

@@ -66,9 +66,7 @@ class Supervisor:
         self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
-        self._drive_enabled_ns = self._noted_ns = 0
-        self._was_enabled = False
-        self._departures = 0.0
+        self._begin_noting(0)
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
     @property
@@ -177,9 +175,7 @@ class Supervisor:
             self._disarm(Mode.STANDBY, refusal[0])
         elif seen.drive_enabled:
             self._arming_since_ns = None
-            self._drive_enabled_ns = self._noted_ns = now_ns
-            self._was_enabled = True
-            self._departures = 0.0
+            self._begin_noting(now_ns)
             self.mode = Mode.ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
@@ -214,6 +210,11 @@ class Supervisor:
         if found is not None:
             zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
             self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
+
+    def _begin_noting(self, now_ns: int) -> None:
+        self._drive_enabled_ns = self._noted_ns = now_ns
+        self._was_enabled = True
+        self._departures = 0.0
 
     def _note_drive(self, seen: Observations, now_ns: int) -> None:
         enabled = seen.drive_enabled

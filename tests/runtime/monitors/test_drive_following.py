@@ -57,6 +57,25 @@ def test_an_enable_that_chatters_excuses_no_pressure_that_stays(
     assert found & LOST == LOST
 
 
+@pytest.mark.parametrize(("off", "begun"), [(8, 4), (7, 2), (0, 2)])
+def test_the_third_hasty_change_begins_nothing_anew(off: int, begun: int) -> None:
+    """Half a second off and the change to on is none of them; updates from that change on."""
+    monitor = DriveFollowing(0.0, BOUNDS, 0.0625)
+    for _ in range(off):
+        update(monitor, 0.0, 0.0, enabled=False)
+    found = [update(monitor, 0.0, -6000.0, enabled=k // 2 % 2 == 0) for k in range(20)]
+    # half a second from the last change that begins anew, and over 0.17 s behind
+    first = begun + 7 + 2
+    assert found[:first] == [0] * first
+    assert found[first] == LAGS
+
+
+def test_of_an_enable_that_chatters_no_pressure_is_expected_while_it_is_off() -> None:
+    monitor = DriveFollowing(0.0, BOUNDS, 0.0625)
+    found = [update(monitor, 6000.0, 6000.0, enabled=k // 2 % 2 == 0) for k in range(40)]
+    assert LAGS in found
+
+
 def test_a_drive_switched_on_and_off_again_is_excused() -> None:
     monitor = drive(0.0, 0.05)
     for enabled in (False, True, False):

@@ -284,3 +284,14 @@ def test_more_than_forty_frames_above_a_tenth_of_the_bus_are_a_flood_and_soon_fo
 def test_a_flood_hides_nothing_else_that_is_found_in_this_call_or_the_one_before() -> None:
     senders = Senders([Stream(Counted(CYCLE_NS), silent_s=0.125)], 1600.0)
     assert [senders.update(999 * k, 0.25) for k in (1, 2)] == [Finding.FLOOD | SILENT] * 2
+
+
+def test_what_came_before_the_beginning_is_not_judged() -> None:
+    counted = Counted(heard=7, lost=3)
+    senders = Senders([Stream(counted), Stream(Counted())], 1700.0)
+    counted.heard, counted.lost = 1000, 500
+    counted.rejected[Rejection.CRC] = 100
+    senders.begin(10**6)
+    for k in range(1, 20):
+        counted.heard = 1000 + 10 * k
+        assert not senders.update(10**6, STEP_S)
