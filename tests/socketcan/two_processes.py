@@ -29,6 +29,7 @@ from utank_hil.canbus import (
 from utank_hil.commands.exit_codes import ExitCode
 
 CHANNEL = "vcan0"
+LOG_BUFFER_BYTES = 8 << 20
 BIN = Path(sys.executable).parent
 CONFIGS = Path("configs").resolve()
 DBC = Path("utank_hil/canbus/utank.dbc")
@@ -94,7 +95,9 @@ class Candump:
     def __init__(self, folder: Path) -> None:
         self._file = folder / "candump.log"
         self._output = self._file.open("wb")
-        self._process = subprocess.Popen(["candump", "-L", CHANNEL], stdout=self._output)
+        # a buffer of many seconds: what a busy machine keeps it from reading is not lost to the log
+        log = ["candump", "-L", "-r", str(LOG_BUFFER_BYTES), CHANNEL]
+        self._process = subprocess.Popen(log, stdout=self._output)
 
     def close(self) -> None:
         """End it; idempotent."""
