@@ -16,7 +16,7 @@ from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, SensorTank, Switch
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.commissioning.node import ROW_S, CommissioningNode, Stage
+from utank_hil.runtime.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
 from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.runtime.commissioning.pulses import plan_pulses
 from utank_hil.runtime.panel import Action, TimedAction
@@ -24,6 +24,7 @@ from utank_hil.telemetry.bus_records import RECORD
 from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.replay import entries_of, replay
+from utank_hil.tick import TICK_NS
 
 NAVAL = controller("naval_constrained_gpc")
 LEVELS = ("port_level_m", "starboard_level_m")
@@ -178,20 +179,43 @@ def test_pulses_stay_within_their_bounds_and_the_pump_ends_at_zero(
 
 
 class LeavesTicksOut:
-    """A commissioning of whose ticks the loop leaves out one of so many."""
+    """A commissioning of whose ticks the loop leaves some out, by their number."""
 
     name = "controller"
 
-    def __init__(self, node: CommissioningNode, every: int) -> None:
+    def __init__(self, node: CommissioningNode, leaves_out: Callable[[int], bool]) -> None:
         self.period_ns = node.period_ns
         self.receive = node.receive
         self._node = node
-        self._every = every
-        self._ticks = 0
+        self._leaves_out = leaves_out
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        self._ticks += 1
-        return self._node.tick(now_ns) if self._ticks % self._every else ()
+        return () if self._leaves_out(now_ns // TICK_NS) else self._node.tick(now_ns)
+
+
+def test_a_loop_held_up_measures_the_zeros_anew() -> None:
+    node = build_commissioning_node(NAVAL)
+    scenario = still_water(NAVAL)
+    ship = build_ship_side(scenario, 1, scenario.operator).nodes
+    # three seconds of the twenty
+    lockstep = Lockstep([*ship, LeavesTicksOut(node, lambda tick: 1000 <= tick < 1300)])
+    lockstep.run_until(round((REST_S + 2.0) * SECOND))
+    assert node.stage is Stage.REST
+    lockstep.run_until(round((13.0 + REST_S + 1.0) * SECOND))
+    assert node.stage is Stage.ARM
+    assert len(node.rest["roll_rad"]) == pytest.approx(REST_S / ROW_S, abs=1)
+
+
+def test_pulses_end_where_the_loop_is_held_up() -> None:
+    node = build_commissioning_node(NAVAL)
+    scenario = still_water(NAVAL)
+    ship = build_ship_side(scenario, 1, scenario.operator).nodes
+    first = round((ARM_S + 5.0) * 100)
+    out = range(first, first + 15)
+    lockstep = Lockstep([*ship, LeavesTicksOut(node, lambda tick: tick in out)])
+    lockstep.run_until(round((ARM_S + 6.0) * SECOND))
+    assert node.stage is Stage.DONE
+    assert node.ended.startswith(("DRIVE_FAULT", "OVERRUN"))
 
 
 @pytest.mark.parametrize("every", [10, 20])
@@ -200,7 +224,7 @@ def test_ticks_that_the_loop_leaves_out_leave_out_no_check(every: int) -> None:
     node = build_commissioning_node(config)
     scenario = still_water(config)
     ship = build_ship_side(scenario, 1, scenario.operator).nodes
-    lockstep = Lockstep([*ship, LeavesTicksOut(node, every)])
+    lockstep = Lockstep([*ship, LeavesTicksOut(node, lambda tick: tick % every == 0)])
     while node.stage is not Stage.DONE and lockstep.now_ns < 100 * SECOND:
         lockstep.run_until(lockstep.now_ns + SECOND)
     assert not node.ended

@@ -13,8 +13,8 @@ AT_REST: Final = 10
 """Commands to a drive that neither drives nor brakes, after which it has stopped: one status in
 between proves nothing of a drive whose enable chatters."""
 RESETS: Final = 5
-"""Commands that reset the drive's fault: the first is the edge, some may be lost. A drive whose
-cause lasts needs another edge later, so the bit is taken back."""
+"""Commands that reset a fault of drive or valve: the first is the edge, some may be lost. Where its
+cause lasts another edge is needed later, so the bit is taken back."""
 
 
 _TOWARDS_ENABLED = {

@@ -12,12 +12,10 @@ from utank_hil.canbus import (
 )
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
+from utank_hil.runtime.drive_sequence import RESETS
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.observations import MILLISECOND_NS, VALVE_OFF, Observations
 from utank_hil.tick import TICK_S
-
-RESETS: Final = 5
-"""Commands in a row that reset the valve's fault: their first is the edge, some may be lost."""
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _FOLLOWING: Final = ValveState.FOLLOWING

@@ -182,9 +182,10 @@ class CommissioningNode:
     def _note(self, now_ns: int) -> None:
         self._sum += self._values(self.node)
         self._ticks += 1
-        due = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS)
-        if len(self._rows) < due:
-            self._rows += [self._sum / self._ticks] * (due - len(self._rows))
+        # a loop held up for more than two rows lost the echo of drive or valve, and begins anew
+        missing = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS) - len(self._rows)
+        if missing > 0:
+            self._rows += [self._sum / self._ticks] * missing
             self._sum = np.zeros(len(self._names))
             self._ticks = 0
 
