@@ -217,10 +217,14 @@ def test_wrong_use_ends_with_code_2_and_an_error(arguments: tuple[str, ...]) -> 
     assert re.search("error", result.stderr, re.IGNORECASE) or "Usage" in result.stderr
 
 
+STORM_ALL = CONFIGS / "scenarios" / "storm_all.yaml"
+"""Several laws, none of which takes long to design."""
+
+
 def bench_process(*arguments: str) -> subprocess.Popen[str]:
     """The command in a process group of its own, as a terminal would start it."""
     return subprocess.Popen(
-        [BIN / "utank-hil", "bench", *arguments],
+        [BIN / "utank-hil", "bench", STORM_ALL, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -264,7 +268,9 @@ def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     assert 0 < report["end_s"] < 36000
     run = [each["name"] for each in report["runs"]]
     assert run[0] == "passive"
-    assert sorted(run + report["not_run"]) == ["dpc", "gpc", "passive", "self-tuning"]
+    assert sorted(run + report["not_run"]) == [
+        *("constrained", "dpc", "gpc", "lqg", "passive", "pd"),
+    ]
     recording = read_recording(tmp_path / "bench.rrd")
     assert list(recording) == run
     assert min(each["time_s"][-1] for each in recording.values()) < report["end_s"] + 0.05
@@ -308,7 +314,7 @@ def test_bench_whose_results_can_not_be_written_prints_them_all_the_same(
 
     for name in ("_draw", "_record"):
         monkeypatch.setattr(firmware_sim.report, name, full)
-    result = invoke(app, "bench", "--duration", "4", "--out", tmp_path)
+    result = invoke(app, "bench", STORM_ALL, "--duration", "4", "--out", tmp_path)
     assert result.exit_code == 2
     assert "signif." in result.stdout
     for name in ("picture", "recording"):

@@ -82,8 +82,14 @@ def test_figures_are_printed_for_ship_controller_and_scenario(tmp_path: Path) ->
     assert "Waves of 0.00 m significant height" in text
 
 
-def test_scenario_says_what_the_sea_is_to_the_ship() -> None:
-    path = CONFIGS / "scenarios" / "naval_vessel.yaml"
+def test_scenario_says_what_the_sea_is_to_the_ship(tmp_path: Path) -> None:
+    content = parse_yaml((CONFIGS / "scenarios" / "naval_vessel.yaml").read_text())[0]
+    content["vessel"] = str(CONFIGS / "ships" / "naval_vessel.yaml")
+    # the other law takes long to design
+    planned = CONFIGS / "controllers" / "naval_constrained_gpc.yaml"
+    content["controllers"] = {"constrained": str(planned)}
+    path = tmp_path / "scenario.yaml"
+    path.write_text(yaml.safe_dump(content))
     report = json.loads(invoke("check", path, "--json").stdout)
     figures = report["figures"]
     assert figures["hs_m"] == pytest.approx(0.5, rel=1e-3)

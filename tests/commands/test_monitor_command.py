@@ -47,7 +47,10 @@ def refused(*words: str) -> str:
     return " ".join(result.stderr.split())
 
 
-@pytest.mark.parametrize("command", ["monitor", "bench --duration 1 --view --json --out"])
+@pytest.mark.parametrize(
+    "command",
+    ["monitor", "bench configs/scenarios/storm_day.yaml --duration 1 --view --json --out"],
+)
 def test_a_port_that_was_taken_since_ends_the_viewer_with_the_remedy(
     monkeypatch: pytest.MonkeyPatch, recording: Path, taken: socket.socket, command: str
 ) -> None:

@@ -18,7 +18,7 @@ from utank_hil.runtime.stopping import SIGNALS
 
 BUSY_S = 2.0
 COMMANDS = {
-    "bench": ("--duration", "36000", "--out"),
+    "bench": ("configs/scenarios/storm_all.yaml", "--duration", "36000", "--out"),
     "faults": ("--rows", "motion", "--seeds", "30", "--out"),
     "campaign": ("configs/studies/storm_seeds.yaml", "--out"),
 }

@@ -18,8 +18,8 @@ pytestmark = pytest.mark.slow
 
 def test_campaign_compares_seed_by_seed_and_draws(tool, tmp_path: Path):
     arguments = ("--seeds", "2", "--seconds", "60", "--out", str(tmp_path), "--json")
-    found = tool("studies.constrained_campaign", *arguments).found
-    assert len(found["cases"]) >= 4
+    found = tool("studies.constrained_campaign", *arguments, "--only", ":40").found
+    assert len(found["cases"]) == 3  # measured hours, with the shipped pump
     assert (tmp_path / "campaign.png").stat().st_size > 10_000
     for case in found["cases"]:
         rolls = {name: [one["roll_rms_rad"] for one in runs] for name, runs in case["runs"].items()}
