@@ -58,6 +58,47 @@ def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
     assert line.orders.take_retuning() == RetuningOrder()
 
 
+def test_arm_and_stop_hold_from_frame_to_frame() -> None:
+    line = Line()
+    assert line.orders.take_retuning() == RetuningOrder()  # nothing was heard yet
+    for bits in ({"arm": False}, {"stop": True}, {}):
+        line.say(**bits)
+        for _ in range(3):
+            wishes = line.orders.take()
+            assert wishes.armed == ("arm" not in bits)
+            assert wishes.stop == ("stop" in bits)
+
+
+def test_without_the_arm_bit_nothing_is_an_edge_of_it() -> None:
+    line = Line()
+    line.say(arm=False)
+    line.say(arm=False)
+    assert not line.orders.take().arm_edge
+
+
+def test_an_alarm_is_accepted_once_a_press() -> None:
+    line = Line()
+    line.say(acknowledge=True, acknowledge_code=7)  # pressed nobody knows when
+    assert line.orders.take_accepted() == []
+    line.say(acknowledge=False)
+    for _ in range(2):
+        line.say(acknowledge=True, acknowledge_code=7)
+        line.say(acknowledge=True, acknowledge_code=7)
+        assert line.orders.take_accepted() == [7]
+        line.say(acknowledge=False)
+    assert line.orders.take_accepted() == []
+
+
+@pytest.mark.parametrize(("late_ms", "edge"), [(0, True), (1, False)])
+def test_an_edge_and_a_held_stop_count_for_four_cycles(late_ms: int, edge: bool) -> None:
+    line = Line()
+    line.say(arm=False, stop=True)
+    line.now_ns += late_ms * MS
+    assert line.orders.holds_stop(line.now_ns + 800 * MS) == edge
+    line.say(lost=3, arm=True)
+    assert line.orders.take().arm_edge == edge
+
+
 def test_a_mode_that_is_none_is_standby() -> None:
     line = Line()
     line.say(mode_request=Mode.ACTIVE)

@@ -72,6 +72,26 @@ def test_stop_counts_from_any_station(taken: bool) -> None:
         assert bench.node.mode is Mode.STANDBY
 
 
+def test_a_stop_in_command_counts_in_a_tick_in_which_the_other_station_speaks() -> None:
+    bench = active_bench()
+    bench.second_is()
+    bench.order_is(stop=True)
+    bench.tick()
+    bench.tick()
+    assert bench.pressure_pa == 0.0
+    assert bench.node.mode is Mode.STANDBY
+
+
+def test_taking_the_command_resets_nothing() -> None:
+    bench = active_bench()
+    bench.order_is(stop=True, reset=True)
+    bench.second_is(take_command=True, reset=True)
+    wishes = bench.node.inbox.stations.take(0)
+    assert wishes.stop
+    assert not wishes.reset_edge
+    assert not wishes.arm_edge
+
+
 def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_arming() -> None:
     bench = Bench()
     bench.second = IDLE
