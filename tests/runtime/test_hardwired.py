@@ -3,7 +3,7 @@
 import pytest
 from controller_bench import CATALOGUE
 
-from utank_hil.canbus import HardwiredInputs, Quality, Switch
+from utank_hil.canbus import Frame, HardwiredInputs, Quality, Switch
 from utank_hil.runtime.hardwired import HardwiredHeard
 
 SHUT = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
@@ -30,10 +30,10 @@ class Line:
 def test_shut_and_low_stop_nothing() -> None:
     line = Line()
     assert line.heard.heard_ns < 0
-    assert not (line.heard.stop or line.heard.stop_heard or line.heard.high_level)
+    assert not any((line.heard.stop, line.heard.stop_heard, line.heard.high_level))
     heard = line.say()
     assert heard.heard_ns == 1
-    assert not (heard.stop or heard.stop_heard or heard.high_level)
+    assert not any((heard.stop, heard.stop_heard, heard.high_level))
 
 
 @pytest.mark.parametrize("name", ["port_high", "starboard_high"])
@@ -69,3 +69,12 @@ def test_only_a_healthy_node_says_that_the_loop_is_shut(quality: Quality) -> Non
     heard = line.say(quality=quality)
     assert heard.stop is not usable
     assert heard.heard_ns == (2 if usable else 1)
+
+
+def test_a_damaged_frame_says_nothing() -> None:
+    line = Line()
+    line.say()
+    frame = line.sender.frame(SHUT._replace(stop_loop=NOT_OFF[0]))
+    damaged = Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,)))
+    assert line.heard.accept(damaged) is None
+    assert not line.heard.stop_heard

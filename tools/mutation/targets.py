@@ -78,6 +78,18 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Receiver.accept: if counter == self._expected: -> if False:": "the short way for most",
         "Receiver.accept: if self._bucket: -> if True:": "draining an empty bucket does nothing",
     },
+    "utank_hil/runtime/orders.py": {
+        ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(2 << 62)": _LONG_AGO,
+        ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(1 << 63)": _LONG_AGO,
+        "Orders.accept: heard = order or self.receiver.intact(frame) -> "
+        "heard = self.receiver.intact(frame)": _LONGER_WAY,
+        "Orders.obey: if before is None or now_ns - self.heard_ns > self._gap_ns: -> "
+        "if now_ns - self.heard_ns > self._gap_ns:": _LONG_AGO,
+    },
+    "utank_hil/runtime/hardwired.py": {
+        "HardwiredHeard.accept: heard = inputs or self.receiver.intact(frame) -> "
+        "heard = self.receiver.intact(frame)": _LONGER_WAY,
+    },
     "utank_hil/runtime/inbox.py": {
         ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 2 << 62": _NEVER,
         ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 1 << 63": _NEVER,
@@ -364,6 +376,17 @@ TARGETS = (
             *_NODE,
         ),
     ),
+    Target(
+        "utank_hil/runtime/orders.py",
+        ("tests/runtime/test_orders.py",),
+        ("tests/runtime/test_stations.py", "tests/runtime/test_inbox.py", *_NODE),
+    ),
+    Target(
+        "utank_hil/runtime/stations.py",
+        ("tests/runtime/test_stations.py",),
+        ("tests/runtime/test_inbox.py", *_NODE),
+    ),
+    Target("utank_hil/runtime/hardwired.py", ("tests/runtime/test_hardwired.py",), _NODE),
     Target("firmware_sim/drive.py", ("tests/firmware_sim/test_drive.py",)),
     Target("firmware_sim/drive_states.py", ("tests/firmware_sim/test_drive_states.py",)),
     Target(
