@@ -6,8 +6,9 @@ READY := $(VENV)/.ready
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
+# extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
-	--no-header --no-annotate --no-emit-index-url
+	--no-header --no-annotate --no-emit-index-url --no-strip-extras
 
 # the matrices here are small: threads of the linear-algebra library only get in each other's way
 export OPENBLAS_NUM_THREADS := 1

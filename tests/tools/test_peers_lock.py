@@ -9,7 +9,8 @@ PEERS = ROOT / "tools" / "peers"
 
 def pinned(path):
     """Requirement lines by name, hashes left out."""
-    lines = re.findall(r"^([a-z0-9-]+)==(\S+)( ; [^\\\n]*)?", path.read_text(), re.MULTILINE)
+    entry = r"^([a-z0-9-]+)(?:\[[a-z0-9,-]+\])?==(\S+)( ; [^\\\n]*)?"
+    lines = re.findall(entry, path.read_text(), re.MULTILINE)
     found: dict[str, set[tuple[str, str]]] = {}
     for name, version, marker in lines:
         found.setdefault(name, set()).add((version, marker.strip()))
