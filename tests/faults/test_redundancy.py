@@ -174,6 +174,30 @@ def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> No
     assert Fault.SENSORS_DISAGREE in {alarm.code for alarm in bench.ship.panel.alarms}
 
 
+@pytest.mark.parametrize("gap_ms", [30, 60_000])
+def test_a_sensor_found_wrong_is_not_gone_back_to_while_the_other_is_silent(gap_ms: int) -> None:
+    bench = Bench()
+    bench.fail("sensors", motion(lambda roll, rate: (roll + 0.015, rate)))
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    bench.run(T0_S + 20)
+    assert motions.used is motions.second
+    # its evidence is gone by now, and the two are still apart
+    bench.run(T0_S + 40)
+    assert (motions.first.accused, bench.node.mode) == (True, Mode.ACTIVE)
+    gap = bench.failing["sensors_2"]
+    gap.spoil, gap.begin_ns = dropped(), bench.lockstep.now_ns
+    gap.end_ns = gap.begin_ns + gap_ms * MS
+    for _ in range(1500):
+        bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
+        assert motions.used is motions.second
+        assert motions.first.accused
+    if gap_ms == 30:
+        assert bench.node.mode is Mode.ACTIVE
+    else:
+        assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.MOTION_SILENT)
+
+
 def test_an_offset_that_nothing_explains_halves_and_then_ends_it() -> None:
     bench = Bench()
     bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2), MS)

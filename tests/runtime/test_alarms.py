@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 import pytest
-from controller_bench import CATALOGUE, ControllerBench
+from controller_bench import CATALOGUE, MS, ControllerBench
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +35,7 @@ class Table:
     def run(self, seconds: float, *active: Fault) -> None:
         for _ in range(round(10 * seconds)):
             self.list.update(active, Mode.STANDBY, self.now_ns)
+            self.list.next_message(self.now_ns)
             self.now_ns += SECOND_NS // 10
 
     def accept(self, code: Fault | None = None) -> None:
@@ -262,7 +263,8 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
     bench.run(400)
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
     bench.run(400)
-    assert [(event.code, event.state) for event in told] == [(HIGH, ACTIVE)]
+    assert [(event.code, event.state) for event in told] == [(HIGH, ACTIVE)] * 2
+    assert [event.time_ns for event in told] == [100 * MS, 400 * MS]
     bench = ControllerBench()
     told.clear()
     bench.drive_at(20e3)
@@ -275,3 +277,143 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
         (Fault.DRIVE_FAULT, ACTIVE, Mode.FAULT),
         (Fault.DRIVE_FAULT, None, Mode.FAULT),
     ]
+
+
+def test_accepting_counts_for_what_was_sent() -> None:
+    table = Table()
+    table.list.update({HIGH}, Mode.STANDBY, 0)
+    table.accept()
+    table.accept(HIGH)
+    assert table.list.unaccepted
+    table.run(0.1, HIGH)
+    table.accept()
+    assert table.states == [ACTIVE, ACCEPTED]
+    table.list.raise_anew(HIGH, Mode.FAULT, table.now_ns)
+    table.accept()
+    assert table.list.unaccepted
+
+
+class Told(ControllerBench):
+    """With the alarms that the node tells of."""
+
+    def __init__(self) -> None:
+        self.told: list[AlarmEvent] = []
+        super().__init__(event_sink=lambda event, _: self.told.append(event))
+
+    def accept(self) -> None:
+        self.order_is(acknowledge=True)
+        self.run(200)
+        assert not self.node.alarms.unaccepted
+        self.order_is(acknowledge=False)
+        self.told.clear()
+
+
+def test_what_is_raised_in_the_tick_of_an_acceptance_is_not_accepted() -> None:
+    bench = Told()
+    bench.drive_warns = True
+    bench.run(810)
+    bench.order_is(acknowledge=True)
+    bench.run(30)
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(300)
+    assert [(event.code, event.state) for event in bench.told] == [
+        (Fault.DRIVE_WARNING, ACTIVE),
+        (Fault.DRIVE_WARNING, ACCEPTED),
+        (HIGH, ACTIVE),
+    ]
+    assert bench.status is not None
+    assert bench.status.alarm
+
+
+def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -> None:
+    bench = Told()
+    bench.drive_at(10e3)
+    bench.drive_fault = DriveFault.STALL
+    bench.run(300)
+    bench.accept()
+    bench.drive_fault = DriveFault.NONE
+    bench.order_is(mode_request=Mode.STANDBY, arm=False, reset=True)
+    bench.run(300)
+    bench.order_is(reset=False)
+    bench.arm()
+    bench.drive_fault = DriveFault.STALL
+    bench.run(300)
+    assert bench.status is not None
+    assert (bench.node.mode, bench.status.alarm) == (Mode.FAULT, True)
+    assert [(e.code, e.state, e.mode) for e in bench.told] == [
+        (Fault.DRIVE_FAULT, ACTIVE, Mode.FAULT)
+    ]
+
+
+def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_control() -> None:
+    bench = Told()
+    bench.drive_at(10e3)
+    bench.silent.add(type(bench.tank))
+    bench.run(400)
+    bench.accept()
+    bench.run(1000)
+    assert bench.status is not None
+    assert (bench.node.mode, bench.status.alarm) == (Mode.FAULT, True)
+    assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.FAULT)]
+
+
+def test_the_alarm_of_a_refused_arming_goes_and_hides_no_later_one() -> None:
+    bench = Told()
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(400)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(200)
+    bench.tank = bench.tank._replace(port_high=Switch.OFF)
+    bench.accept()
+    bench.run(11_000)
+    assert codes(bench) == {Fault.NONE}
+    bench.told.clear()
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(200)
+    assert [(event.code, event.state) for event in bench.told] == [(HIGH, ACTIVE)]
+    # and each press of the lever that is refused is an event, with its cause accepted or not
+    bench.accept()
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(200)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(120)
+    assert [(event.code, event.state) for event in bench.told] == [(HIGH, ACTIVE)]
+
+
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE, Mode.FAULT])
+@pytest.mark.parametrize("phase_ms", range(0, 100, 10))
+def test_a_switch_that_closes_between_two_statuses_alarms(mode: Mode, phase_ms: int) -> None:
+    bench = Told()
+    if mode is Mode.FAULT:
+        bench.drive_at(10e3)
+        bench.drive_fault = DriveFault.STALL
+        bench.run(400)
+        bench.accept()
+    elif mode is Mode.PASSIVE:
+        bench.run(100)
+        bench.order_is(mode_request=Mode.PASSIVE)
+    bench.run(1000 + phase_ms)
+    assert bench.node.mode is mode
+    bench.tank = bench.tank._replace(starboard_high=Switch.ON)
+    bench.run(20)
+    bench.tank = bench.tank._replace(starboard_high=Switch.OFF)
+    bench.run(120)
+    assert [(event.code, event.state) for event in bench.told] == [(HIGH, ACTIVE)]
+    bench.run(11_000)
+    assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]
+
+
+def test_what_is_latched_and_reset_between_two_statuses_alarms() -> None:
+    bench = Told()
+    bench.drive_at(10e3)
+    while bench.ms % 100 != 10:
+        bench.tick()
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(20)
+    bench.tank = bench.tank._replace(port_high=Switch.OFF)
+    bench.run(10)
+    bench.order_is(mode_request=Mode.STANDBY, arm=False, reset=True)
+    bench.run(40)
+    assert bench.node.mode is Mode.STANDBY
+    bench.run(100)
+    assert [(e.code, e.state, e.mode) for e in bench.told] == [(HIGH, ACTIVE, Mode.FAULT)]

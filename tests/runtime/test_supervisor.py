@@ -77,7 +77,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.HEEL_LIMIT, Reaction.RAMP, {"heel_rad": 0.2}),
     (Fault.HEEL_LIMIT, Reaction.RAMP, {"heel_rad": -0.2}),
     (Fault.OPERATOR_SILENT, Reaction.RAMP, {"panel_age_ms": 6000}),
-    (Fault.OVERRUN, Reaction.STOP, {"tick_late_ms": 60}),
+    (Fault.OVERRUN, Reaction.STOP, {"tick_late_ms": 50}),  # in whole ticks: up to 60
     (Fault.OVERRUN, Reaction.RAMP, {"overruns_in_ten": 3}),
     (Fault.VERSION_MISMATCH, Reaction.STOP, {"versions_match": False}),
     (Fault.SIGN_FLIP, Reaction.STOP, {"found": Finding.PUMP_SIGN}),
@@ -628,14 +628,66 @@ def test_another_mode_ends_active_though_the_arm_bit_is_set(mode: Mode) -> None:
     assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
 
 
-def test_reset_during_a_ramp_is_refused() -> None:
+def test_reset_during_a_ramp_is_refused_and_the_refusal_is_told() -> None:
     bench = armed_bench()
     bench.tick(**{**ACTIVE, "roll_rad": 1.0})
+    assert bench.tick(**RAMPING).reset_refused_by is Fault.NONE
     for _ in range(90):
         assert bench.tick(**RAMPING, reset_edge=True).mode is Mode.FAULT
+        assert bench.supervisor.reset_refused_by is Fault.HEEL_LIMIT
     assert bench.supervisor.demand is Demand.RAMP
     for _ in range(100):  # nor is it done later
         assert bench.tick().mode is Mode.FAULT
+    assert bench.supervisor.reset_refused_by is Fault.HEEL_LIMIT
+    assert bench.tick(reset_edge=True).mode is Mode.STANDBY
+
+
+@pytest.mark.parametrize("sign", [{"tank_age_ms": 150}, {"pump_age_ms": 1001}])
+def test_what_is_awaited_and_does_not_end_active_does_not_cut_the_ramp_after_disarming(
+    sign: dict[str, float],
+) -> None:
+    bench = disarmed_bench()
+    ends = bool(conditions_in(replace(HEALTHY, **sign), Reaction.RAMP))  # type: ignore[arg-type]
+    for _ in range(20):
+        supervisor = bench.tick(**{**RAMPING, **sign})
+        assert supervisor.mode is (Mode.FAULT if ends else Mode.PASSIVE)
+        assert supervisor.demand is Demand.RAMP
+        assert supervisor.drive_wanted
+    if not ends:
+        assert bench.tick(**{**RAMPING, **sign, "command_pa": 0.0}).mode is Mode.INIT
+
+
+@pytest.mark.parametrize(
+    "end", [{"armed": False}, {"requested_mode": Mode.STANDBY}, {"commissioned": False}]
+)
+def test_arming_that_ends_during_the_ramp_leaves_the_ramp(end: dict[str, object]) -> None:
+    bench = disarmed_bench()
+    arming = {**RAMPING, "requested_mode": Mode.ACTIVE, "armed": True, "drive_enabled": False}
+    assert bench.tick(**{**arming, "arm_edge": True}).arming
+    supervisor = bench.tick(**{**arming, **end})
+    assert not supervisor.arming
+    assert (supervisor.mode, supervisor.demand) == (Mode.PASSIVE, Demand.RAMP)
+    assert supervisor.drive_wanted
+
+
+def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone() -> None:
+    bench = Bench()
+    assert bench.tick().raised is Fault.NONE
+    assert bench.tick(**ARMING, high_level=True).raised is Fault.LEVEL_LIMIT
+    assert bench.tick(**ACTIVE, high_level=True).raised is Fault.NONE
+    assert bench.supervisor.fault is Fault.LEVEL_LIMIT
+    bench.tick()
+    assert bench.tick(**ARMING).raised is Fault.NONE
+    assert bench.tick(**ACTIVE, high_level=True).raised is Fault.LEVEL_LIMIT
+    assert bench.tick(**ARMING).raised is Fault.NONE
+    late = [bench.tick(**{**ACTIVE, "drive_enabled": False}).raised for _ in range(400)]
+    assert [raised for raised in late if raised] == [Fault.DRIVE_FAULT]
+    bench = armed_bench()
+    assert bench.supervisor.raised is Fault.NONE
+    assert bench.tick(**{**ACTIVE, "roll_rad": 1.0}).raised is Fault.HEEL_LIMIT
+    assert bench.tick(**{**ACTIVE, "roll_rad": 1.0}).raised is Fault.NONE
+    bench = disarmed_bench()
+    assert bench.tick(**RAMPING, link_lost=True).raised is Fault.BUS_LOST
 
 
 READY = {

@@ -365,3 +365,22 @@ def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.Mon
     commander = ValveCommander(DUCT, TANK, CATALOGUE, 0.05)
     assert held == [commander.held_pa(bench.node.inbox, 0.5)]
     assert held[0] > 0.0
+
+
+@pytest.mark.parametrize("opening", [0.3, 0.6, 1.0])
+def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
+    opening: float,
+) -> None:
+    bench = ValveBench()
+    bench.now_ns = bench.start_ns = 1000 * 1_000_000_000  # the clock of the machine
+    bench.opening = opening
+    for _ in range(100):
+        bench.tick()
+        assert bench.node.seen.valve_off_ms == 0.0
+    assert bench.node.alarms.codes == set()
+    # one that does not move is found
+    bench = ValveBench()
+    bench.opening, bench.moves = opening, False
+    bench.run(1000)
+    off = bench.node.seen.valve_off_ms
+    assert off == 0.0 if opening == 1.0 else off > 300

@@ -18,7 +18,6 @@ _ROUNDED = "less than a step of the set-point on the bus"
 _PHASE = "in which tick a status of every second tick comes is the same to all"
 _A_MARGIN = "levels come in millimetres, and the limit has a margin of a tenth"
 _FIRST = "before the first levels one more update by nothing, and after them a fresh start"
-_AS_MANY = "a law answers as many commands as it names"
 _LOSS = "a pascal at a metre a second: the valve does not move by that"
 _NOT_NONE = "for the type checker: it is not None, and no place is 0"
 _LONG_AGO = "any time so long ago is as good"
@@ -165,8 +164,6 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "self.inbox.stations.take_retuning(), engaged=self.supervisor.demand is "
         "Demand.CONTROL, fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
         "passive_roll_rad=self.twin_roll_rad)": _AT_50_MS,
-        "ControllerNode._answer: answered = dict(zip(self._law_commands, answer, "
-        "strict=False)) -> answered = dict(zip(self._law_commands, answer, strict=True))": _AS_MANY,
         "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
         "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 1.0)), "
         "float(answered.get(VALVE, 0.0)))": _ROUNDED,

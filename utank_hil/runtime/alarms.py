@@ -2,9 +2,10 @@
 
     state                      to                         when
     (not in the list)          ACTIVE_UNACKNOWLEDGED      its cause is there
-    ACTIVE_UNACKNOWLEDGED      ACTIVE_ACKNOWLEDGED        accepted
+    ACTIVE_UNACKNOWLEDGED      ACTIVE_ACKNOWLEDGED        accepted after it was sent
                                RECTIFIED_UNACKNOWLEDGED   the cause has been gone for `GONE_NS`
     ACTIVE_ACKNOWLEDGED        (NORMAL, out of the list)  the cause has been gone for `GONE_NS`
+                               ACTIVE_UNACKNOWLEDGED      it is latched, or refuses arming, anew
     RECTIFIED_UNACKNOWLEDGED   ACTIVE_UNACKNOWLEDGED      its cause is there again
                                (NORMAL, out of the list)  accepted
 
@@ -56,7 +57,8 @@ class _Entry:
     state: AlarmState
     raised_ns: int
     seen_ns: int
-    times_raised: int = 1
+    times_raised: int = 0
+    sent: bool = False
 
 
 class AlarmList:
@@ -87,13 +89,10 @@ class AlarmList:
             return
         for code in active:
             entry = entries.get(code)
-            if entry is None:
-                entry = entries[code] = _Entry(code, AlarmState.NORMAL, now_ns, now_ns, 0)
-            entry.seen_ns = now_ns
-            if entry.state in (AlarmState.NORMAL, AlarmState.RECTIFIED_UNACKNOWLEDGED):
-                entry.raised_ns = now_ns
-                entry.times_raised += 1
-                self._enter(entry, AlarmState.ACTIVE_UNACKNOWLEDGED, mode, now_ns)
+            if entry is None or entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED:
+                self.raise_anew(code, mode, now_ns)
+            else:
+                entry.seen_ns = now_ns
         for entry in tuple(entries.values()):
             if now_ns - entry.seen_ns >= GONE_NS:
                 if entry.state is AlarmState.ACTIVE_UNACKNOWLEDGED:
@@ -101,10 +100,20 @@ class AlarmList:
                 elif entry.state is AlarmState.ACTIVE_ACKNOWLEDGED:
                     self._enter(entry, AlarmState.NORMAL, mode, now_ns)
 
+    def raise_anew(self, code: Fault, mode: Mode, now_ns: int) -> None:
+        """Raise the alarm of a fault, even if it is accepted and its cause has lasted since."""
+        entry = self._entries.get(code)
+        if entry is None:
+            entry = self._entries[code] = _Entry(code, AlarmState.NORMAL, now_ns, now_ns)
+        entry.raised_ns = entry.seen_ns = now_ns
+        entry.times_raised += 1
+        entry.sent = False
+        self._enter(entry, AlarmState.ACTIVE_UNACKNOWLEDGED, mode, now_ns)
+
     def accept(self, code: int | None, mode: Mode, now_ns: int) -> None:
-        """Accept the alarm of this code, or all of them for None."""
+        """Accept the alarm of this code, or all for None; of those that a panel can have shown."""
         for entry in tuple(self._entries.values()):
-            if code is None or code == entry.code:
+            if entry.sent and (code is None or code == entry.code):
                 if entry.state is AlarmState.ACTIVE_UNACKNOWLEDGED:
                     self._enter(entry, AlarmState.ACTIVE_ACKNOWLEDGED, mode, now_ns)
                 elif entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED:
@@ -121,6 +130,7 @@ class AlarmList:
         place = self._place % len(self._order)
         self._place = place + 1
         entry = self._order[place]
+        entry.sent = True
         age_s = (now_ns - entry.raised_ns) * 1e-9
         return Alarm(
             entry.state, entry.code, place, len(self._order), min(entry.times_raised, 254), age_s
@@ -149,8 +159,7 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
-    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. The
-    reason counts where arming was refused, too.
+    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone.
     """
     mode, limits = supervisor.mode, supervisor.limits
     if mode is Mode.INIT:
@@ -159,6 +168,21 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
         found = judging.all_harming(seen, limits)
     else:
         found = judging.all_stopping(seen, limits)
-    found |= judging.all_warning(seen, limits) | {supervisor.fault, law_fault}
+    found |= judging.all_warning(seen, limits) | {law_fault}
+    if mode in (Mode.INIT, Mode.FAULT):  # elsewhere it says why arming was refused, some time ago
+        found.add(supervisor.fault)
     found.discard(Fault.NONE)
     return found
+
+
+def passing_faults(supervisor: Supervisor, seen: Observations) -> set[Fault]:
+    """What would stop the pump now, to be looked at in every tick in which it is not in charge.
+
+    In ACTIVE it is latched; elsewhere it may be gone before the alarms are looked at.
+    """
+    limits = supervisor.limits
+    if judging.first_stopping(seen, limits) is None:
+        return set()
+    if supervisor.mode is Mode.INIT:
+        return judging.all_stopping_unawaited(seen, limits)
+    return judging.all_stopping(seen, limits)

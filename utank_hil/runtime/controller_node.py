@@ -28,7 +28,7 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults
+from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults, passing_faults
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
@@ -226,6 +226,7 @@ class ControllerNode:
         self._alarm_frames = catalogue.transmitter(Alarm)
         self.alarms = AlarmList()
         self._alarming = False
+        self._passing: set[Fault] = set()
         self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
@@ -318,6 +319,7 @@ class ControllerNode:
         self._estimate(now_ns)
         self._observe(now_ns)
         self.supervisor.update(self.seen, now_ns)
+        self._note_causes(now_ns)
         self._control(now_ns)
         self._limit()
         frames = self._encode(now_ns)
@@ -385,6 +387,14 @@ class ControllerNode:
         if news and self._event_sink is not None:
             self._event_sink(RetuningEvent(now_ns, self.retuning_state, news), self.start_ns)
 
+    def _note_causes(self, now_ns: int) -> None:
+        """Keep what may be gone before alarms are looked at, ten times a second."""
+        supervisor = self.supervisor
+        if supervisor.mode is not _ACTIVE:
+            self._passing |= passing_faults(supervisor, self.seen)
+        if supervisor.raised is not _NO_FAULT:
+            self.alarms.raise_anew(supervisor.raised, supervisor.mode, now_ns)
+
     def _control(self, now_ns: int) -> None:
         """Let the law answer when a sample is due, in charge or not."""
         due = self._samples.due(now_ns)
@@ -450,7 +460,7 @@ class ControllerNode:
             )
         self._answered = True
         answer = self._controller.step(self._measure(self.inbox, self._level))
-        answered = dict(zip(self._law_commands, answer, strict=False))
+        answered = dict(zip(self._law_commands, answer, strict=True))
         return float(answered.get(PRESSURE, 0.0)), float(answered.get(VALVE, 0.0))
 
     def _limit(self) -> None:
@@ -512,11 +522,12 @@ class ControllerNode:
         self._alarming = (
             self._alarming or mode is not Mode.INIT or now_ns - self.start_ns >= QUIET_START_NS
         )
-        if self._alarming:
-            active = active_faults(supervisor, self.seen, self._law_fault)
-            alarms.update(active, mode, now_ns)
         for code in self.inbox.stations.take_accepted():
             alarms.accept(code, mode, now_ns)
+        if self._alarming:
+            active = active_faults(supervisor, self.seen, self._law_fault) | self._passing
+            alarms.update(active, mode, now_ns)
+        self._passing.clear()
         refused_by = supervisor.reset_refused_by
         if refused_by is not self._refused_by:
             self._refused_by = refused_by

@@ -567,8 +567,9 @@ FAULTS: Final = (
         "Stop other work on the computer and give the controller real-time scheduling.",
         Condition(
             Reaction.STOP,
-            "a tick over {long_overrun_ms:g} ms late",
-            lambda seen, limits: seen.tick_late_ms > limits.long_overrun_ms,
+            "a tick {long_overrun_ms:g} ms late or more",
+            # counted in whole ticks: what is 50 here was up to 60
+            lambda seen, limits: seen.tick_late_ms >= limits.long_overrun_ms,
         ),
         Condition(
             Reaction.RAMP,

@@ -284,21 +284,24 @@ class Monitors:
         both = not (stale or spare_stale)
         self._leave_accused(inbox, motions, seen, spare)
         self._of_pair = self._pair.update(
-            inbox.roll_rad - other.roll_rad if both else 0.0,
-            inbox.roll_rate_rad_s - other.roll_rate_rad_s if both else 0.0,
+            inbox.roll_rad - other.roll_rad if both else math.nan,
+            inbox.roll_rate_rad_s - other.roll_rate_rad_s,
             self._used,
             spare,
         )
+        motions.used.accused, motions.spare.accused = self._used.accused, spare.accused
 
     def _leave_accused(
         self, inbox: Inbox, motions: MotionSensors, seen: Observations, spare: SensorEvidence
     ) -> None:
         """Use the other motion sensor if something speaks against this one alone."""
-        heard = seen.motion_spare_age_ms <= SPARE_MS
-        if heard and self._used.found and not (spare.found or spare.accused):
+        used = self._used
+        if seen.motion_spare_age_ms > SPARE_MS or spare.found or spare.accused:
+            return
+        if used.found or used.accused:
+            motions.used.accused = used.accused = True
             inbox.exchange_motion(motions)
             self.twin.excuse()  # of what the other one said
-            self._used.accused = True
             self._used, self._spare = spare, self._used
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excused: bool) -> None:

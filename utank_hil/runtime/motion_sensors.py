@@ -19,14 +19,17 @@ class MotionSensor:
         As given.
     roll_rad, roll_rate_rad_s : float
         Of the last good sample, received at `heard_ns`.
+    accused : bool
+        Whether anything has spoken against it since both agreed; the monitors' to set.
     """
 
-    __slots__ = ("heard_ns", "receiver", "roll_rad", "roll_rate_rad_s")
+    __slots__ = ("accused", "heard_ns", "receiver", "roll_rad", "roll_rate_rad_s")
 
     def __init__(self, receiver: Receiver[SensorMotion]) -> None:
         self.receiver = receiver
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.heard_ns = NEVER_HEARD_NS
+        self.accused = False
 
 
 class MotionSensors:
@@ -48,6 +51,6 @@ class MotionSensors:
         self.used, self.spare = self.spare, self.used
 
     def silent(self, now_ns: int) -> bool:
-        """Whether the sensor in use is silent, and the other one is not."""
-        oldest_ns = now_ns - SILENT_NS
-        return self.used.heard_ns < oldest_ns <= self.spare.heard_ns
+        """Whether the sensor in use is silent, and the other one is neither that nor accused."""
+        oldest_ns, spare = now_ns - SILENT_NS, self.spare
+        return self.used.heard_ns < oldest_ns <= spare.heard_ns and not spare.accused

@@ -6,6 +6,7 @@ from typing import Final
 
 from utank_hil.canbus.enumerations import DriveFault, DriveState, Mode
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.tick import TICK_NS, TICK_S
 
@@ -180,6 +181,7 @@ class Observer:
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._load_since_ns = 0
         self._frames_counted = 0
+        self._heel_share = 1.0
 
     def link_error(self, now_ns: int) -> None:
         """Take note that the bus could not be read or written."""
@@ -233,7 +235,10 @@ class Observer:
             hardwired.stop_heard = False
             seen.hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         seen.roll_rad = inbox.roll_rad
-        seen.heel_rad += HEEL_SHARE * (inbox.roll_rad - seen.heel_rad)
+        if inbox.motion_ns > NEVER_HEARD_NS:
+            # at first the mean of all that was measured: a heel is known from the first sample on
+            seen.heel_rad += self._heel_share * (inbox.roll_rad - seen.heel_rad)
+            self._heel_share = max(self._heel_share / (1.0 + self._heel_share), HEEL_SHARE)
         if self._load_schedule.due(now_ns):
             self._count_load(now_ns, inbox.frames + frames_sent)
 

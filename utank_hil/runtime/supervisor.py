@@ -19,6 +19,7 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
+_NO_FAULT: Final = Fault.NONE
 DISARMED_ZERO_WITHIN_MS: Final = 1000
 """When the pressure is cut after disarming, even if the ramp has not come to its end."""
 RESET_WITHIN_MS: Final = 500
@@ -52,6 +53,8 @@ class Supervisor:
         Whether the drive should be in operation enabled.
     degraded : bool
         Whether only half the pressure is allowed.
+    raised : Fault
+        What was latched in this tick, or refused arming in it; else NONE.
     reset_refused_by : Fault
         What lasts, in FAULT after a reset was refused; else NONE.
     """
@@ -63,7 +66,7 @@ class Supervisor:
         self.demand = Demand.ZERO
         self.drive_wanted = False
         self.degraded = False
-        self.reset_refused_by = Fault.NONE
+        self.raised = self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
         self._begin_noting(0)
@@ -76,6 +79,7 @@ class Supervisor:
 
     def update(self, seen: Observations, now_ns: int) -> None:
         """Take one tick's observations and set `mode`, `fault`, `demand` and `drive_wanted`."""
+        self.raised = _NO_FAULT
         if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
         elif self.mode is Mode.FAULT:
@@ -103,9 +107,11 @@ class Supervisor:
             if now_ns >= self._zero_at_ns or seen.stop or judging.first_stopping(seen, self.limits):
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
-        if seen.reset_edge and self.demand is Demand.ZERO:
-            self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
-            self.reset_refused_by = Fault.NONE
+        if seen.reset_edge:
+            ramping = self.demand is Demand.RAMP
+            self.reset_refused_by = self.fault if ramping else _NO_FAULT
+            if not ramping:
+                self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
         if self._reset_until_ns is not None:
             self._continue_reset(seen, now_ns, self._reset_until_ns)
 
@@ -119,9 +125,10 @@ class Supervisor:
             self.reset_refused_by = lasts[0]
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
+        ramping = seen.command_pa != 0.0
         if self.mode is Mode.PASSIVE:
-            if seen.command_pa != 0.0:
-                # still ramping down, so what ends ACTIVE ends this
+            if ramping:
+                # so what ends ACTIVE ends this
                 self._note_drive(seen, now_ns)
                 found = judging.first_ending(seen, self.limits)
                 if now_ns >= self._zero_at_ns:
@@ -131,7 +138,8 @@ class Supervisor:
             if found is not None:
                 self._latch(*found, seen, now_ns)
                 return
-        missing = judging.first_awaited(seen, self.limits)
+        # INIT cuts the pressure: what would not end ACTIVE waits for the end of the ramp
+        missing = None if ramping else judging.first_awaited(seen, self.limits)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
             return
@@ -145,7 +153,7 @@ class Supervisor:
         elif seen.requested_mode is Mode.ACTIVE and seen.arm_edge and seen.armed:
             self._begin_arming(seen, now_ns)
         elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
-            if seen.command_pa == 0.0:  # the ramp down has come to its end
+            if not ramping:
                 self._disarm(Mode.STANDBY)
         elif (
             seen.requested_mode is Mode.PASSIVE
@@ -159,7 +167,7 @@ class Supervisor:
         seen.drive_out_ms = 0.0  # off, as it should be
         refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
-            self.fault = refusal[0]
+            self.fault = self.raised = refusal[0]
         else:
             self._arming_since_ns = now_ns
             self.drive_wanted = True
@@ -167,12 +175,12 @@ class Supervisor:
     def _continue_arming(self, seen: Observations, now_ns: int, since_ns: int) -> None:
         seen.arming_ms = (now_ns - since_ns) / MILLISECOND_NS
         if not seen.armed or seen.requested_mode is not Mode.ACTIVE:
-            self._disarm(Mode.STANDBY)
+            self._end_arming(seen, _NO_FAULT)
             return
         # being out of operation enabled does not count yet; all else counts until ACTIVE
         refusal = judging.first_refusing(seen, self.limits)
         if refusal is not None:
-            self._disarm(Mode.STANDBY, refusal[0])
+            self._end_arming(seen, refusal[0])
         elif seen.drive_enabled:
             self._arming_since_ns = None
             self._begin_noting(now_ns)
@@ -183,7 +191,12 @@ class Supervisor:
         else:
             found = judging.first_giving_up(seen, self.limits)
             if found is not None:
-                self._disarm(Mode.STANDBY, found[0])
+                self._end_arming(seen, found[0])
+
+    def _end_arming(self, seen: Observations, fault: Fault) -> None:
+        """Give arming up; a ramp that it began in goes on to its end."""
+        self._disarm(Mode.STANDBY if seen.command_pa == 0.0 else Mode.PASSIVE, fault)
+        self.raised = fault
 
     def _disarm(self, mode: Mode, fault: Fault = Fault.NONE) -> None:
         self.mode = mode
@@ -197,7 +210,7 @@ class Supervisor:
 
     def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
         self.mode = Mode.FAULT
-        self.fault = fault
+        self.fault = self.raised = fault
         self._arming_since_ns = None
         stop = condition.reaction is Reaction.STOP or seen.stop
         self.demand = Demand.ZERO if stop else Demand.RAMP

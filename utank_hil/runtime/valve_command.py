@@ -15,6 +15,7 @@ from utank_hil.dynamics.valves import Valve
 from utank_hil.runtime.drive_sequence import RESETS
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.observations import MILLISECOND_NS, VALVE_OFF, Observations
+from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.tick import TICK_S
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
@@ -50,6 +51,7 @@ class ValveCommander:
         self._following = False
         self._resets_left = 0
         self._followed_ns = self._at_place_ns = 0
+        self._heard = False
 
     def ask(self, loss: float) -> None:
         """Take the loss that the law wants, in Pa per (m/s)^2 of dh/dt."""
@@ -81,6 +83,9 @@ class ValveCommander:
         if not self._following or inbox.valve_state is _FOLLOWING:
             self._followed_ns = now_ns
         seen.valve_out_ms = (now_ns - self._followed_ns) / MILLISECOND_NS
+        if not self._heard:  # it may stand anywhere at first, and runs from there
+            self._heard = inbox.valve_ns > NEVER_HEARD_NS
+            self._expected = inbox.valve_opening
         step = self._told - self._expected
         self._expected += min(max(step, -self._most_step), self._most_step)
         if abs(inbox.valve_opening - self._expected) <= VALVE_OFF:

@@ -128,6 +128,26 @@ def test_evidence_counts_until_both_agree_again(which: str) -> None:
     assert sensor.accused is False
 
 
+@pytest.mark.parametrize("which", ["used", "spare"])
+def test_what_was_known_is_kept_while_one_is_silent(which: str) -> None:
+    pair = Pair()
+    sensor = getattr(pair, which)
+    pair.found(2, APART_RAD)
+    sensor.watch.found = int(Finding.SPIKES)
+    pair(APART_RAD)
+    sensor.watch.found = 0
+    assert pair.found(400, math.nan) == [DISAGREE] * 400
+    assert sensor.accused is True
+    # of two that agree nothing is found, whichever is silent
+    pair = Pair()
+    assert pair.found(400, math.nan) == [0] * 400
+    # of two that disagree nobody knows whether the one that is left is right
+    pair = Pair()
+    assert pair(APART_RAD) == 0
+    assert pair.found(10, APART_RAD) == [DISAGREE] * 10
+    assert pair.found(51, math.nan) == [DISAGREE] * 50 + [UNCLEAR]
+
+
 @pytest.mark.parametrize("finding", Finding)
 def test_what_is_evidence_against_a_motion_sensor(finding: Finding) -> None:
     pair = Pair()

@@ -5,12 +5,15 @@ each one's own evidence: its roll against its rate, its noise and spikes, and th
 with its roll. What once spoke against a sensor counts until both agree again.
 
     in use             the other          then
-    silent             heard              the other is used, and half the pressure (the inbox)
+    silent             heard, none        the other is used, and half the pressure (the inbox)
+    silent             evidence           as if the one in use were the only one
     evidence           none, and heard    the other is used, and half the pressure
     none               evidence           half the pressure
     none               none               where they disagree half the pressure, and after 1.5 roll
                                           periods, since nobody knows who is right, the end
     evidence           evidence           as if the one in use were the only one
+
+While one is silent they are not compared, and what was known of both is kept.
 """
 
 import math
@@ -119,9 +122,23 @@ class MotionPair:
         Parameters
         ----------
         apart_rad, rate_apart_rad_s : float
-            Roll and rate of one less those of the other, 0 where one is silent.
+            Roll and rate of one less those of the other; NaN where one is silent.
         used, spare : SensorEvidence
         """
+        if not math.isnan(apart_rad):
+            self._compare(apart_rad, rate_apart_rad_s)
+        apart = self._remembered_s > 0
+        for sensor in (used, spare):
+            sensor.accused = sensor.found != 0 or (sensor.accused and apart)
+        self.unclear = apart and used.accused is spare.accused
+        self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
+        if not (apart or used.accused or spare.accused):
+            return 0
+        if self._unclear_s > UNCLEAR_PERIODS * self._roll_period_s:
+            return _DISAGREE | _UNCLEAR
+        return _DISAGREE
+
+    def _compare(self, apart_rad: float, rate_apart_rad_s: float) -> None:
         self._roll_rad += self._share * (apart_rad - self._roll_rad)
         self._rate_rad_s += self._share * (rate_apart_rad_s - self._rate_rad_s)
         over = (
@@ -133,13 +150,3 @@ class MotionPair:
             self._remembered_s = self._roll_period_s
         else:
             self._remembered_s = max(self._remembered_s - self._period_s, 0.0)
-        apart = self._remembered_s > 0
-        for sensor in (used, spare):
-            sensor.accused = sensor.found != 0 or (sensor.accused and apart)
-        self.unclear = apart and used.accused is spare.accused
-        self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
-        if not (apart or used.accused or spare.accused):
-            return 0
-        if self._unclear_s > UNCLEAR_PERIODS * self._roll_period_s:
-            return _DISAGREE | _UNCLEAR
-        return _DISAGREE
