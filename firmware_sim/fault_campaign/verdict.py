@@ -8,6 +8,7 @@ from typing import Any, Final
 from firmware_sim.fault_campaign.campaign import Row, Setup
 from firmware_sim.fault_campaign.trial import Outcome
 from utank_hil.runtime.faults import FAULTS, Reaction
+from utank_hil.runtime.panel import Action
 
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""
@@ -122,6 +123,10 @@ def judged(row: Row, setup: Setup, requirement: str, outcomes: Sequence[Outcome]
     )
 
 
+def _is_reset(row: Row) -> bool:
+    return any(order.action is Action.RESET for order in row.operator)
+
+
 def _worst(times_ms: Sequence[float | None]) -> float | None:
     known = [each for each in times_ms if each is not None]
     return round(max(known), 3) if known and len(known) == len(times_ms) else None
@@ -173,6 +178,8 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
             yield f"pressure not halved within {row.halved_within_ms:.0f} ms"
     if latched and found_ms is not None and outcome.mode == "ACTIVE":
         yield "in charge again in the end"
+    elif latched and outcome.mode != "FAULT" and _is_reset(row):
+        yield f"reset while its cause lasts, to {outcome.mode}"
     if latched and found_ms is not None and not row.hardwired_stop:
         zero_ms = math.inf if outcome.zero_ms is None else outcome.zero_ms
         limit_ms = _zero_limit_ms(row, outcome)

@@ -137,6 +137,13 @@ def test_each_reaction_asks_for_its_own() -> None:
     assert not verdict("held-arm-bit", replace(refused, was_active=True)).passed
 
 
+@pytest.mark.parametrize("mode", ["STANDBY", "PASSIVE", "ACTIVE"])
+def test_a_reset_that_was_obeyed_while_the_cause_lasts_fails_the_row(mode: str) -> None:
+    kept = replace(GOOD, row="reset-under-high-level", code="LEVEL_LIMIT", found_ms=10, zero_ms=30)
+    assert verdict("reset-under-high-level", kept).passed
+    assert not verdict("reset-under-high-level", replace(kept, mode=mode)).passed
+
+
 def test_minutes_later_a_run_may_end_in_the_faults_that_the_row_names() -> None:
     noisy = replace(GOOD, found_ms=None, halved_ms=50.0, alarms=("NOISE",), code="DRIFT")
     assert verdict("noise-10-fold", noisy).passed

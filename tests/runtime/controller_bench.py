@@ -120,6 +120,7 @@ class ControllerBench:
         self.drive_follows = True
         self.drive_fault = DriveFault.NONE
         self.drive_warns = False
+        self.drive_limits = (False,) * 4
         self.order = OperatorCommand(Mode.STANDBY, *(False,) * 4)
         self.versions = self.panel_versions = (CATALOGUE.version, VERSION)
         self.silent: set[type] = set()
@@ -193,7 +194,9 @@ class ControllerBench:
             echo = self._commands.counter
             self._send(
                 DriveStatus1,
-                DriveStatus1(self.pump.pressure_pa, 0.0, self.drive_state, echo, *(False,) * 4),
+                DriveStatus1(
+                    self.pump.pressure_pa, 0.0, self.drive_state, echo, *self.drive_limits
+                ),
             )
         if index % 10 == 0:
             self._send(

@@ -275,6 +275,47 @@ def test_rows_follow_the_motion_in_every_tick_and_the_estimates_within_100_ms() 
     np.testing.assert_allclose(np.diff(changed_s), 0.1)
 
 
+def test_until_the_water_obeyed_the_pressure_is_a_quarter() -> None:
+    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    bench = ControllerBench(START_NS, monitors=monitors)
+    bench.arm()
+    assert not monitors.confirmed
+    bench.law.answer_pa = 2 * LIMITS.pressure_pa
+    pressures = []
+    for _ in range(60):
+        bench.pump = SensorPump(bench.node.command_pa, 0.0, Quality.GOOD)  # it follows
+        bench.tick()
+        pressures.append(bench.node.command_pa)
+    assert bench.node.mode is Mode.ACTIVE
+    assert max(pressures) == pressures[-1] == 0.25 * LIMITS.pressure_pa
+    monitors.confirmed = True
+    bench.tick()
+    assert bench.node.command_pa > pressures[-1]
+
+
+def test_the_status_says_when_the_drive_is_at_a_limit() -> None:
+    bench = ControllerBench(START_NS)
+    for limits, told in (((False,) * 4, False), ((True,) * 4, True), ((False,) * 4, False)):
+        bench.drive_limits = limits
+        bench.run(200)
+        assert bench.status is not None
+        assert bench.status.saturated is told
+
+
+def test_one_late_tick_is_an_alarm_and_no_more() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.run(200)
+    assert bench.node.alarms.codes == set()
+    bench.tick(late_ticks=1)
+    bench.run(100)
+    assert bench.node.alarms.codes == {Fault.OVERRUN}
+    assert (bench.node.mode, bench.node.supervisor.degraded) == (Mode.ACTIVE, False)
+    bench.run(1000)
+    assert bench.pressure_pa == LEVEL
+
+
 def test_heartbeat_tells_the_fault() -> None:
     bench = ControllerBench(START_NS)
     beats = CATALOGUE.receiver(Heartbeat, Address.CONTROLLER)

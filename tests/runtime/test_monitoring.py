@@ -1,10 +1,13 @@
 """All monitors behind the controller node, fed by hand."""
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from controller_bench import CATALOGUE, VERSION, VESSEL
+from monitors.moving_ship import MovingShip
 
 from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
 from utank_hil.control import DesignPlant
@@ -123,6 +126,100 @@ def test_gap_of_the_motion_sensor_is_no_drift() -> None:
     table.tick(5.0, motion_age_ms=1000.0)
     table.say_roll(0.2)
     assert not table.tick(1.0) & ~Finding.SPIKES
+
+
+def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set[Finding]:
+    """What is found of a ship in motion, her inbox filled by hand."""
+    found = 0
+    for _ in range(round(seconds / TICK_S)):
+        time_s, inbox = table.now_ns * 1e-9, table.inbox
+        inbox.roll_rad, inbox.pressure_pa = ship.roll_rad(time_s), ship.pressure_pa(time_s)
+        inbox.roll_rate_rad_s = ship.rate_rad_s(time_s)
+        inbox.starboard_level_m = level_m = ship.level_m(time_s)
+        inbox.port_level_m = -level_m
+        stale = {name: age(time_s) for name, age in seen.items() if callable(age)}
+        found |= table.tick(command_pa=inbox.pressure_pa, drive_enabled=True, **stale)
+    return set(Finding(found))
+
+
+ROLLING = MovingShip(math.radians(2.0), 5e3, noise=False)
+T = 10.7
+
+
+def gap(length_s: float, every_s: float = 4.0) -> Callable[[float], float]:
+    """Age in ms of a sensor that is silent for so long each time."""
+    return lambda time_s: max(1000 * (length_s - (-time_s) % every_s), 0.0)
+
+
+def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
+    table = Table()
+    moved(table, ROLLING, 5.0)
+    assert not table.monitors.confirmed  # the filters have not settled
+    moved(table, ROLLING, 5.0)
+    assert table.monitors.confirmed
+    still = Table()
+    moved(still, MovingShip(0.0, 0.0, noise=False), 100.0)
+    assert not still.monitors.confirmed
+    moved(still, ROLLING, 10.0)
+    assert still.monitors.confirmed
+    moved(still, MovingShip(0.0, 0.0, noise=False), 100.0)
+    assert still.monitors.confirmed  # water at rest is watched, too
+
+
+@pytest.mark.parametrize("age", ["motion_age_ms", "tank_age_ms", "pump_age_ms"])
+@pytest.mark.parametrize("length_s", [0.15, 0.3, 0.45])
+def test_short_gaps_keep_nothing_from_being_judged(age: str, length_s: float) -> None:
+    table = Table()
+    assert not moved(table, ROLLING, 60.0, **{age: gap(length_s)})
+    assert table.monitors.confirmed
+    reversed_motion = MovingShip(math.radians(2.0), 5e3, noise=False)
+    reversed_motion.level = -reversed_motion.level
+    assert Finding.WATER_SIGN in moved(table, reversed_motion, T, **{age: gap(length_s)})
+
+
+@pytest.mark.parametrize("age", ["motion_age_ms", "tank_age_ms", "pump_age_ms"])
+def test_long_gaps_that_keep_the_water_from_being_judged_are_found(age: str) -> None:
+    table = Table()
+    moved(table, ROLLING, 12.0)
+    assert table.monitors.confirmed
+    longer = {age: gap(0.8)}
+    # of each four seconds measurements come for three and a bit
+    assert moved(table, ROLLING, 0.8 * T, **longer) <= {Finding.DRIFT}
+    assert table.monitors.confirmed
+    assert Finding.UNWATCHED in moved(table, ROLLING, T, **longer)
+    assert not table.monitors.confirmed
+    assert Finding.UNWATCHED_LONG not in moved(table, ROLLING, T, **longer)
+    assert Finding.UNWATCHED_LONG in moved(table, ROLLING, 1.5 * T, **longer)
+    moved(table, ROLLING, 6.0)
+    assert Finding.UNWATCHED not in moved(table, ROLLING, 5.0)
+    assert table.monitors.confirmed
+
+
+def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
+    table = Table()
+    moved(table, ROLLING, 12.0)
+    found = moved(table, ROLLING, 5 * T, tank_age_ms=lambda time_s: 1000 * (time_s - 12.0))
+    assert not found & {Finding.UNWATCHED, Finding.UNWATCHED_LONG}
+
+
+@pytest.mark.parametrize("late_ticks", [1, 2, 4])
+def test_late_ticks_keep_nothing_from_being_judged(late_ticks: int) -> None:
+    table = Table()
+    for _ in range(8):
+        assert not moved(table, ROLLING, 2.0)
+        table.now_ns += late_ticks * TICK_NS
+    assert table.monitors.confirmed
+
+
+def test_a_gauge_that_stands_still_alone_is_found() -> None:
+    table = Table()
+    moved(table, ROLLING, 12.0)
+    inbox, found = table.inbox, 0
+    for _ in range(500):
+        level_m = ROLLING.level_m(table.now_ns * 1e-9)
+        inbox.port_level_m, inbox.starboard_level_m = -0.05, level_m
+        found |= table.tick()
+    assert found & Finding.LEVEL_STUCK
 
 
 def test_everything_is_looked_at_in_a_round() -> None:

@@ -96,6 +96,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.SIGNAL_DELAYED, Reaction.RAMP, {"found": Finding.MOTION_LATE}),
     (Fault.ROLL_AMPLIFIED, Reaction.RAMP, {"found": Finding.ROLL_AMPLIFIED}),
     (Fault.SENSORS_DISAGREE, Reaction.RAMP, {"found": Finding.SENSORS_UNCLEAR}),
+    (Fault.BUS_DEGRADED, Reaction.RAMP, {"found": Finding.UNWATCHED_LONG}),
     (Fault.HARDWIRED_STOP, Reaction.STOP, {"hardwired_stop": True}),
     (Fault.HARDWIRED_SILENT, Reaction.STOP, {"hardwired_age_ms": 160}),
 ]
@@ -781,7 +782,9 @@ def test_control_only_while_armed_fresh_and_after_an_edge(history: list[Observat
             edge_since_disarmed = False
 
 
-DEGRADING = ("DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "SENSORS_DISAGREE")
+DEGRADING = (
+    "DRIFT", "VOLUME", "NOISE", "SATURATED", "NODE_SILENT", "SENSORS_DISAGREE", "UNWATCHED",
+)  # fmt: skip
 
 WARNING = ("FRAMES_LOST",)
 

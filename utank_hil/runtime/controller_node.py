@@ -470,6 +470,9 @@ class ControllerNode:
             return
         if demand is _CONTROL:
             share = DEGRADED_SHARE if self.supervisor.degraded else 1.0
+            monitors = self.monitors
+            if monitors is not None and not monitors.confirmed:
+                share = monitors.thresholds.unconfirmed_share
             self.command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
         elif demand is Demand.RAMP:
             self.command_pa = limiter.ramp_to_zero()
@@ -498,7 +501,7 @@ class ControllerNode:
                         armed=supervisor.mode is Mode.ACTIVE,
                         alarm=self.alarms.unaccepted,
                         degraded=supervisor.degraded,
-                        saturated=self._limiter.limiting,
+                        saturated=self._limiter.limiting or self.inbox.drive_held_back,
                         not_realtime=not self.statistics.real_time,
                         bus_load=self.seen.bus_load,
                         catalogue_version=self._catalogue_version,

@@ -560,6 +560,12 @@ FAULTS: Final = (
             "0.75 a cycle for 2 s",
             Finding.FRAMES_LOST,
         ),
+        _found(
+            Reaction.HALVE,
+            "gaps have kept the tank's equation from judging for a roll period",
+            Finding.UNWATCHED,
+        ),
+        _found(Reaction.RAMP, "the same for three roll periods", Finding.UNWATCHED_LONG),
     ),
     _row(
         Fault.OVERRUN,
@@ -579,6 +585,7 @@ FAULTS: Final = (
                 and seen.overruns_in_ten >= limits.overruns_in_ten
             ),
         ),
+        Condition(Reaction.WARN, "one of them", lambda seen, _: seen.overruns_in_ten > 0),
     ),
     _row(
         Fault.NOT_COMMISSIONED,

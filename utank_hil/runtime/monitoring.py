@@ -17,7 +17,7 @@ from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
 from utank_hil.runtime.monitors.finding import Finding
-from utank_hil.runtime.monitors.level_stuck import LevelStuck
+from utank_hil.runtime.monitors.level_stuck import GaugeStuck, LevelStuck
 from utank_hil.runtime.monitors.motion import RollAgainstRate
 from utank_hil.runtime.monitors.motion_pair import MotionPair, SensorEvidence
 from utank_hil.runtime.monitors.motion_watch import MotionWatch
@@ -40,8 +40,11 @@ SPARE_MS: Final = 30.0
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
 SILENT_S: Final = 1.0
-LATE_ROUND: Final = 1.2
-"""So many rounds after the last one, ticks were left out: as a gap."""
+GAP_PERIODS: Final = 0.05
+"""Of the roll's: over a gap so long roll and level run straight, to a hundredth of their swing."""
+UNWATCHED_PERIODS: Final = 1.0
+LONG_PERIODS: Final = 3.0
+"""So long longer gaps may keep the tank's equation from judging, though measurements come."""
 
 MOST_CHANGE: Final = 10.0
 """Of inertia and stiffness by loading, either way: more is an error of the identification."""
@@ -52,6 +55,9 @@ _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
 _WATER_SIGN: Final = int(Finding.WATER_SIGN)
+_VOLUME: Final = int(Finding.VOLUME)
+_UNWATCHED: Final = int(Finding.UNWATCHED)
+_UNWATCHED_LONG: Final = int(Finding.UNWATCHED | Finding.UNWATCHED_LONG)
 
 
 class Monitors:
@@ -78,6 +84,8 @@ class Monitors:
     drive : DriveFollowing
     volume : Volume
         The monitors whose statistics are of interest.
+    confirmed : bool
+        Whether the water was seen to move as roll and pressure push it, and is watched since.
     found : int
         Bits of `Finding`, of now.
     """
@@ -99,6 +107,7 @@ class Monitors:
         self.drive = DriveFollowing(plant.lag_s, thresholds, SHORT_S)
         self._saturation = Saturation(thresholds)
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
+        self._port_stuck, self._starboard_stuck = GaugeStuck(thresholds), GaugeStuck(thresholds)
         self.volume = Volume(thresholds)
         self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
         self._ship, self._tank = ship, tank
@@ -123,8 +132,11 @@ class Monitors:
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
         self._begun = False
+        self._longest_gap_s = GAP_PERIODS * thresholds.roll_period_s
+        self._unwatched_s = 0.0
+        self.confirmed = False
         self._of_pair = self._of_drive = self._of_level = self._of_volume = 0
-        self._of_senders = self._of_twin = self._of_saturation = 0
+        self._of_senders = self._of_twin = self._of_saturation = self._of_watch = 0
         self.found = 0
 
     def follow(self, found: ModelSummary | ShipFigures | None) -> None:
@@ -236,9 +248,11 @@ class Monitors:
             self._look_at_water(now_ns, inbox, seen, held_pa)
         elif phase == 4:
             if seen.tank_age_ms <= STALE_MS:
-                self._of_volume = self.volume.update(
-                    inbox.port_level_m, inbox.starboard_level_m, LONG_S
-                )
+                port_m, starboard_m = inbox.port_level_m, inbox.starboard_level_m
+                volume = self.volume.update(port_m, starboard_m, LONG_S)
+                stuck = self._port_stuck.update(port_m, starboard_m)
+                stuck |= self._starboard_stuck.update(starboard_m, port_m)
+                self._of_volume = volume | stuck if volume & _VOLUME else volume
         elif phase == 8:
             elapsed_s = (now_ns - self._senders_ns) * 1e-9
             self._senders_ns = now_ns
@@ -261,6 +275,7 @@ class Monitors:
             | self._of_senders
             | self._of_twin
             | self._of_saturation
+            | self._of_watch
         )
         return found
 
@@ -312,22 +327,26 @@ class Monitors:
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
 
     def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations, held_pa: float) -> None:
-        late_s = (now_ns - self._round_ns) * 1e-9
-        self._round_ns = now_ns
-        oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
-        if oldest_ms > STALE_MS or late_s > LATE_ROUND * LONG_S:
+        elapsed_s = (now_ns - self._round_ns) * 1e-9
+        if elapsed_s > self._longest_gap_s:
             self._used.restart_water()
             if self._spare is not None:
                 self._spare.restart_water()
             self._level_stuck.restart()
             self._of_level = 0
+        oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
+        if oldest_ms > STALE_MS:
             return
+        self._round_ns = now_ns
+        steps = max(round(elapsed_s / LONG_S), 1) if elapsed_s <= self._longest_gap_s else 1
         roll_rad, level_m = inbox.roll_rad, inbox.level_m
         pressure_pa = inbox.pressure_pa - held_pa
         if self._water_free:
-            self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
-        told = self._told_by_water
-        self._used.water = self._used.equation.update(roll_rad, level_m, pressure_pa) & told
+            for _ in range(steps):
+                self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
+        told, equation = self._told_by_water, self._used.equation
+        self._used.water = water = equation.update(roll_rad, level_m, pressure_pa, steps) & told
+        self._note_watch(equation, elapsed_s, sound=not water)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
             return
@@ -335,8 +354,21 @@ class Monitors:
             spare.restart_water()
         else:
             spare_rad = motions.spare.roll_rad
-            spare.water = spare.equation.update(spare_rad, level_m, pressure_pa) & told
+            spare.water = spare.equation.update(spare_rad, level_m, pressure_pa, steps) & told
         self._leave_accused(inbox, motions, seen, spare)
+
+    def _note_watch(self, equation: TankEquation, elapsed_s: float, *, sound: bool) -> None:
+        """Note for how long, with measurements that come, nothing was told by the water."""
+        unwatched_s = 0.0 if equation.settled else self._unwatched_s + elapsed_s
+        self._unwatched_s = unwatched_s
+        period_s = self.thresholds.roll_period_s
+        if unwatched_s > UNWATCHED_PERIODS * period_s:
+            self.confirmed = False
+            longer = unwatched_s > LONG_PERIODS * period_s
+            self._of_watch = _UNWATCHED_LONG if longer else _UNWATCHED
+            return
+        self._of_watch = 0
+        self.confirmed = self.confirmed or (sound and equation.obeyed)
 
 
 def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:

@@ -181,3 +181,75 @@ def test_restart_forgets() -> None:
     equation.restart()
     assert math.isnan(equation.roll_gain)
     assert not equation.update(ship.roll_rad(0.0), ship.level_m(0.0), ship.pressure_pa(0.0))
+
+
+@pytest.mark.parametrize("every", [2, 4, 5])
+def test_samples_that_are_left_out_change_little(every: int) -> None:
+    """Half a second is a twentieth of the period: the inputs run nearly straight."""
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
+    ship = MovingShip(math.radians(2.0), noise=False)
+    whole, gaps = (TankEquation(SHIP, TANK, exact, STEP_S) for _ in range(2))
+    for k in range(1, 1200):
+        sample = (each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa))
+        roll, level, pressure = sample
+        whole.update(roll, level, pressure)
+        if k % every == 0:
+            gaps.update(roll, level, pressure, every)
+    assert gaps.roll_gain == pytest.approx(whole.roll_gain, abs=0.05)
+    assert gaps.pump_gain == pytest.approx(whole.pump_gain, abs=0.05)
+    assert gaps.level_gain == pytest.approx(whole.level_gain, abs=0.02)
+    assert gaps.late_s == pytest.approx(whole.late_s, abs=0.02)
+
+
+def test_inputs_run_straight_over_the_steps_that_are_left_out() -> None:
+    apart, together = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S) for _ in range(2))
+    for k in range(100):
+        found = [apart.update(0.01 * k, 0.02 * k, 300.0 * k), 0]
+        if k % 4 == 0:
+            found[1] = together.update(0.01 * k, 0.02 * k, 300.0 * k, 4)
+            assert found[0] == found[1]
+            assert together.roll_gain == pytest.approx(apart.roll_gain, nan_ok=True)
+            assert together._dd == pytest.approx(apart._dd)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 3.0, 30.0])
+def test_it_has_settled_after_six_time_constants_and_after_a_gap_again(seconds: float) -> None:
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    settles_s = 6 * T / (4 * math.pi)
+    assert not equation.settled
+    for k in range(round(seconds / STEP_S)):
+        equation.update(0.0, 0.0, 0.0)
+        assert equation.settled is (k * STEP_S >= settles_s)
+    # a full reservoir ends the judging, not the watch
+    equation.update(0.0, 0.99 * TANK.level_limit_m, 0.0)
+    assert equation.settled is (seconds > settles_s)
+    equation.restart()
+    assert not equation.settled
+
+
+@pytest.mark.parametrize(
+    ("fault", "obeyed"),
+    [
+        (lambda roll, level, pressure: (roll, level, pressure), True),
+        (lambda roll, level, pressure: (-roll, level, pressure), False),
+        (lambda roll, level, pressure: (roll, -level, pressure), False),
+    ],
+)
+@pytest.mark.parametrize("roll_deg", [0.1, 0.25, 0.5, 1.0, 4.0])
+@pytest.mark.parametrize("zero", range(-3, 4))
+def test_no_zero_makes_a_wrong_sensor_look_obeyed(
+    fault, obeyed: bool, roll_deg: float, zero: int
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), 0.0, noise=False)
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    seen = []
+    for k in range(600):
+        sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
+        sample = list(fault(*sample))
+        sample[abs(zero) % 3] += math.copysign(1, zero) * ZEROS[abs(zero) % 3] if zero else 0.0
+        equation.update(*sample)
+        seen.append(equation.obeyed)
+    if not obeyed or roll_deg == 0.1:
+        assert not any(seen)
+    elif roll_deg >= 1.0:
+        assert any(seen)

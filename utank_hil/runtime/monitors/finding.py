@@ -30,3 +30,5 @@ class Finding(IntFlag):
     SENSORS_UNCLEAR = auto()
     DAMAGED = auto()
     FRAMES_LOST = auto()
+    UNWATCHED = auto()
+    UNWATCHED_LONG = auto()

@@ -27,6 +27,8 @@ MOST_PER_CYCLE: Final = 1.25
 MOST_FRAMES: Final = 8.0
 LEAST_PER_CYCLE: Final = 0.75
 SLOW_S: Final = 2.0
+BURST_CYCLES: Final = 8.0
+"""A message with as many cycles between two looks has so few in one look by a gap alone."""
 LOST_SHARE: Final = 0.001
 MOST_LOST: Final = 5.0
 FOREIGN_SHARE: Final = 0.1
@@ -77,7 +79,8 @@ class Stream:
         self.begin()
         self.damaged = 0
         self.excess = self._missing = 0.0
-        self._silent_s = self._slow_s = 0.0
+        self._silent_s = self._slow_s = self._gap = 0.0
+        self._heard_before = False
 
     def begin(self) -> None:
         """Judge nothing of what was received until now."""
@@ -101,9 +104,16 @@ class Stream:
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
         self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
-        if heard:  # a silence is judged elsewhere
-            self._slow_s = self._slow_s + elapsed_s if came < LEAST_PER_CYCLE * cycles else 0.0
         missing = self._missing + lost - LOST_SHARE * came
+        if heard:  # a silence is judged elsewhere, its first and last look too
+            slow = came < LEAST_PER_CYCLE * cycles
+            self._slow_s = self._slow_s + elapsed_s if slow else 0.0
+            missing += self._gap
+            burst = slow and self._heard_before and cycles >= BURST_CYCLES
+            self._gap = cycles - came if burst else 0.0  # longer than the counter bridges
+        else:
+            self._gap = 0.0
+        self._heard_before = heard > 0
         self._missing = missing = min(max(missing, 0.0), MOST_LOST + 1.0)
         found = _SECOND if excess > MOST_FRAMES else 0
         if missing > MOST_LOST or self._slow_s > SLOW_S:

@@ -81,10 +81,12 @@ class DerivativeFilter:
     ----------
     value, rate : float
         Output and its first derivative.
+    last : float
+        The last input.
     """
 
     __slots__ = (
-        "_a11", "_a12", "_a21", "_a22", "_b1", "_b2", "_c1", "_c2", "_last", "_w", "rate", "value",
+        "_a11", "_a12", "_a21", "_a22", "_b1", "_b2", "_c1", "_c2", "_w", "last", "rate", "value",
     )  # fmt: skip
 
     def __init__(self, frequency_rad_s: float, period_s: float) -> None:
@@ -100,13 +102,13 @@ class DerivativeFilter:
 
     def start(self, value: float) -> None:
         """Begin anew with a constant input."""
-        self._last = self.value = value
+        self.last = self.value = value
         self.rate = 0.0
 
     def update(self, value: float) -> float:
         """Take the next value; return the second derivative."""
-        last, old, rate, w = self._last, self.value, self.rate, self._w
-        self._last = value
+        last, old, rate, w = self.last, self.value, self.rate, self._w
+        self.last = value
         self.value = new = self._a11 * old + self._a12 * rate + self._b1 * value + self._c1 * last
         self.rate = rate = self._a21 * old + self._a22 * rate + self._b2 * value + self._c2 * last
         bend: float = w * (w * (value - new) - 2 * rate)
@@ -133,6 +135,10 @@ class TankEquation:
         that speaks most for sound sensors.
     late_s : float
         Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
+    obeyed : bool
+        Whether roll or level gain is now of a size that no zeros of wrong sensors explain.
+    settled : bool
+        Whether the filters have forgotten their start, the first one or that after a gap.
     """
 
     def __init__(
@@ -181,6 +187,7 @@ class TankEquation:
     def restart(self) -> None:
         """Begin anew after a gap."""
         self._wait = -1
+        self.settled = self.obeyed = False
         self._xx = self._pp = self._rest_x = self._rest_p = self._both = self._level_both = 0.0
         self._x = self._p = self._left = self._weight = self._lead = self._d = self._dd = 0.0
         self._samples = self._still = 0
@@ -188,20 +195,35 @@ class TankEquation:
         self._unmoved = 0.0
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
 
-    def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
-        """Take a sample of all three; return what was found."""
+    def update(self, roll_rad: float, level_m: float, pressure_pa: float, steps: int = 1) -> int:
+        """Take a sample of all three; return what was found.
+
+        Between two samples that are some `steps` apart all three are taken to run straight.
+        """
         if self._wait < 0:
             self._roll.start(roll_rad)
             self._level.start(level_m)
             self._pump.start(pressure_pa / self._density)
             self._wait = self._settle
             return 0
+        found = 0
+        level, roll, pump, push = self._level, self._roll, self._pump, pressure_pa / self._density
+        for left in range(steps, 0, -1):
+            found = self._take(
+                roll.last + (roll_rad - roll.last) / left,
+                level.last + (level_m - level.last) / left,
+                pump.last + (push - pump.last) / left,
+            )
+        return found
+
+    def _take(self, roll_rad: float, level_m: float, pump_m2_s2: float) -> int:
         level, roll = self._level, self._roll
         level_m_s2 = level.update(level_m)
         roll_rad_s2 = roll.update(roll_rad)
-        self._pump.update(pressure_pa / self._density)
+        self._pump.update(pump_m2_s2)
         if self._wait > 0:
             self._wait -= 1
+            self.settled = self.settled or self._wait == 0
             return 0
         if abs(level_m) > self._most_m:
             self._wait = self._settle
@@ -238,10 +260,13 @@ class TankEquation:
 
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
         found = 0
+        self.obeyed = False
         share, zero = self._least_share, self._zero
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
         if xx > self._least_xx and xx > share * pp:
-            self.roll_gain = gain = (self._rest_x + zero * abs(self._x)) / xx
+            feigned = zero * abs(self._x)
+            self.roll_gain = gain = (self._rest_x + feigned) / xx
+            self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
             if gain < self._sign_gain:
                 found = _WATER_SIGN
         if pp > self._least_pp and pp > share * xx:
@@ -249,7 +274,9 @@ class TankEquation:
             if gain < self._sign_gain:
                 found |= _PUMP_SIGN
         if both > self._least_xx + self._least_pp:
-            self.level_gain = gain = (self._level_both + zero * abs(self._x + self._p)) / both
+            feigned = zero * abs(self._x + self._p)
+            self.level_gain = gain = (self._level_both + feigned) / both
+            self.obeyed = self.obeyed or self._level_both - feigned > STUCK_GAIN * both
             if gain < self._sign_gain:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:

@@ -9,10 +9,16 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Final
 
+import numpy as np
+
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import Range, range_problems, refuse
 
+UNCONFIRMED_SHARE: Final = 0.25
+UNCONFIRMED_HEEL_DEG: Final = 0.25
+"""Steady heel by a pressure that does little harm, whichever way it presses."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
@@ -80,6 +86,8 @@ class MonitorThresholds:
         Pressure of a pump that is off, per level, that is excused besides.
     pressure_limit_pa : float
         Greatest command.
+    unconfirmed_share : float
+        Of the pressure, until the water was seen to move as roll and pressure push it.
     amplified_roll_rad : float
         Root mean square of the roll below which it is not compared with the twin's.
     """
@@ -106,6 +114,7 @@ class MonitorThresholds:
     pressure_error_pa: float
     free_rotor_pa_m: float
     pressure_limit_pa: float
+    unconfirmed_share: float
     amplified_roll_rad: float
 
 
@@ -153,5 +162,15 @@ def thresholds_of(
         # its inertia is some 7 % of the water's, which 2 rho g accelerates per level
         free_rotor_pa_m=0.1 * 2 * tank.density_kg_m3 * GRAVITY_M_S2,
         pressure_limit_pa=limits.pressure_pa,
+        unconfirmed_share=_unconfirmed_share(plant),
         amplified_roll_rad=math.radians(0.5),
     )
+
+
+def _unconfirmed_share(plant: DesignPlant) -> float:
+    """A quarter, or what heels a ship whose pump is strong for her size by so little."""
+    push_n = plant.limits.pressure_pa * plant.tank.reservoir_area_m2
+    stiffness = coupled_matrices(plant.ship, plant.tank)[2]
+    heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0])
+    least = UNCONFIRMED_SHARE * heel_rad <= math.radians(UNCONFIRMED_HEEL_DEG)
+    return UNCONFIRMED_SHARE if least else float(math.radians(UNCONFIRMED_HEEL_DEG) / heel_rad)
