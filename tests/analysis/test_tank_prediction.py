@@ -48,7 +48,6 @@ def test_waves_too_short_to_roll_the_ship_are_refused() -> None:
 
 
 def test_each_tank_lowers_the_roll_further() -> None:
-    assert FOUND.active is not None
     assert FOUND.without_tank_rad > FOUND.passive.roll_rms_rad > FOUND.active.roll_rms_rad
     assert FOUND.active_below_passive is not None
     assert FOUND.active_below_passive > 0.2
@@ -69,7 +68,6 @@ def test_power_is_what_the_stepped_loop_gives_the_water() -> None:
     frequency = 0.5  # away from resonance: pressure and flow are out of phase
     wave = Harmonics(np.full(1, 2e5), np.full(1, frequency), np.zeros(1))
     found = predict_roll(PLANT, dataclasses.replace(SEA, wave_moment=wave))
-    assert found.law is not None
     law = found.law.design.law(PLANT)
     fine = 30
     step_s = law.sample_time_s / fine
@@ -96,7 +94,6 @@ def test_power_is_what_the_stepped_loop_gives_the_water() -> None:
 
 def test_shaft_power_is_what_the_stepped_pump_draws_in_the_same_waves() -> None:
     """Pressure and flow of the linear loop in time, and a rotor that has to follow them."""
-    assert FOUND.law is not None
     pump = Pump.for_duct(TANK.duct_area_m2, PLANT.limits.pressure_pa)
     pressure_rms_pa, flow_rms_m3_s, water_w = pump_moments(PLANT, FOUND.law.design, WAVES)
     rng, step_s = np.random.default_rng(1), 0.02
@@ -123,7 +120,6 @@ def test_a_vessel_without_a_pump_has_no_active_tank() -> None:
 
 def test_loading_changes_the_roll_and_the_nominal_one_is_the_prediction() -> None:
     points = {point.period_scale: point for point in loading_sensitivity(PLANT, SEA, FOUND)}
-    assert FOUND.active is not None
     assert points[1.0].active_rad == pytest.approx(FOUND.active.roll_rms_rad)
     assert points[1.0].passive_rad == pytest.approx(FOUND.passive.roll_rms_rad)
     stiff = dataclasses.replace(SHIP, stiffness_nm_rad=SHIP.stiffness_nm_rad / 0.7**2)
@@ -133,7 +129,6 @@ def test_loading_changes_the_roll_and_the_nominal_one_is_the_prediction() -> Non
     assert points[0.7].passive_rad == pytest.approx(other.passive.roll_rms_rad)
     assert points[0.7].without_tank_rad == pytest.approx(other.without_tank_rad)
     # the law is the one made for the nominal ship
-    assert FOUND.law is not None
     law, measured = FOUND.law.design.law(PLANT), FOUND.law.design.predictor.measured
     active = motion_in_sea(
         law, coupled_model(stiff, TANK), measured, moment, PLANT.delay_s, PLANT.lag_s

@@ -26,7 +26,6 @@ def test_interrupt_ends_it_at_once_and_without_a_traceback() -> None:
         # a shell's background job ignores it, and its children with it
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:
-        assert process.stdout is not None
         process.stdout.readline()
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=30)
@@ -53,7 +52,6 @@ def test_a_closed_terminal_and_a_stopped_service_end_it_as_ctrl_c_and_once(numbe
     with subprocess.Popen(
         [sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True
     ) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "loading\n"
         process.send_signal(number)
         assert process.stdout.readline() == "closing\n"

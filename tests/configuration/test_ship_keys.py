@@ -186,7 +186,6 @@ def test_pump_fills_the_tanks_duct_and_keeps_what_is_given(tmp_path: Path) -> No
     similar = Pump.for_duct(1.2, 20e3)
     assert vessel(tmp_path).pump == similar
     own = vessel(tmp_path, pump="{max_pressure_pa: 20.0e+3, max_power_w: 9.0e+4}").pump
-    assert own is not None
     assert (own.max_power_w, own.radius_m) == (9e4, similar.radius_m)
 
 

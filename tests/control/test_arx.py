@@ -96,7 +96,7 @@ def test_simulation_equals_the_state_space_form_and_its_own_prediction(
     )
     u = rng.normal(size=(30, inputs))
     y = arx.simulate(u)
-    system = arx.to_state_space()
+    system = control.ss(*arx.matrices())
     scale = 1e-10 * np.abs(y).max()
     np.testing.assert_allclose(respond(system, np.zeros(order * outputs), u), y, atol=scale)
     np.testing.assert_allclose(arx.predict(u, y), y, atol=scale)

@@ -112,7 +112,6 @@ def test_a_factory_that_asks_for_the_plant_gets_it() -> None:
 
 def test_a_law_s_own_state_space_is_judged_in_the_loops_count() -> None:
     law = built("with_linear")
-    assert law.linear is not None
     z = np.exp(1j * np.array([0.1, 1.0]))
     np.testing.assert_allclose(law.linear.response(z)[:, 0, 0], 1e5 / z)
     assert control.ss([], [], [], [[1e5]], 0.1).D == 1e5

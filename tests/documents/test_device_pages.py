@@ -52,7 +52,6 @@ def registers(data: Sequence[int]) -> list[int]:
 
 def data_id(name: str, counter: int) -> int:
     dbc = DATABASE.get_message_by_name(name).dbc
-    assert dbc is not None
     return bytes.fromhex(str(dbc.attributes["DataIDs"].value))[counter]
 
 
@@ -80,12 +79,10 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
     assert after == registers(taken)
     assert after[-1] ^ 0xFF == shown[0]
     begins = re.search(r"begins\n([0-9A-F ]+),", page)
-    assert begins is not None
     listed = bytes.fromhex(begins[1])
     assert listed == bytes(data_id("SENSOR_MOTION", counter) for counter in range(6))
     frame = Frame(CATALOGUE.codec(SensorMotion).can_id, shown)
     message = CATALOGUE.receiver(SensorMotion).accept(frame)
-    assert message is not None
     assert message.quality is Quality.GOOD
     assert (message.roll_rad, message.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
     assert f"0x{frame.can_id:08X}" in page
@@ -129,7 +126,6 @@ def test_frames_of_the_other_pages_are_right(
     content: dict[str, object],
 ) -> None:
     row = re.search(rf"^\| {name} \| (0x.*)$", text(page), re.M)
-    assert row is not None
     shown = bytes(hexes(row[1]))
     assert shown == encoded(name, counter, **signals)
     assert f"data ID is 0x{data_id(name, counter):02X}" in text(page).replace("\n", " ")

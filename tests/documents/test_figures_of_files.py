@@ -23,7 +23,6 @@ def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
     found = re.search(pattern, text)
     assert found is not None
     pump = load_config(ROOT / "configs" / "ships" / "patti_b.yaml", Vessel).pump
-    assert pump is not None
     values = (pump.duct_area_m2, pump.max_pressure_pa / 1e3, pump.max_speed_rad_s,
               pump.max_power_w / 1e3)  # fmt: skip
     for written, value in zip(found.groups(), values, strict=True):
@@ -40,7 +39,6 @@ def test_roll_in_the_readme_is_that_of_the_measured_rows() -> None:
     text = " ".join((ROOT / "README.md").read_text().split())
     pattern = r"LQG (\d+) %, DPC (\d+) %, GPC (\d+) %, and (\d+) % for the GPC that plans"
     found = re.search(pattern, text)
-    assert found is not None
     for written, law in zip(found.groups(), ("lqg", "dpc", "gpc", "constrained"), strict=True):
         assert int(written) == round(100 * rows[law])
 

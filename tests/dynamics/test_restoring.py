@@ -37,14 +37,6 @@ def test_energy_is_the_work_of_the_moment(ship):
     np.testing.assert_allclose(slope, table.moment_nm(roll), rtol=1e-4, atol=1.0)
 
 
-def test_angle_of_vanishing_stability():
-    assert restoring(PATTI).vanishing_rad() == pytest.approx(math.sqrt(0.2138 / 0.6713), rel=1e-12)
-    assert restoring(THESIS_SHIP).vanishing_rad() == math.inf
-    angle = restoring(LEVERS).vanishing_rad()
-    assert math.radians(70) < angle < math.radians(80)
-    assert abs(restoring(LEVERS).moment_nm(angle)) < 1.0
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

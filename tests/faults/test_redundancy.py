@@ -83,7 +83,6 @@ def motion(change: Callable[[float, float], tuple[float, float]], address: Addre
         if frame.can_id != receiver.can_id:
             return (frame,)
         message = receiver.accept(frame)
-        assert message is not None
         transmitter.counter = frame.data[1] - 1
         roll_rad, rate_rad_s = change(message.roll_rad, message.roll_rate_rad_s)
         return (transmitter.frame(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD)),)
@@ -100,7 +99,6 @@ def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
     assert bench.node.mode is Mode.ACTIVE
     assert not degraded
     motions = bench.node.inbox.motions
-    assert motions is not None
     assert motions.used is motions.first
 
 
@@ -110,7 +108,6 @@ def test_one_silent_motion_sensor_leaves_the_other_and_half_the_pressure(first: 
     bench.fail("sensors" if first else "sensors_2", dropped(SensorMotion) if first else dropped())
     bench.run(T0_S + 5.0)
     motions = bench.node.inbox.motions
-    assert motions is not None
     assert motions.used is (motions.second if first else motions.first)
     assert bench.node.mode is Mode.ACTIVE
     assert bench.node.supervisor.degraded
@@ -163,7 +160,6 @@ def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> No
     name = "sensors" if first else "sensors_2"
     bench.fail(name, motion(WRONG.get(wrong) or held(), address))
     motions = bench.node.inbox.motions
-    assert motions is not None
     end_ns = T0 + round(1.5 * PERIOD_S * SECOND)
     while bench.lockstep.now_ns < end_ns and (not first or motions.used is motions.first):
         bench.run(bench.lockstep.now_ns * 1e-9 + 0.1)
@@ -179,7 +175,6 @@ def test_a_sensor_found_wrong_is_not_gone_back_to_while_the_other_is_silent(gap_
     bench = Bench()
     bench.fail("sensors", motion(lambda roll, rate: (roll + 0.015, rate)))
     motions = bench.node.inbox.motions
-    assert motions is not None
     bench.run(T0_S + 20)
     assert motions.used is motions.second
     # its evidence is gone by now, and the two are still apart
@@ -214,7 +209,6 @@ def test_a_wrong_sensor_beside_does_not_excuse_the_law_from_her_twin() -> None:
     bench.run(T0_S + 12.0)
     assert bench.node.mode is Mode.ACTIVE
     monitors = bench.node.monitors
-    assert monitors is not None
     monitors.twin.amplified = True
     monitors.twin._losing_s = 100.0
     monitors.twin._power = 4 * max(monitors.twin._twin_power, 1e-3)
@@ -234,7 +228,6 @@ def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> 
     bench.run_to_fault(40.0)
     assert bench.node.fault in (Fault.MOTION_SIGN_FLIP, Fault.SIGN_FLIP, Fault.STUCK_SIGNAL)
     motions = bench.node.inbox.motions
-    assert motions is not None
     assert motions.used is motions.first
 
 
@@ -263,7 +256,6 @@ def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
 def test_the_hard_wired_stop_ends_it_at_once_and_holds_the_reset() -> None:
     bench = Bench()
     hardwired = bench.ship.hardwired
-    assert hardwired is not None
     bench.run(T0_S)
     assert bench.node.mode is Mode.ACTIVE
     hardwired.stop_pressed = True
@@ -295,7 +287,6 @@ def test_a_stop_loop_that_is_not_shut_acts_out_of_sequence_and_in_bad_quality(
     for tick in range(3):
         node.receive(transmitter.frame(shut), tick * 50 * MS)
     hardwired = node.inbox.hardwired
-    assert hardwired is not None
     assert not hardwired.stop
     transmitter.counter += 7
     bad = HardwiredInputs(Switch.OFF, Switch.OFF, switch, Quality.BAD)

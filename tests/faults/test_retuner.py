@@ -162,10 +162,8 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
               TimedAction(80.0, Action.ARM))  # fmt: skip
     voyage = Voyage(Broken(law_of(1e5)), script).run(66)
     adaptive = voyage.node._retuning
-    assert adaptive is not None
     assert adaptive.state is TRIAL
     configured, bad = adaptive.laws.accepted, adaptive.laws.on_trial
-    assert bad is not None
     good = configured.controller.step
     bad.controller.step = nan = lambda y, reference=None: np.full(1, np.nan)  # type: ignore[method-assign]
     if failing == "all":

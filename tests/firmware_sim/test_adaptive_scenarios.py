@@ -46,10 +46,8 @@ def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controlle
     # no false alarm either: the twin is the ship of the file, which this one is not any more
     assert run.column("mode")[-1] == Mode.ACTIVE
     figures = retuning_figures(run, scenario("adaptive.yaml"), 60.0)
-    assert figures is not None
     assert figures.roll_after_below_before is not None
     assert figures.roll_after_below_before > 0.32  # thesis 3.8: about 40 %
-    assert figures.found is not None
     assert figures.found.roll_period_s == pytest.approx(figures.truth.roll_period_s, rel=0.005)
     assert figures.truth.roll_period_s == pytest.approx(7.5, rel=1e-4)
     assert run.refused_commands == 0

@@ -76,7 +76,6 @@ def test_set_point_is_zero_within_the_frames_own_timeout_and_one_tick(
     assert bench.told.state is DriveState.FAULT_REACTION_ACTIVE
     bench.ticks(10)
     assert bench.told.state is DriveState.FAULT
-    assert bench.status_2 is not None
     assert bench.status_2.fault is DriveFault.COMMAND_TIMEOUT
 
 
@@ -199,7 +198,6 @@ def test_status_can_say_the_power_of_every_shipped_pump(monkeypatch: pytest.Monk
         monkeypatch.setattr(Plant, "pump_power_w", power_w)
         bench = DriveBench()
         bench.tick()
-        assert bench.status_2 is not None
         said_w = bench.status_2.bus_voltage_v * bench.status_2.current_a
         assert said_w == pytest.approx(power_w, rel=1e-3)
 
@@ -291,7 +289,6 @@ def test_a_new_drive_has_no_set_point_and_warns_of_nothing() -> None:
     bench = DriveBench()
     assert bench.drive.setpoint_pa == 0.0
     bench.tick()
-    assert bench.status_2 is not None
     assert not bench.status_2.command_warning
 
 
@@ -311,7 +308,6 @@ def test_a_drive_that_is_switched_off_by_itself_is_in_no_fault() -> None:
     bench.command(20e3)
     bench.ticks(20)
     assert bench.told.state is DriveState.SWITCH_ON_DISABLED
-    assert bench.status_2 is not None
     assert bench.status_2.fault is DriveFault.NONE
 
 
@@ -329,7 +325,6 @@ def test_status_2_comes_every_100_ms_and_warns_of_refused_commands_only() -> Non
     warned = [CATALOGUE.codec(DriveStatus2).decode(frame.data) for frame in sent.values()]
     assert [each.command_warning for each in warned if each is not None] == [False, True, False]
     for each in warned:
-        assert each is not None
         warnings = each.temperature_warning, each.voltage_warning, each.sensor_warning
         assert not any(warnings)
 
@@ -401,7 +396,6 @@ def test_refusals_in_a_row_trip_the_drive_and_one_good_command_forgives() -> Non
     bench.command(60e3)
     bench.ticks(10)
     assert bench.told.state is DriveState.FAULT
-    assert bench.status_2 is not None
     assert bench.status_2.fault is DriveFault.COMMAND_REFUSED
     assert bench.drive.refused == 2 * MISCODED_COMMANDS_TO_TRIP - 1
 

@@ -228,7 +228,6 @@ def test_a_valve_of_another_maker_throttles_the_emulated_tank() -> None:
     foreign.versions = (load_catalogue().version, scenario.vessel.version)
     controller = build_controller_node(scenario.controllers["on_off"], commissioned=True)
     lockstep = Lockstep([*ship.without(("valve",)), foreign, controller])
-    assert scenario.vessel.valve is not None
     loss_at = partial(scenario.vessel.valve.loss, scenario.vessel.tank)
     openings = set()
     for _ in range(1500):

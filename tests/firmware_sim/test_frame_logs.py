@@ -77,7 +77,6 @@ def test_a_run_is_the_same_with_a_frame_log_which_is_replayed_exactly(
 def test_a_run_in_real_time_leaves_a_log_that_is_replayed_exactly(tmp_path: Path) -> None:
     file = tmp_path / "dpc.frames"
     run = run_in_one_process(replace(job_of("dpc", 2.0, []), frames=file))
-    assert run.loop is not None
     result = replayed(file)
     assert (result.first, result.ticks) == (None, run.loop.statistics.ticks)
 

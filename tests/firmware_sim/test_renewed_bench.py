@@ -24,11 +24,6 @@ DESIGN, TRIAL = RetuningState.DESIGN, RetuningState.TRIAL
 SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 
 
-class Unwatched:
-    def stopped(self, done_s: float) -> bool:
-        return False
-
-
 def job_of(duration_s: float, scenario: Scenario = SCENARIO) -> Job:
     """The shipped configuration, which estimates more often and from a shorter record."""
     config = load_config(Path("configs/controllers/self_tuning.yaml"), ControllerConfig)
@@ -45,10 +40,10 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     monkeypatch.setattr(estimating, "LEAST_PERIODS", 14.0)
     job = job_of(240.0)
     file = tmp_path / "renewed.frames"
-    logged = run_lockstep(replace(job, frames=file), Unwatched())
+    logged = run_lockstep(replace(job, frames=file))
     assert [event.state for event in logged.retuning] == [DESIGN, TRIAL]
     assert "renewed for Hs" in logged.retuning[-1].reasons[0]
-    np.testing.assert_array_equal(logged.rows, run_lockstep(job, Unwatched()).rows)
+    np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
     log = FrameLog(file)
     with recorded_config(log.head) as config:
         result, why = replay_log(log, config, tmp_path)
@@ -62,7 +57,7 @@ def test_a_peak_of_the_waves_is_not_taken_for_a_ship_of_twice_the_stiffness() ->
     mild = replace(sea.effective_slope, coefficient=sea.effective_slope.coefficient / 2)
     scenario = scenario.model_copy(update={"sea": sea.model_copy(update={"effective_slope": mild})})
     jobs = jobs_of(scenario, scenario.seed, 640.0)
-    passive, law = (run_lockstep(jobs[k], Unwatched()) for k in (0, -1))
+    passive, law = (run_lockstep(jobs[k]) for k in (0, -1))
     assert law.retuning[1].state is TRIAL
     assert "roll period 10.70 s" in law.retuning[1].reasons[0]
     tried = law.between(law.retuning[1].time_ns * 1e-9 + 10.0, 640.0)
@@ -81,8 +76,8 @@ def test_the_first_waves_of_a_swell_condemn_no_law() -> None:
         effective_slope=SCENARIO.sea.effective_slope,
     )
     scenario = SCENARIO.model_copy(update={"sea": swell, "seed": 4})
-    passive = run_lockstep(jobs_of(scenario, 4, 180.0)[0], Unwatched())
-    law = run_lockstep(job_of(180.0, scenario), Unwatched())
+    passive = run_lockstep(jobs_of(scenario, 4, 180.0)[0])
+    law = run_lockstep(job_of(180.0, scenario))
     assert not law.retuning
     assert set(law.column("mode")[law.between(10.0, 180.0)]) == {Mode.ACTIVE}
     roll, without = (

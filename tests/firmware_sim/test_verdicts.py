@@ -179,7 +179,6 @@ def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> Non
     assert mark_of(result_of(PASSIVE_RUN, disarmed), disarmed) is not None
     never = result_of(PASSIVE_RUN, disarmed, operator=(TimedAction(5.0, Action.PASSIVE),))
     mark = mark_of(never, disarmed)
-    assert mark is not None
     assert (mark.word, mark.why) == (
         "idle",
         "no order to go to ACTIVE before the end of the window",

@@ -41,7 +41,6 @@ def row_by_row(v: FloatArray, order: int, highest: int) -> tuple[FloatArray, Flo
 def test_white_noise_is_found_white() -> None:
     v = np.random.default_rng(1).standard_normal((1500, 2)) @ MIXING.T
     found = low_order_noise_model(v, 30)
-    assert found is not None
     assert found.order == 0
     np.testing.assert_allclose(found.covariance, v[30:].T @ v[30:] / 1470, rtol=1e-9)
 
@@ -56,7 +55,6 @@ def test_white_noise_is_seldom_refused() -> None:
 
 def test_autoregression_is_recovered() -> None:
     found = low_order_noise_model(coloured(20_000, 3), 20)
-    assert found is not None
     assert found.order == 2
     np.testing.assert_allclose(found.alpha, ALPHA, atol=0.05)  # standard deviation 0.01 on average
     np.testing.assert_allclose(found.covariance, MIXING @ MIXING.T, atol=0.03)

@@ -26,7 +26,6 @@ def test_ship_and_sea_are_told_while_the_pump_works():
     ship = loaded(14.4)
     found = estimate(request(motion_in(MOMENT_NM, ship)[500:]), TASK)
     assert (found.of_sea, found.of_ship) == (Verdict.GOOD, Verdict.GOOD)
-    assert found.ship is not None
     assert found.ship.roll_period_s == pytest.approx(14.4, rel=0.03)
     assert found.ship.stiffness_nm_rad == pytest.approx(ship.stiffness_nm_rad, rel=0.05)
     # the moment is that on the configured ship, and the height is given per this one's stiffness
@@ -50,7 +49,6 @@ def test_a_ship_loaded_within_the_record_is_the_present_one():
     half = len(motion) - 3150
     found = estimate(request(np.vstack([motion[500:half], loaded_m[half:]])), TASK)
     assert found.of_ship is Verdict.GOOD
-    assert found.ship is not None
     assert found.ship.roll_period_s == pytest.approx(14.4, rel=0.05)
     assert found.duration_s == pytest.approx(600.0, rel=0.1)
 
@@ -59,7 +57,6 @@ def test_with_a_passive_tank_the_waves_are_those_of_the_known_ship():
     ship = loaded(10.0)
     found = estimate(request(motion_in(MOMENT_NM, ship, 0.0)[500:], ship), TASK)
     assert (found.of_sea, found.of_ship) == (Verdict.GOOD, Verdict.UNCERTAIN)
-    assert found.ship is not None
     assert found.ship.roll_period_s == pytest.approx(10.0, rel=0.05)
     factor = SHIP.stiffness_nm_rad / ship.stiffness_nm_rad
     assert found.hs_m == pytest.approx(4.0 * factor, rel=0.15)

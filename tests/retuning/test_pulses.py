@@ -79,7 +79,6 @@ def test_excitation_is_chosen_in_the_configuration(tmp_path: Path) -> None:
     path = tmp_path / "chosen.yaml"
     path.write_text(content + "  excitation: {kind: chirp, band_rad_s: [0.3, 0.9]}\n")
     config = load_config(path, ControllerConfig)
-    assert config.retuning is not None
     assert config.retuning.excitation == Excitation("chirp", (0.3, 0.9))
     for wrong, said in (
         ("{kind: noise}", "retuning.excitation.kind"),

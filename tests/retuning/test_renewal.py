@@ -59,7 +59,6 @@ def test_the_law_is_for_the_estimated_ship_at_the_sample_time_of_the_one_in_char
 
 def test_beyond_the_bands_the_slope_falls_as_that_of_wind_waves() -> None:
     waves = estimated().waves
-    assert waves is not None
     tailed = TailedSpectrum(waves)
     inside = OMEGA[:-1] + 0.01
     assert tailed.slope_density(inside) == pytest.approx(waves.slope_density(inside))
@@ -86,7 +85,6 @@ def test_waves_that_do_not_roll_her_are_refused_with_the_reason() -> None:
 def test_the_works_of_a_configuration_hold_the_renewal_and_its_power_budget() -> None:
     law = replace(CONFIG.law, mean_power_w=2e5)  # type: ignore[type-var]  # it is a dataclass
     work, estimating = works_of(CONFIG.model_copy(update={"law": law}))
-    assert work is not None
     assert estimating is not None
     assert work[0].keywords["task"].mean_power_w == 2e5  # type: ignore[attr-defined]  # partial
     widest = estimated().numbers()

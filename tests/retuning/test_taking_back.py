@@ -135,7 +135,6 @@ def test_law_that_leans_on_the_pump_is_taken_back() -> None:
     rig = Rig(ToyRetuner(candidate_of(1e5)))
     rig.retune_until(TRIAL)
     law = rig.controller.laws.on_trial
-    assert law is not None
     step = law.controller.step
     law.controller.step = lambda y, reference=None: step(y, reference) + 3e4  # type: ignore[method-assign]
     rig.run_until(REFUSED)
@@ -166,7 +165,6 @@ def test_law_whose_answer_is_not_finite_is_dropped_before_anyone_hears_of_it() -
     rig.retune_until(TRIAL)
     rig.run(5)
     law = rig.controller.laws.on_trial
-    assert law is not None
     law.controller.step = lambda y, reference=None: np.full(1, np.nan)  # type: ignore[method-assign]
     rig.run(300)
     assert states(rig) == [IDENTIFY, DESIGN, TRIAL, REFUSED]
@@ -179,7 +177,6 @@ def test_law_that_is_faded_from_is_cut_off_when_its_answer_is_not_finite() -> No
     rig.retune_until(TRIAL)
     rig.run(60)
     law = rig.controller.laws.on_trial
-    assert law is not None
     rig.engaged = False  # back to the accepted law, by a fade
     rig.run(3)
     law.controller.step = lambda y, reference=None: np.full(1, np.nan)  # type: ignore[method-assign]

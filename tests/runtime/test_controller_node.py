@@ -66,7 +66,6 @@ def test_armed_controller_commands_the_laws_pressure_and_enables_the_drive_in_se
     bench.law.answer_pa = LEVEL
     bench.run(600)
     assert bench.pressure_pa == LEVEL
-    assert bench.status is not None
     assert bench.status.armed
     assert bench.status.configuration_version == VERSION
 
@@ -243,7 +242,6 @@ def test_status_tells_of_a_loop_without_real_time_scheduling(
 ) -> None:
     bench = ControllerBench(statistics=statistics)
     bench.run(200)
-    assert bench.status is not None
     assert bench.status.not_realtime is told
 
 
@@ -294,12 +292,16 @@ def test_until_the_water_obeyed_the_pressure_is_a_quarter() -> None:
     assert bench.node.command_pa > pressures[-1]
 
 
-def test_the_status_says_when_the_drive_is_at_a_limit() -> None:
+def test_the_status_says_when_drive_or_command_is_at_a_limit() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.law.answer_pa = 2 * LIMITS.pressure_pa
+    bench.run(1000)
+    assert bench.status.saturated is True
     bench = ControllerBench(START_NS)
     for limits, told in (((False,) * 4, False), ((True,) * 4, True), ((False,) * 4, False)):
         bench.drive_limits = limits
         bench.run(200)
-        assert bench.status is not None
         assert bench.status.saturated is told
 
 
@@ -532,7 +534,6 @@ def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
     monkeypatch.setattr(bench.node, "_retuning", noted)
     assert bench.node.retuning_state is RetuningState.TRIAL
     bench.run(200)
-    assert bench.status is not None
     assert bench.status.retuning is RetuningState.TRIAL
 
 

@@ -627,7 +627,6 @@ def test_the_stream_of_the_motion_sensor_in_use_counts_for_the_protection() -> N
 def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence() -> None:
     line = RedundantLine()
     hardwired = line.inbox.hardwired
-    assert hardwired is not None
     shut = HardwiredInputs(Switch.OFF, Switch.OFF, Switch.OFF, Quality.GOOD)
     line.hear(line.hardwired.frame(shut))
     assert (hardwired.heard_ns, hardwired.stop) == (line.now_ns, False)

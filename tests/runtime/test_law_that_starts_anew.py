@@ -82,7 +82,6 @@ def rearm(bench: ControllerBench) -> None:
 )
 def test_operator_is_told_that_the_law_ended_and_why(passed: str, fault: Fault) -> None:
     bench = rolling_bench()
-    assert bench.status is not None
     assert bench.status.fault is Fault.NONE
     assert not bench.status.alarm
     if passed == "roll":
@@ -111,12 +110,10 @@ def test_armed_again_it_starts_again_from_zero(reset_first: bool) -> None:
     if reset_first:
         bench.order_is(reset=True)
         bench.run(200)
-        assert bench.status is not None
         assert bench.status.fault is Fault.NONE
         bench.order_is(reset=False)
         bench.run(100)
     rearm(bench)
-    assert bench.status is not None
     assert bench.status.fault is Fault.NONE
     assert greatest_pa(bench, 0.5) < 0.1 * FULL_PA
     assert greatest_pa(bench, 12.0) > ON_COURSE_PA

@@ -141,7 +141,7 @@ TABLE = replace(
 def test_righting_moment_is_that_of_the_ship_piece_by_piece_and_beyond() -> None:
     """Beyond the angle of vanishing stability, too, where it capsizes her."""
     softening = replace(FIRST.ship, restoring_odd_nm=(-3e9,))
-    assert restoring(softening).vanishing_rad() < 0.9
+    assert restoring(softening).moment_nm(0.9) < 0
     for ship in (TABLE, replace(FIRST.ship, restoring_odd_nm=(-3e8, 2e8)), softening):
         twin = PassiveTwin(ship, FIRST.tank, STEP_S, 0.01)
         for roll_rad in (*np.linspace(-0.95, 0.95, 39), 0.15, 0.3, -0.45, 0.9):

@@ -59,7 +59,6 @@ class Panel:
             time.sleep(0.7)  # longer than a button stays pressed
 
     def close(self) -> None:
-        assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.kill()
         self._process.wait(30)
@@ -132,7 +131,6 @@ def kill_controllers(folder: Path) -> list[Logged]:
                 running_one.signal(signal.SIGKILL)
                 watcher.forget()
                 watcher.watch(1.5)
-            assert watcher.drive is not None
             assert watcher.drive.state is DriveState.FAULT
             (file,) = (folder / str(number) / "out").glob("run-*.rrd")
             recording = read_recording(file)["live"]
@@ -231,7 +229,6 @@ def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path: 
                     watcher.watch(draw.uniform(0.02, 0.2))
                 watcher.forget()
                 watcher.wait(lambda w: w.statuses >= 20)
-                assert watcher.status is not None
                 assert (watcher.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
                 assert ship_program.code is None
                 arm(watcher, panel)  # and it works again when the operator says so

@@ -105,7 +105,6 @@ def test_a_law_that_fails_ends_at_zero_pressure(
     watcher, report = first_that_can_be_judged(
         lambda at: until_it_ends(at, flaw, monkeypatch), folder
     )
-    assert watcher.drive is not None
     assert abs(watcher.drive.pressure_pa) < 2e3  # the rotor turns with the water
     assert watcher.drive.state is not DriveState.OPERATION_ENABLED
     assert report["mode"] == "FAULT"

@@ -80,7 +80,6 @@ def tell_story(folder: Path) -> Story:
                 controller.signal(signal.SIGKILL)
             watcher.forget()
             watcher.watch(1.0)
-            assert watcher.drive is not None
             told.killed_states = {watcher.drive.state}
             with running(controller_program(again, folder / "second")) as controller:
                 watcher.wait(lambda w: w.statuses >= 50)  # five seconds of it
@@ -238,9 +237,7 @@ def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
             watcher.forget()
             watcher.wait(lambda w: w.mode is Mode.FAULT)
             watcher.watch(2.0)  # the link is back, arming is not
-            assert watcher.status is not None
             assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
-            assert watcher.drive is not None
             assert watcher.drive.state is DriveState.FAULT
             report, notes = controller.end(ExitCode.BUS_LOST)
             ship.end()

@@ -105,8 +105,6 @@ def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -
             stdout=subprocess.PIPE,
             text=True,
         )
-        assert process.stdin is not None
-        assert process.stdout is not None
         process.stdin.write('{"head": {"about": {"x": 1}}}')
         process.stdin.close()
         assert process.stdout.readline() == '{"ready": 1}\n'

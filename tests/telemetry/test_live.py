@@ -89,7 +89,6 @@ def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         "ring = RingWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
     name = process.stdout.readline().strip()
     try:
         assert name in [run.ring for run in live_runs()]

@@ -232,7 +232,6 @@ os.kill(os.getpid(), signal.SIGKILL)
         stderr=subprocess.DEVNULL,
         text=True,
     )
-    assert writer.stdout is not None
     ring, events = writer.stdout.readline().split()
     recorder = RecorderProcess(ring, file, events=events)
     writer.communicate("\n")
@@ -252,7 +251,6 @@ def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
         process = subprocess.Popen(
             [*command, "--file", str(file)], stdout=subprocess.PIPE, text=True
         )
-        assert process.stdout is not None
         process.stdout.readline()
         feed(ring, table(7))
         process.send_signal(stop)
@@ -279,7 +277,6 @@ sys.stdin.read()
         stderr=subprocess.DEVNULL,
         text=True,
     )
-    assert writer.stdout is not None
     recorder = RecorderProcess(writer.stdout.readline().strip(), file)
     writer.kill()
     wait_for(lambda: recorder._process.poll() == 0)
@@ -323,7 +320,6 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
             stderr=subprocess.PIPE,
             text=True,
         )
-        assert process.stdout is not None
         process.stdout.readline()
         feed(ring, table(100))
         time.sleep(1.0)

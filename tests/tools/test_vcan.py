@@ -97,7 +97,6 @@ def start_loop() -> "subprocess.Popen[bytes]":
     process = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == b"started\n"  # while it runs: output is live
     return process
 
@@ -140,7 +139,6 @@ def test_both_outputs_to_one_file_keep_their_order() -> None:
 
 def test_command_ends_by_sigpipe_when_nobody_reads() -> None:
     process = subprocess.Popen([VCAN, WAY, "yes"], stdout=subprocess.PIPE)
-    assert process.stdout is not None
     assert process.stdout.read(2) == b"y\n"
     process.stdout.close()
     assert process.wait(LIMIT_S) == -signal.SIGPIPE

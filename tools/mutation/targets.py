@@ -120,6 +120,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
+        "ControllerNode._note_causes: if supervisor.mode is not _ACTIVE: -> if True:": (
+            "what would stop the pump in ACTIVE is latched in the same tick"
+        ),
         ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
             _A_NANOSECOND
         ),
@@ -270,10 +273,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ),
     },
     "utank_hil/runtime/monitors/motion_pair.py": {
-        "MotionPair.update: over = abs(self._roll_rad) > self._roll_limit_rad or "
+        "MotionPair._compare: over = abs(self._roll_rad) > self._roll_limit_rad or "
         "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) >= "
         "self._roll_limit_rad or abs(self._rate_rad_s) > self._rate_limit_rad_s": _NEVER_THERE,
-        "MotionPair.update: over = abs(self._roll_rad) > self._roll_limit_rad or "
+        "MotionPair._compare: over = abs(self._roll_rad) > self._roll_limit_rad or "
         "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) > "
         "self._roll_limit_rad or abs(self._rate_rad_s) >= self._rate_limit_rad_s": _NEVER_THERE,
     },
@@ -282,6 +285,13 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
         "MonitorThresholds: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
+        "_unconfirmed_share: heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0]) -> "
+        "heel_rad = abs(np.linalg.solve(stiffness, [1.0, push_n])[0])": (
+            "a newton metre heels no ship"
+        ),
+        "_unconfirmed_share: least = UNCONFIRMED_SHARE * heel_rad <= "
+        "math.radians(UNCONFIRMED_HEEL_DEG) -> least = UNCONFIRMED_SHARE * heel_rad < "
+        "math.radians(UNCONFIRMED_HEEL_DEG)": _AT_THE_BOUND,
     },
     "utank_hil/runtime/passive_twin.py": {
         **dict.fromkeys(

@@ -55,19 +55,6 @@ STAGES: Final = {
 """Begin, end, sea, and whether she is slower."""
 
 
-class Unwatched:
-    """Nobody looks on."""
-
-    def stopped(self, done_s: float) -> bool:  # noqa: ARG002
-        """Go on."""
-        return False
-
-
-def sail(job: Job) -> Run:
-    """One run; in a process of its own."""
-    return run_lockstep(job, Unwatched())
-
-
 def told(config: ControllerConfig, time: str, stiffness_nm_rad: float | None = None) -> BuiltLaw:
     """The self-tuned law that knows an hour's sea and the ship's stiffness."""
     law = config.law
@@ -205,7 +192,7 @@ def main() -> None:
     voyages, events = [], []
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
         for seed in range(1, 1 + arguments.seeds):
-            runs = {run.name: run for run in pool.map(sail, jobs(seed))}
+            runs = {run.name: run for run in pool.map(run_lockstep, jobs(seed))}
             voyages.append(judge(runs, plant))
             events.append([event.as_json() for event in runs[RENEWED].retuning])
             sys.stderr.write(f"voyage {seed} of {arguments.seeds}\n")

@@ -173,12 +173,6 @@ class ARX:
         b = (self.beta[1:] + self.alpha @ self.beta[0]).reshape(size, self.inputs)
         return LinearModel(a, b, np.eye(self.outputs, size), self.beta[0], self.sample_time_s)
 
-    def to_state_space(self) -> "StateSpace":
-        """The same model as control.StateSpace."""
-        from control import ss  # here, because importing it brings plotting into the process
-
-        return ss(*self.matrices())
-
     def _record(self, u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         u, y = np.asarray(u, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if u.ndim != 2 or u.shape[1] != self.inputs:

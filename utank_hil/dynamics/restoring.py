@@ -45,18 +45,6 @@ class Restoring(NamedTuple):
             integrals[i, 0] = _horner(integrals[i - 1], np.asarray(self.piece_rad))
         return _horner(integrals[piece], since)
 
-    def vanishing_rad(self) -> float:
-        """Angle of vanishing stability in rad: the first positive zero, infinite without one."""
-        for i, row in enumerate(self.coefficients_nm):
-            roots = np.roots(row[::-1])
-            real = roots.real[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))]
-            last = i == len(self.coefficients_nm) - 1
-            inside = real[(real > (1e-9 if i == 0 else -1e-9)) & (last | (real <= self.piece_rad))]
-            if inside.size:
-                start = i * self.piece_rad if i else 0.0
-                return float(start + inside.min())
-        return math.inf
-
     def _locate(self, roll_rad: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """Piece of each angle, and the angle from the start of that piece."""
         heel = np.abs(np.asarray(roll_rad, dtype=np.float64))

@@ -1,5 +1,6 @@
 """The steppable predictive controller: its law, its memory, anti-windup and take-over."""
 
+import control
 import numpy as np
 import pytest
 
@@ -96,7 +97,7 @@ def test_reference_for_the_whole_horizon_or_for_each_sample():
 def test_frequency_response_equals_that_of_the_state_space_form():
     law = random_law(10)
     z = np.exp(1j * np.array([0.01, 0.3, 2.0, np.pi]))
-    system = law.to_state_space()
+    system = control.ss(*law.matrices())
     for point, response in zip(z, law.response(z), strict=True):
         expected = system.C @ np.linalg.solve(point * np.eye(6) - system.A, system.B) + system.D
         np.testing.assert_allclose(response, expected, rtol=1e-10)

@@ -124,6 +124,17 @@ def test_a_gauge_that_stands_still_while_the_other_moves_is_stuck(way: int) -> N
     assert found == [0, 0, 0, Finding.LEVEL_STUCK]
 
 
+def test_a_gauge_has_moved_beyond_its_band_and_the_other_beyond_its_way() -> None:
+    assert gauges((math.pi, -math.pi)) == [0]
+    volume_m = THRESHOLDS.volume_m
+    assert gauges((0.0, 0.0), (0.0, volume_m), (0.0, 1.001 * volume_m)) == [
+        0, 0, Finding.LEVEL_STUCK,
+    ]  # fmt: skip
+    at_the_band = GaugeStuck(THRESHOLDS)
+    at_the_band.update(0.0, 0.0)
+    assert at_the_band.update(at_the_band._band_m, 2 * volume_m) == Finding.LEVEL_STUCK
+
+
 def test_gauges_that_both_stand_still_or_both_move_are_sound() -> None:
     assert not any(gauges(*[(0.3, -0.3)] * 1000))
     for other in (-1.0, -0.3, 0.5):

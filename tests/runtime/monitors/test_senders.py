@@ -103,6 +103,28 @@ def test_bursts_too_long_for_the_counter_are_found_and_a_silence_is_not() -> Non
         assert first == (None if found_s is None else pytest.approx(found_s))
 
 
+def paced(*heard: int, cycle_ns: int = 10_000_000, every_s: float = STEP_S) -> list[int]:
+    """What a stream finds of so many frames in each look."""
+    counted = Counted(cycle_ns)
+    stream, found = Stream(counted), []
+    for frames in heard:
+        counted.heard += frames
+        found.append(stream.update(every_s) & Finding.FRAMES_LOST)
+    return found
+
+
+def test_a_burst_counts_when_the_next_frames_come_and_only_of_a_sender_that_was_heard() -> None:
+    lost = Finding.FRAMES_LOST
+    assert paced(10, 3, 10) == [0, 0, lost]
+    assert paced(10, 8, 10) == paced(3, 10, 10) == paced(0, 3, 10) == [0, 0, 0]
+    assert paced(0, 1, 3, 10) == [0, 0, 0, lost]
+    assert not any(paced(*[10, 0] * 10))
+    assert not any(paced(*[10, 3, 0] * 10))
+    # eight cycles are enough
+    assert paced(8, 2, 8, cycle_ns=125_000_000, every_s=1.0) == [0, 0, lost]
+    assert paced(8, 2, 8, cycle_ns=125_000_000, every_s=0.99) == [0, 0, 0]
+
+
 def test_a_sender_that_begins_or_ends_between_two_looks_has_no_gap() -> None:
     counted = Counted()
     stream = Stream(counted)

@@ -1,15 +1,11 @@
 """The law that predictive design ends in: fixed gains on past inputs and outputs."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from utank_hil.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.sampling import LinearModel
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,12 +52,6 @@ class PredictiveLaw:
         a[:, :r] += self.input_gains.reshape(p * r, r)
         b = self.output_gains.reshape(p * r, m)
         return LinearModel(a, b, np.eye(r, p * r), np.zeros((r, m)), self.sample_time_s)
-
-    def to_state_space(self) -> "StateSpace":
-        """The law from y to u as control.StateSpace."""
-        from control import ss  # here, because importing it brings plotting into the process
-
-        return ss(*self.matrices())
 
 
 class PredictiveController:

@@ -43,7 +43,6 @@ class GaugeStuck:
         if abs(gauge_m - self._still_m) > self._band_m:
             self._still_m = gauge_m
             self._least_m = self._most_m = other_m
-            return 0
         self._least_m = min(self._least_m, other_m)
         self._most_m = max(self._most_m, other_m)
         return _LEVEL_STUCK if self._most_m - self._least_m > self._moved_m else 0
