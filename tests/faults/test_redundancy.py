@@ -341,3 +341,17 @@ def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
     wrong = motion(lambda roll, rate: (-roll, -rate), Address.SENSORS_2)
     node = commissioned(naval, spoil={"sensors_2": wrong})
     assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]
+
+
+def test_a_sensor_that_is_left_is_accused_from_then_on() -> None:
+    bench = Bench()
+    bench.fail("sensors", motion(lambda roll, rate: (-roll, rate)))
+    motions = bench.node.inbox.motions
+    assert motions is not None
+    left = 0
+    while bench.lockstep.now_ns < (T0_S + 5.0) * SECOND:
+        bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
+        if motions.used is motions.second:
+            left += 1
+            assert motions.first.accused
+    assert left > 400

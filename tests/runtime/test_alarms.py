@@ -412,3 +412,16 @@ def test_what_is_latched_and_reset_between_two_statuses_alarms() -> None:
     assert bench.node.mode is Mode.STANDBY
     bench.run(100)
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(HIGH, ACTIVE, Mode.FAULT)]
+
+
+def test_what_refused_an_arming_is_an_alarm_as_long_as_it_would_refuse_another() -> None:
+    bench = Told()
+    bench.node.seen.commissioned = False
+    bench.run(400)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(20_000)
+    assert codes(bench) == {Fault.NOT_COMMISSIONED}
+    assert [event.state for event in bench.told] == [ACTIVE]
+    bench.node.seen.commissioned = True
+    bench.run(11_000)
+    assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]

@@ -202,6 +202,34 @@ def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
     assert not found & {Finding.UNWATCHED, Finding.UNWATCHED_LONG}
 
 
+@pytest.mark.parametrize("silent_s", [5.0, 20.0, 400.0])
+@pytest.mark.parametrize("before_s", [0.02, 12.0])
+def test_sensors_that_come_or_come_back_after_a_silence_were_no_gap(
+    before_s: float, silent_s: float
+) -> None:
+    table = Table()
+    moved(table, ROLLING, before_s)
+    known = table.monitors.confirmed
+    moved(table, ROLLING, silent_s, tank_age_ms=lambda time_s: 1000 * (time_s - before_s))
+    found = moved(table, ROLLING, 1.0)
+    assert not found & {Finding.UNWATCHED, Finding.UNWATCHED_LONG}
+    assert table.monitors.confirmed is (known and silent_s < T)
+    found = moved(table, ROLLING, 12.0)
+    assert not found & {Finding.UNWATCHED, Finding.UNWATCHED_LONG}
+    assert table.monitors.confirmed
+
+
+def test_the_equation_of_a_small_model_runs_at_its_pace() -> None:
+    tank = replace(VESSEL.tank, width_m=0.57, height_m=0.163, lz_m=0.061)
+    assert tank.natural_frequency_rad_s > math.pi
+    monitors = Monitors(DesignPlant(VESSEL.ship, tank), 0.35, SensorFigures(), 250_000)
+    inbox, found = Inbox(CATALOGUE, VERSION, gates=monitors.gates), 0
+    for tick in range(1000):
+        found |= monitors.update(tick * TICK_NS, inbox, Observations(**FRESH), 0.0, excused=False)  # type: ignore[arg-type]
+    assert monitors.equation.settled
+    assert found == 0
+
+
 @pytest.mark.parametrize("late_ticks", [1, 2, 4])
 def test_late_ticks_keep_nothing_from_being_judged(late_ticks: int) -> None:
     table = Table()

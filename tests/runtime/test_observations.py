@@ -37,17 +37,18 @@ def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: floa
     assert table.seen.heel_rad == pytest.approx(sign * 0.1 * (1 - math.exp(-1)), rel=1e-3)
 
 
-def test_in_the_first_minute_heel_is_the_mean_of_what_was_measured() -> None:
+def test_in_the_first_minute_heel_is_the_mean_of_what_was_measured_and_of_ten_seconds_of_zeros():
     table = Table()
     table.inbox.roll_rad = 0.3  # nobody measured it
     table.tick()
     assert table.seen.heel_rad == 0.0
     table.inbox.motion_ns = table.now_ns
-    rolls = [0.3 + 0.2 * math.sin(0.005 * k) for k in range(round(60.0 / TICK_S))]
+    rolls = [0.3 + 0.2 * math.sin(0.005 * k) for k in range(round(50.0 / TICK_S) + 1)]
     for count, roll_rad in enumerate(rolls, 1):
         table.inbox.roll_rad = roll_rad
         table.tick()
-        assert table.seen.heel_rad == pytest.approx(sum(rolls[:count]) / count, rel=1e-9)
+        mean_rad = sum(rolls[:count]) / (count + 10.0 / TICK_S - 1)
+        assert table.seen.heel_rad == pytest.approx(mean_rad, rel=1e-9)
     # and from then on each sample has the same share
     table.inbox.roll_rad = table.seen.heel_rad + 1.0
     table.tick()

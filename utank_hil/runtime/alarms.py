@@ -159,30 +159,24 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
-    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone.
+    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. Why
+    arming was refused counts as long as it would be.
     """
-    mode, limits = supervisor.mode, supervisor.limits
-    if mode is Mode.INIT:
-        found = judging.all_stopping_unawaited(seen, limits)
-    elif mode in (Mode.ACTIVE, Mode.FAULT):
+    mode, fault, limits = supervisor.mode, supervisor.fault, supervisor.limits
+    if mode in (Mode.ACTIVE, Mode.FAULT):
         found = judging.all_harming(seen, limits)
     else:
-        found = judging.all_stopping(seen, limits)
+        found = all_stopping(supervisor, seen)
     found |= judging.all_warning(seen, limits) | {law_fault}
-    if mode in (Mode.INIT, Mode.FAULT):  # elsewhere it says why arming was refused, some time ago
-        found.add(supervisor.fault)
+    # in STANDBY it says why arming was refused, which may be some time ago
+    if mode in (Mode.INIT, Mode.FAULT) or fault in judging.all_refusing(seen, limits):
+        found.add(fault)
     found.discard(Fault.NONE)
     return found
 
 
-def passing_faults(supervisor: Supervisor, seen: Observations) -> set[Fault]:
-    """What would stop the pump now, to be looked at in every tick in which it is not in charge.
-
-    In ACTIVE it is latched; elsewhere it may be gone before the alarms are looked at.
-    """
-    limits = supervisor.limits
-    if judging.first_stopping(seen, limits) is None:
-        return set()
+def all_stopping(supervisor: Supervisor, seen: Observations) -> set[Fault]:
+    """What would stop the pump now, in INIT but for what is awaited."""
     if supervisor.mode is Mode.INIT:
-        return judging.all_stopping_unawaited(seen, limits)
-    return judging.all_stopping(seen, limits)
+        return judging.all_stopping_unawaited(seen, supervisor.limits)
+    return judging.all_stopping(seen, supervisor.limits)

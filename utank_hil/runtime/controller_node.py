@@ -28,11 +28,12 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults, passing_faults
+from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults, all_stopping
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.judging import first_stopping
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
@@ -264,6 +265,14 @@ class ControllerNode:
         return self.supervisor.fault or self._law_fault
 
     @property
+    def _share(self) -> float:
+        """Of the pressure, that the command may be."""
+        monitors = self.monitors
+        if monitors is not None and self._pump and not monitors.confirmed:
+            return monitors.thresholds.unconfirmed_share
+        return DEGRADED_SHARE if self.supervisor.degraded else 1.0
+
+    @property
     def fallbacks(self) -> int | None:
         """Of a law that searches for plans, see `Plans`; else None."""
         return self._controller.fallbacks if isinstance(self._controller, Plans) else None
@@ -389,9 +398,10 @@ class ControllerNode:
 
     def _note_causes(self, now_ns: int) -> None:
         """Keep what may be gone before alarms are looked at, ten times a second."""
-        supervisor = self.supervisor
-        if supervisor.mode is not _ACTIVE:
-            self._passing |= passing_faults(supervisor, self.seen)
+        supervisor, seen = self.supervisor, self.seen
+        # in ACTIVE it is latched
+        if supervisor.mode is not _ACTIVE and first_stopping(seen, supervisor.limits):
+            self._passing |= all_stopping(supervisor, seen)
         if supervisor.raised is not _NO_FAULT:
             self.alarms.raise_anew(supervisor.raised, supervisor.mode, now_ns)
 
@@ -469,11 +479,9 @@ class ControllerNode:
         if not self._pump:
             return
         if demand is _CONTROL:
-            share = DEGRADED_SHARE if self.supervisor.degraded else 1.0
-            monitors = self.monitors
-            if monitors is not None and not monitors.confirmed:
-                share = monitors.thresholds.unconfirmed_share
-            self.command_pa = limiter.limit(self._law_pa, level.level_m, level.rate_m_s, share)
+            self.command_pa = limiter.limit(
+                self._law_pa, level.level_m, level.rate_m_s, self._share
+            )
         elif demand is Demand.RAMP:
             self.command_pa = limiter.ramp_to_zero()
         else:
@@ -500,7 +508,7 @@ class ControllerNode:
                         fault=self.fault,
                         armed=supervisor.mode is Mode.ACTIVE,
                         alarm=self.alarms.unaccepted,
-                        degraded=supervisor.degraded,
+                        degraded=supervisor.demand is _CONTROL and self._share < 1.0,
                         saturated=self._limiter.limiting or self.inbox.drive_held_back,
                         not_realtime=not self.statistics.real_time,
                         bus_load=self.seen.bus_load,

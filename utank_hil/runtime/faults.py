@@ -550,19 +550,19 @@ FAULTS: Final = (
     ),
     _row(
         Fault.BUS_DEGRADED,
-        "Frames are lost on the CAN bus, though not so many in succession that it ends the run, or "
-        "a node sends too seldom.",
+        "Frames are lost on the CAN bus, a node sends too seldom, or a measurement has gaps.",
         "Check the cable, its plugs and termination, gateways between the nodes, the load, and "
         "the nodes' cycle times.",
         _found(
             Reaction.WARN,
-            "over 0.1% of a message's frames missing by its counter, five too many; or under "
-            "0.75 a cycle for 2 s",
+            "over 0.1% of a message's frames missing by its counter, or in bursts of a message of "
+            "25 ms or less, five too many; or under 0.75 a cycle for 2 s",
             Finding.FRAMES_LOST,
         ),
         _found(
             Reaction.HALVE,
-            "gaps have kept the tank's equation from judging for a roll period",
+            "gaps of motion, levels or pressure have kept the tank's equation from judging for a "
+            "roll period",
             Finding.UNWATCHED,
         ),
         _found(Reaction.RAMP, "the same for three roll periods", Finding.UNWATCHED_LONG),

@@ -42,6 +42,8 @@ STALE_MS: Final = 100.0
 SILENT_S: Final = 1.0
 GAP_PERIODS: Final = 0.05
 """Of the roll's: over a gap so long roll and level run straight, to a hundredth of their swing."""
+LATE_ROUND_S: Final = 1.5 * LONG_S
+"""Never less, however small the ship."""
 UNWATCHED_PERIODS: Final = 1.0
 LONG_PERIODS: Final = 3.0
 """So long longer gaps may keep the tank's equation from judging, though measurements come."""
@@ -132,7 +134,7 @@ class Monitors:
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
         self._begun = False
-        self._longest_gap_s = GAP_PERIODS * thresholds.roll_period_s
+        self._longest_gap_s = max(GAP_PERIODS * thresholds.roll_period_s, LATE_ROUND_S)
         self._unwatched_s = 0.0
         self.confirmed = False
         self._of_pair = self._of_drive = self._of_level = self._of_volume = 0
@@ -297,7 +299,8 @@ class Monitors:
         spare_stale = seen.motion_spare_age_ms > STALE_MS
         spare.watch.update(other.roll_rad, other.roll_rate_rad_s, elapsed_s, stale=spare_stale)
         both = not (stale or spare_stale)
-        self._leave_accused(inbox, motions, seen, spare)
+        spare = self._leave_accused(inbox, motions, seen, spare)
+        other = motions.spare
         self._of_pair = self._pair.update(
             inbox.roll_rad - other.roll_rad if both else math.nan,
             inbox.roll_rate_rad_s - other.roll_rate_rad_s,
@@ -308,16 +311,24 @@ class Monitors:
 
     def _leave_accused(
         self, inbox: Inbox, motions: MotionSensors, seen: Observations, spare: SensorEvidence
-    ) -> None:
-        """Use the other motion sensor if something speaks against this one alone."""
+    ) -> SensorEvidence:
+        """Use the other motion sensor if something speaks against this one alone.
+
+        Returns
+        -------
+        SensorEvidence
+            Of the one that is not in use.
+        """
         used = self._used
         if seen.motion_spare_age_ms > SPARE_MS or spare.found or spare.accused:
-            return
-        if used.found or used.accused:
-            motions.used.accused = used.accused = True
-            inbox.exchange_motion(motions)
-            self.twin.excuse()  # of what the other one said
-            self._used, self._spare = spare, self._used
+            return spare
+        if not (used.found or used.accused):
+            return spare
+        motions.used.accused = used.accused = True
+        inbox.exchange_motion(motions)
+        self.twin.excuse()  # of what the other one said
+        self._used, self._spare = spare, used
+        return used
 
     def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excused: bool) -> None:
         twin = self.twin
@@ -328,7 +339,9 @@ class Monitors:
 
     def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations, held_pa: float) -> None:
         elapsed_s = (now_ns - self._round_ns) * 1e-9
+        steps = max(round(elapsed_s / LONG_S), 1)
         if elapsed_s > self._longest_gap_s:
+            steps = 1
             self._used.restart_water()
             if self._spare is not None:
                 self._spare.restart_water()
@@ -338,7 +351,6 @@ class Monitors:
         if oldest_ms > STALE_MS:
             return
         self._round_ns = now_ns
-        steps = max(round(elapsed_s / LONG_S), 1) if elapsed_s <= self._longest_gap_s else 1
         roll_rad, level_m = inbox.roll_rad, inbox.level_m
         pressure_pa = inbox.pressure_pa - held_pa
         if self._water_free:
@@ -359,16 +371,17 @@ class Monitors:
 
     def _note_watch(self, equation: TankEquation, elapsed_s: float, *, sound: bool) -> None:
         """Note for how long, with measurements that come, nothing was told by the water."""
-        unwatched_s = 0.0 if equation.settled else self._unwatched_s + elapsed_s
-        self._unwatched_s = unwatched_s
-        period_s = self.thresholds.roll_period_s
-        if unwatched_s > UNWATCHED_PERIODS * period_s:
-            self.confirmed = False
-            longer = unwatched_s > LONG_PERIODS * period_s
-            self._of_watch = _UNWATCHED_LONG if longer else _UNWATCHED
-            return
+        shortest_s = UNWATCHED_PERIODS * self.thresholds.roll_period_s
+        longest_s = LONG_PERIODS * self.thresholds.roll_period_s
+        # of a silence, which others judge, no more counts than of a gap
+        counted_s = min(elapsed_s, SILENT_S)
+        self._unwatched_s = 0.0 if equation.settled else self._unwatched_s + counted_s
+        unwatched = self._unwatched_s > shortest_s
         self._of_watch = 0
-        self.confirmed = self.confirmed or (sound and equation.obeyed)
+        if unwatched:
+            self._of_watch = _UNWATCHED_LONG if self._unwatched_s > longest_s else _UNWATCHED
+        known = self.confirmed and not unwatched and elapsed_s <= shortest_s
+        self.confirmed = known or (sound and equation.obeyed)
 
 
 def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:

@@ -17,6 +17,8 @@ LOAD_WINDOW_NS: Final = 100 * TICK_NS
 MEAN_FRAME_BITS: Final = 143
 HEEL_TIME_CONSTANT_S: Final = 60.0
 HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
+FIRST_HEEL_S: Final = 10.0
+"""At the start the heel is zero as if it had been measured for so long: no first roll is a heel."""
 CONFLICT_NS: Final = 10_000_000_000
 """A second sender of the controller's address is gone when it has been silent for so long."""
 _ALL_LATE: Final = 0x3FF
@@ -181,7 +183,7 @@ class Observer:
         self._load_schedule = Schedule(LOAD_WINDOW_NS)
         self._load_since_ns = 0
         self._frames_counted = 0
-        self._heel_share = 1.0
+        self._heel_share = TICK_S / FIRST_HEEL_S
 
     def link_error(self, now_ns: int) -> None:
         """Take note that the bus could not be read or written."""
@@ -236,7 +238,7 @@ class Observer:
             seen.hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         seen.roll_rad = inbox.roll_rad
         if inbox.motion_ns > NEVER_HEARD_NS:
-            # at first the mean of all that was measured: a heel is known from the first sample on
+            # at first the mean of all that was measured, and of zeros: a heel is soon known
             seen.heel_rad += self._heel_share * (inbox.roll_rad - seen.heel_rad)
             self._heel_share = max(self._heel_share / (1.0 + self._heel_share), HEEL_SHARE)
         if self._load_schedule.due(now_ns):

@@ -124,7 +124,7 @@ def test_evidence_counts_until_both_agree_again(which: str) -> None:
     assert pair.found(3) == [DISAGREE] * 3
     assert (sensor.accused, other.accused) == (True, False)
     sensor.watch.found = 0
-    assert pair() == 0
+    assert pair.found(5) == [DISAGREE] * 4 + [0]
     assert sensor.accused is False
 
 
@@ -141,11 +141,14 @@ def test_what_was_known_is_kept_while_one_is_silent(which: str) -> None:
     # of two that agree nothing is found, whichever is silent
     pair = Pair()
     assert pair.found(400, math.nan) == [0] * 400
-    # of two that disagree nobody knows whether the one that is left is right
+    # of two that disagreed nobody knows which was right: half the pressure, and no end that could
+    # not be reset while one is silent
     pair = Pair()
     assert pair(APART_RAD) == 0
     assert pair.found(10, APART_RAD) == [DISAGREE] * 10
-    assert pair.found(51, math.nan) == [DISAGREE] * 50 + [UNCLEAR]
+    assert pair.found(400, math.nan) == [DISAGREE] * 400
+    assert pair.pair.unclear is False
+    assert pair.found(40, 0.0) == [DISAGREE] * 39 + [0]
 
 
 @pytest.mark.parametrize("finding", Finding)

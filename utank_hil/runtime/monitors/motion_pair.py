@@ -13,7 +13,7 @@ with its roll. What once spoke against a sensor counts until both agree again.
                                           periods, since nobody knows who is right, the end
     evidence           evidence           as if the one in use were the only one
 
-While one is silent they are not compared, and what was known of both is kept.
+While one is silent they are not compared, and what was known of each is kept.
 """
 
 import math
@@ -30,6 +30,8 @@ NOISES: Final = 3.0
 SMOOTH_S: Final = 0.25
 APART_S: Final = 0.3
 """A difference that lasts so long is one; it passes through zero with each roll."""
+PAUSE_S: Final = 1.0
+"""Evidence may pause for so long, and a difference takes some of it until it counts."""
 UNCLEAR_PERIODS: Final = 1.5
 """In so many roll periods the evidence of the tank's equation is there."""
 
@@ -111,7 +113,7 @@ class MotionPair:
         self._share = period_s / SMOOTH_S
         self._roll_rad = self._rate_rad_s = 0.0
         self._over_s = self._unclear_s = 0.0
-        self._remembered_s = 0.0
+        self._remembered_s = self._quiet_s = 0.0
         self.unclear = False
 
     def update(
@@ -125,12 +127,15 @@ class MotionPair:
             Roll and rate of one less those of the other; NaN where one is silent.
         used, spare : SensorEvidence
         """
-        if not math.isnan(apart_rad):
+        both = not math.isnan(apart_rad)
+        if both:
             self._compare(apart_rad, rate_apart_rad_s)
         apart = self._remembered_s > 0
+        self._quiet_s = 0.0 if used.found or spare.found else self._quiet_s + self._period_s
         for sensor in (used, spare):
-            sensor.accused = sensor.found != 0 or (sensor.accused and apart)
-        self.unclear = apart and used.accused is spare.accused
+            keeps = apart or self._quiet_s <= PAUSE_S
+            sensor.accused = sensor.found != 0 or (sensor.accused and keeps)
+        self.unclear = both and apart and used.accused is spare.accused
         self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
         if not (apart or used.accused or spare.accused):
             return 0
