@@ -292,6 +292,20 @@ def test_until_the_water_obeyed_the_pressure_is_a_quarter() -> None:
     assert bench.node.command_pa > pressures[-1]
 
 
+@pytest.mark.parametrize("pump", [True, False])
+def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump: bool) -> None:
+    plant = DesignPlant(VESSEL.ship, VESSEL.tank)
+    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    bench = ControllerBench(START_NS, monitors=monitors, pump=pump)
+    bench.run(500)
+    assert bench.status is not None
+    assert bench.status.degraded is False  # nothing is commanded
+    bench.node.supervisor.demand = Demand.CONTROL
+    bench.node.supervisor.update = lambda seen, now_ns: None  # type: ignore[method-assign]
+    bench.run(200)
+    assert bench.status.degraded is pump
+
+
 def test_the_status_says_when_drive_or_command_is_at_a_limit() -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)

@@ -120,8 +120,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
-        "ControllerNode._note_causes: if supervisor.mode is not _ACTIVE: -> if True:": (
-            "what would stop the pump in ACTIVE is latched in the same tick"
+        "ControllerNode._note_causes: if supervisor.mode is not _ACTIVE and "
+        "first_stopping(seen, supervisor.limits): -> if True:": (
+            "a shortcut: nothing stops the pump then, and in ACTIVE it is latched in the same tick"
         ),
         ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
             _A_NANOSECOND
