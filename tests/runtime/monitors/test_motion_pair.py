@@ -149,6 +149,12 @@ def test_what_was_known_is_kept_while_one_is_silent(which: str) -> None:
     assert pair.found(400, math.nan) == [DISAGREE] * 400
     assert pair.pair.unclear is False
     assert pair.found(40, 0.0) == [DISAGREE] * 39 + [0]
+    # the time is kept over short silences
+    pair = Pair()
+    assert pair(APART_RAD) == 0
+    found = [pair(math.nan if k % 4 == 3 else APART_RAD) for k in range(90)]
+    assert found.index(UNCLEAR) == 80
+    assert [pair(APART_RAD), pair(math.nan)] == [UNCLEAR, DISAGREE]
 
 
 @pytest.mark.parametrize("finding", Finding)

@@ -136,10 +136,11 @@ class MotionPair:
             keeps = apart or self._quiet_s <= PAUSE_S
             sensor.accused = sensor.found != 0 or (sensor.accused and keeps)
         self.unclear = both and apart and used.accused is spare.accused
-        self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
+        if both:
+            self._unclear_s = self._unclear_s + self._period_s if self.unclear else 0.0
         if not (apart or used.accused or spare.accused):
             return 0
-        if self._unclear_s > UNCLEAR_PERIODS * self._roll_period_s:
+        if self.unclear and self._unclear_s > UNCLEAR_PERIODS * self._roll_period_s:
             return _DISAGREE | _UNCLEAR
         return _DISAGREE
 
