@@ -119,6 +119,19 @@ def test_five_spikes_in_a_second_are_found() -> None:
     assert table.tick(0.1) & Finding.SPIKES
 
 
+@pytest.mark.parametrize("start_ns", [0, 10**13])
+def test_a_first_sample_that_waited_in_the_queue_is_no_drift(start_ns: int) -> None:
+    table = Table(start_ns)
+    roll_rad, found = 0.04, 0
+    for tick in range(100):
+        if tick == 3:  # what waited is read by then
+            roll_rad -= 0.0059
+        table.say_roll(roll_rad)
+        found |= table.tick()
+    assert table.inbox.roll_rad == pytest.approx(0.0341, abs=1e-4)
+    assert found == 0
+
+
 def test_gap_of_the_motion_sensor_is_no_drift() -> None:
     table = Table()
     table.say_roll(0.0)

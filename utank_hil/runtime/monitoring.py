@@ -40,6 +40,8 @@ SPARE_MS: Final = 30.0
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
 SILENT_S: Final = 1.0
+BACKLOG_NS: Final = 200_000_000
+"""What is received first may have waited in the interface's queue, and be old."""
 GAP_PERIODS: Final = 0.05
 """Of the roll's: over a gap so long roll and level run straight, to a hundredth of their swing."""
 LATE_ROUND_S: Final = 1.5 * LONG_S
@@ -134,6 +136,7 @@ class Monitors:
         self._phase = 0
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
         self._begun = False
+        self._judges_from_ns = 0
         self._longest_gap_s = max(GAP_PERIODS * thresholds.roll_period_s, LATE_ROUND_S)
         self._unwatched_s = 0.0
         self.confirmed = False
@@ -284,19 +287,21 @@ class Monitors:
     def _begin(self, now_ns: int, inbox: Inbox) -> None:
         """Count time, and frames, from the first tick on: the clock may be that of the machine."""
         self._begun = True
+        self._judges_from_ns = now_ns + BACKLOG_NS
         self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = now_ns - TICK_NS
         self._senders.begin(inbox.foreign)
 
     def _look_at_motion(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
         elapsed_s = (now_ns - self._motion_ns) * 1e-9
         self._motion_ns = now_ns
-        stale = seen.motion_age_ms > STALE_MS
+        backlog = now_ns < self._judges_from_ns
+        stale = backlog or seen.motion_age_ms > STALE_MS
         self._used.watch.update(inbox.roll_rad, inbox.roll_rate_rad_s, elapsed_s, stale=stale)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
             return
         other = motions.spare
-        spare_stale = seen.motion_spare_age_ms > STALE_MS
+        spare_stale = backlog or seen.motion_spare_age_ms > STALE_MS
         spare.watch.update(other.roll_rad, other.roll_rate_rad_s, elapsed_s, stale=spare_stale)
         both = not (stale or spare_stale)
         spare = self._leave_accused(inbox, motions, seen, spare)
