@@ -268,7 +268,7 @@ def test_everything_is_looked_at_in_a_round() -> None:
     table = Table()
     table.say_levels(0.5, 0.5)
     table.say_roll(0.0)
-    table.tick(2 * ROUND_TICKS * TICK_S)
+    table.tick(4 * ROUND_TICKS * TICK_S)
     table.inbox.roll_rad = 0.1
     table.inbox.foreign = 1000
     found = table.tick(2 * ROUND_TICKS * TICK_S)
