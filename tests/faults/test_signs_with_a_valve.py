@@ -16,6 +16,7 @@ from utank_hil.runtime.panel import Action, TimedAction
 
 SECOND = 1_000_000_000
 FLIPPED = {"kind": "sign", "message": "SENSOR_MOTION", "signals": ["roll_rad", "roll_rate_rad_s"]}
+OPPOSITE = {"kind": "law", "fails": "opposite"}
 
 
 @cache
@@ -36,3 +37,12 @@ def test_both_signs_wrong_are_told_by_water_that_a_valve_holds_back(
     bench.run(16 * SECOND)
     told = Fault.MOTION_SIGN_FLIP if flipped else Fault.NONE
     assert (bench.node.mode is Mode.FAULT, bench.node.fault) == (flipped, told)
+
+
+def test_pump_law_that_is_turned_against_the_ship_is_found_by_her_twin() -> None:
+    config = scenario().controllers["pump_with_valve"]
+    script = (TimedAction(1.0, Action.ARM),)
+    bench = FaultyBench(scenario(), config, build_law(config), seed=10, script=script)
+    bench.place([TypeAdapter(AnyFault).validate_python({**OPPOSITE, "at_s": 40.0})])
+    bench.run(60 * SECOND)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.ROLL_AMPLIFIED)

@@ -158,6 +158,20 @@ def test_sound_law_is_kept_through_a_lull_and_given_up_if_it_goes_on() -> None:
     assert patient < ends_s < t[np.argmax(amplified)] < begins_s + 17 * PERIOD_S
 
 
+@pytest.mark.parametrize("room", [1.0, 1.1])
+def test_room_is_a_factor_on_the_ratios_at_which_a_law_has_lost(room: float) -> None:
+    t = np.arange(0.0, 60 * PERIOD_S, STEP_S)
+    amplified = {}
+    for more in (1.2, 1.3, 1.4):
+        pressure_pa, made_rad = made_by_pump(t, np.full(len(t), 0.04 * (more - 1)))
+        twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD, room=room)
+        for own_rad, effort_pa in zip(0.04 * np.sin(0.6 * t) + made_rad, pressure_pa, strict=True):
+            twin.update(own_rad, 0.0, 0.0, effort_pa)
+        amplified[more] = twin.amplified
+        assert twin.share == pytest.approx(more / (room * AMPLIFIED), rel=0.02)
+    assert amplified == {1.2: False, 1.3: room < 1.04, 1.4: True}
+
+
 def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_found() -> None:
     ends_s, bad_s = 20 * PERIOD_S, 45 * PERIOD_S
     t = np.arange(0.0, 60 * PERIOD_S, STEP_S)

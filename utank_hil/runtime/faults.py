@@ -505,7 +505,7 @@ FAULTS: Final = (
         _found(
             Reaction.RAMP,
             "roll over 1.25 times the passive twin's for a quarter of a roll period, over 1.1 "
-            "times in twelve roll periods, and over 0.5 degrees RMS",
+            "times in twelve roll periods, with a valve a tenth more, and over 0.5 degrees RMS",
             Finding.ROLL_AMPLIFIED,
         ),
     ),

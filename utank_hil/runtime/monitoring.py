@@ -50,6 +50,8 @@ UNWATCHED_PERIODS: Final = 1.0
 LONG_PERIODS: Final = 3.0
 """So long longer gaps may keep the tank's equation from judging, though measurements come."""
 
+ROOM_OF_VALVE: Final = 1.1
+"""On the twin's thresholds: in short seas a valve costs a sound law up to a sixth of the roll."""
 MOST_CHANGE: Final = 10.0
 """Of inertia and stiffness by loading, either way: more is an error of the identification."""
 MOST_DAMPING_RATIO: Final = 1.0
@@ -113,13 +115,14 @@ class Monitors:
         self._level_stuck = LevelStuck(ship, tank, thresholds, LONG_S)
         self._port_stuck, self._starboard_stuck = GaugeStuck(thresholds), GaugeStuck(thresholds)
         self.volume = Volume(thresholds)
-        self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad)
+        room = ROOM_OF_VALVE if plant.valve else 1.0
+        self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad, room=room)
         self._ship, self._tank = ship, tank
         self._followed: ModelSummary | ShipFigures | None = None
         # what a valve that is nearly shut holds back is uncertain: only a wrong sign is told then
         self._water_free = plant.valve is None
         self._told_by_water = ~0 if self._water_free else _WATER_SIGN
-        self._compares = compares and self._water_free
+        self._compares = compares
         gates = self.gates.motions if second_motion else (None, None)
         first, second = [
             SensorEvidence(

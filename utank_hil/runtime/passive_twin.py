@@ -17,6 +17,9 @@ and the tank's quadratic loss.
 
 The twin's model is the configuration's ship. A ship that was loaded otherwise makes d wrong by as
 much as her answer to the pump differs, and nothing where the pump does nothing.
+
+A tank's valve counts as open. Where it throttles the water, the pump does less than d, so a ship
+with a valve is compared with more room.
 """
 
 import math
@@ -59,6 +62,8 @@ class PassiveTwin:
         Time between two updates.
     least_roll_rad : float
         Own root mean square below which nothing is judged.
+    room : float
+        Factor on the ratios of own roll to the twin's at which a law has lost.
 
     Attributes
     ----------
@@ -68,8 +73,17 @@ class PassiveTwin:
         The ship rolls more than her twin, and has for over a quarter of a roll period.
     """
 
-    def __init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float) -> None:
+    def __init__(
+        self,
+        ship: RollShip,
+        tank: Tank,
+        period_s: float,
+        least_roll_rad: float,
+        *,
+        room: float = 1.0,
+    ) -> None:
         self._period_s = period_s
+        self._amplified, self._record = room * AMPLIFIED, room * RECORD
         self._made = np.zeros(7)
         self._effort = self._made[4:]
         self.take(ship, tank)
@@ -116,8 +130,8 @@ class PassiveTwin:
         """How near the comparison is to its threshold, 1; NaN where nothing is judged."""
         if self._losing_s < 0 or self._power <= self._least_power or not self._twin_power:
             return math.nan
-        lately = math.sqrt(self._power / self._twin_power) / (AMPLIFIED + self._unknown)
-        return min(lately, math.sqrt(self._record_power / self._twin_record_power) / RECORD)
+        lately = math.sqrt(self._power / self._twin_power) / (self._amplified + self._unknown)
+        return min(lately, math.sqrt(self._record_power / self._twin_record_power) / self._record)
 
     def update(
         self, roll_rad: float, rate_rad_s: float, level_rate_m_s: float, pressure_pa: float
@@ -168,9 +182,9 @@ class PassiveTwin:
                 self._forget()
             return
         self._unknown -= self._share * self._unknown
-        ratio = RECOVERED if self.amplified else AMPLIFIED + self._unknown
+        ratio = RECOVERED if self.amplified else self._amplified + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
-        on_record = self.amplified or self._record_power > RECORD**2 * self._twin_record_power
+        on_record = self.amplified or self._record_power > self._record**2 * self._twin_record_power
         if on_record and self._power > least_power:
             self._losing_s += self._period_s
         else:
