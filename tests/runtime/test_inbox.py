@@ -291,12 +291,22 @@ def test_an_address_that_is_claimed_under_another_name_has_two_holders(address: 
     assert line.inbox.claimed_twice_ns < line.now_ns
 
 
-def test_unknown_drive_state_and_fault_are_neither_enabled_nor_healthy() -> None:
+def test_drive_of_an_unknown_fault_is_not_healthy() -> None:
     line = Line()
-    line.say(GOOD[DriveStatus1]._replace(state=None))  # type: ignore[attr-defined]
     line.say(GOOD[DriveStatus2]._replace(fault=None))  # type: ignore[attr-defined]
-    assert line.inbox.drive_state is None
     assert line.inbox.drive_fault is None
+
+
+def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
+    line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)  # type: ignore[attr-defined]
+    line.say(status._replace(state=None))
+    assert (line.inbox.drive_state, line.inbox.drive_ns) == (None, NEVER_HEARD_NS)
+    line.say(status)
+    heard_ns = line.inbox.drive_ns
+    line.say(status._replace(state=None, power_limited=False, command_echo=9))
+    inbox = line.inbox
+    assert (inbox.drive_state, inbox.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
+    assert inbox.drive_ns == inbox.echo_ns == heard_ns
 
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:

@@ -323,6 +323,8 @@ class Inbox:
             self.pump_ns = now_ns
 
     def _on_drive_1(self, status: DriveStatus1, now_ns: int) -> None:
+        if status.state is None:  # as if the frame had not come
+            return
         self.drive_state = status.state
         self.drive_held_back = status.power_limited or status.speed_limited
         self.drive_ns = now_ns
