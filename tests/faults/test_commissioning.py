@@ -1,5 +1,6 @@
 """Commissioning in lockstep: a ship that is as her files say passes; whatever is not is named."""
 
+import tracemalloc
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -246,6 +247,19 @@ def test_who_arms_before_the_zeros_are_right_has_to_arm_again() -> None:
     assert (node.stage, node.node.mode) == (Stage.ARM, Mode.STANDBY)
     lockstep.run_until(round((ARM_S + 8.0) * SECOND))
     assert (node.stage, node.node.mode) == (Stage.MOVING, Mode.ACTIVE)
+
+
+def test_time_that_the_computer_was_up_for_costs_no_memory() -> None:
+    node = build_commissioning_node(NAVAL)
+    tracemalloc.start()
+    try:
+        for tick in range(10):
+            list(node.tick(2 * 86_400 * SECOND + tick * TICK_NS))
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert node.stage is Stage.WAITING
+    assert peak_bytes < 1_000_000
 
 
 def test_the_operators_stop_ends_it() -> None:

@@ -174,8 +174,9 @@ class CommissioningNode:
         # whoever arms sooner would have the pump move without having been asked to
         self.node.seen.commissioned = self.stage in (Stage.ARM, Stage.MOVING)
         frames = self.node.tick(now_ns)
-        if self.stage is not Stage.DONE:
+        if self.stage in (Stage.REST, Stage.MOVING):
             self._note(now_ns)
+        if self.stage is not Stage.DONE:
             self._go_on(now_ns)
         return frames
 
