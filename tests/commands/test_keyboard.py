@@ -1,5 +1,6 @@
 """The keyboard of the panel: obeys at once, on a pipe too, and shows the controller in words."""
 
+import contextlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,9 +17,9 @@ from utank_hil.canbus import (
     Station,
     load_catalogue,
 )
-from utank_hil.commands.keyboard import LEAVE_NS, SILENT_NS, Keyboard
+from utank_hil.commands.keyboard import LEAVE_NS, Keyboard
 from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.panel import Action, OperatorPanel
+from utank_hil.runtime.panel import SILENT_NS, Action, OperatorPanel
 
 CATALOGUE = load_catalogue()
 STEP_NS = 100_000_000
@@ -165,6 +166,27 @@ def test_status_is_said_in_words_when_it_changes_and_silence_too(table: Table) -
     table.hear(Mode.STANDBY)
     table.look()
     assert table.said[2:] == ["controller: STANDBY"]
+
+
+def test_controller_that_was_never_heard_is_silent(table: Table) -> None:
+    for _ in range(2 * SILENT_NS // STEP_NS):
+        table.look()
+    assert table.said == ["controller: SILENT"]
+
+
+def test_pipe_that_is_never_empty_holds_nothing_up(table: Table) -> None:
+    os.set_blocking(table.writing, False)
+    for look in range(100):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(table.writing, b"x" * 4096)
+        assert not table.look()
+        assert len(table.keyboard._typed) < 1000, look
+    table.hear(Mode.STANDBY)
+    os.read(table.reading, 1 << 20)
+    table.type("\nstop\n")
+    table.look()
+    assert table.order.stop
 
 
 def test_alarms_are_said_with_words_and_remedy_and_when_they_are_over(table: Table) -> None:

@@ -19,7 +19,9 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.enumerations import Address
+from utank_hil.commands.panel import LOOK_NS
 from utank_hil.runtime.faults import FAULTS
+from utank_hil.runtime.panel import EDGE_NS, SILENT_NS
 from utank_hil.runtime.safety_limits import SafetyLimits
 
 PAGES = Path("docs/how-to")
@@ -156,6 +158,8 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
         ("drive", "out of OPERATION_ENABLED while active | 40 ms", LIMITS.drive_enabled_within_ms),
         ("panel", "silent, before arming | 600 ms", LIMITS.panel_age_to_arm_ms),
         ("panel", "silent, while armed | 5 s", LIMITS.panel_age_armed_ms),
+        ("panel", "No CTRL_STATUS for 300 ms", SILENT_NS / 1e6),
+        ("panel", "take it back for 500 ms", EDGE_NS / 1e6),
     ],
 )
 def test_limits_of_the_pages_are_those_that_are_judged(
@@ -164,6 +168,11 @@ def test_limits_of_the_pages_are_those_that_are_judged(
     assert words in text(page)
     number, unit = re.findall(r"([\d.]+) (ms|s)\b", words)[0]
     assert float(number) * (1000 if unit == "s" else 1) == limit_ms
+
+
+def test_keyboard_panel_keeps_the_time_from_button_to_frame() -> None:
+    assert "From the button to the frame: 50 ms at most." in text("panel")
+    assert 2 * LOOK_NS <= 50_000_000
 
 
 def test_addresses_and_fault_codes_exist() -> None:

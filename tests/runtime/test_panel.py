@@ -86,6 +86,7 @@ def test_buttons_of_an_armed_panel(action: Action, mode: Mode, armed: bool) -> N
     table = Table()
     table.panel.press(Action.ARM)
     table.tick()
+    table.hear(Mode.ACTIVE)
     table.panel.press(action)
     table.tick()
     assert (table.last.mode_request, table.last.arm) == (mode, armed)
@@ -204,3 +205,39 @@ def test_controllers_status_is_kept_and_a_damaged_one_is_not() -> None:
     table.panel.receive(Frame(frame.can_id, bytes(8)), START_NS)
     table.panel.receive(Frame(frame.can_id + 1, frame.data), START_NS)
     assert table.panel.status == status
+
+
+def test_arming_again_after_a_fault_is_another_rising_edge_in_any_two_of_three_frames() -> None:
+    table = Table()
+    table.panel.press(Action.ARM)
+    for mode in (Mode.STANDBY, Mode.ACTIVE, Mode.FAULT, Mode.STANDBY):
+        table.hear(mode)
+        table.run(5)
+        assert table.last.arm
+    again_ms = (table.now_ns - START_NS) / MS
+    table.panel.press(Action.ARM)
+    table.run(10)
+    arms = [(time_ms - again_ms, sent.arm) for time_ms, sent in table.heard if time_ms >= again_ms]
+    low = [time_ms for time_ms, arm in arms if not arm]
+    assert len(low) >= 3
+    assert [arm for _, arm in arms] == sorted(arm for _, arm in arms)
+    assert table.last == OperatorCommand(Mode.ACTIVE, True, False, False, False)
+
+
+def test_arm_pressed_while_active_does_not_disarm() -> None:
+    table = Table()
+    for _ in range(2):
+        table.panel.press(Action.ARM)
+        table.hear(Mode.ACTIVE)
+        table.run(10)
+    assert all(sent.arm for _, sent in table.heard)
+
+
+@pytest.mark.parametrize(("age_ms", "arm"), [(300, True), (301, False)])
+def test_who_takes_the_command_adopts_only_a_mode_of_now(age_ms: int, arm: bool) -> None:
+    table = Table()
+    table.hear(Mode.ACTIVE)
+    table.now_ns += age_ms * MS
+    table.panel.press(Action.TAKE)
+    table.tick()
+    assert table.last.arm is arm

@@ -7,10 +7,8 @@ from typing import Final
 
 from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Station
 from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.panel import Action, OperatorPanel
+from utank_hil.runtime.panel import SILENT_NS, Action, OperatorPanel
 
-SILENT_NS: Final = 1_000_000_000
-"""So long without a status the controller is called silent."""
 LEAVE_NS: Final = 3_000_000_000
 """So long a panel that is left waits for the answer to a stop."""
 HELP: Final = """\
@@ -24,6 +22,7 @@ HELP: Final = """\
   help, quit           Words may be cut short: d for disarm."""
 
 _READ_BYTES: Final = 4096
+_LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
@@ -53,6 +52,7 @@ class Keyboard:
         self._typed = b""
         self._shown = ""
         self._silent = True
+        self._began_ns: int | None = None
         self._leave_ns: int | None = None
         self._alarms: dict[Fault | None, AlarmState | None] = {}
 
@@ -69,14 +69,16 @@ class Keyboard:
     def _lines(self) -> list[str]:
         """Whole lines that have come; what comes with the end of a pipe is one, too.
 
-        Python's own buffer would keep a line back until there is something to read again.
+        Python's own buffer would keep a line back until there is something to read again. There is
+        one read a look: a pipe that is never empty is not to hold the panel up.
         """
-        while self._open and select.select([self._descriptor], [], [], 0)[0]:
+        if self._open and select.select([self._descriptor], [], [], 0)[0]:
             data = os.read(self._descriptor, _READ_BYTES)
             self._open = bool(data)
             self._typed += data
         *lines, begun = self._typed.split(b"\n")
-        self._typed = begun if self._open else b""
+        # what is longer than any word is none, and kept no longer than its beginning
+        self._typed = begun[:_LONGEST_LINE] if self._open else b""
         if begun and not self._open:
             lines.append(begun)
         return [line.decode(errors="replace").strip().lower() for line in lines]
@@ -117,11 +119,13 @@ class Keyboard:
 
     def _show(self, now_ns: int) -> None:
         node = self._node
-        heard_ns = node.heard_ns
-        self._silent = heard_ns is None or now_ns - heard_ns > SILENT_NS
-        if node.status is not None:
-            text = _status_text(node.status, node.station)
-            said = "controller: SILENT" if self._silent else text
+        if self._began_ns is None:
+            self._began_ns = now_ns
+        self._silent = node.silent(now_ns)
+        if node.status is not None or now_ns - self._began_ns > SILENT_NS:
+            said = "controller: SILENT"
+            if node.status is not None and not self._silent:
+                said = _status_text(node.status, node.station)
             if said != self._shown:
                 self._say(said)
                 self._shown = said

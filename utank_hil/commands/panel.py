@@ -16,6 +16,10 @@ from utank_hil.commands.terminal import notes
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.runtime import RealTimeLoop, stop_on_signals
 from utank_hil.runtime.panel import OperatorPanel
+from utank_hil.tick import TICK_NS
+
+LOOK_NS = 2 * TICK_NS
+"""Between two looks at the keyboard: a frame leaves within 50 ms of its button."""
 
 
 def panel(
@@ -37,7 +41,9 @@ def panel(
     """
     version = load(vessel, Vessel).version
     station = Station.OPERATOR_2 if second else Station.OPERATOR
-    node = OperatorPanel(load_catalogue(), configuration_version=version, station=station)
+    node = OperatorPanel(
+        load_catalogue(), configuration_version=version, station=station, period_ns=LOOK_NS
+    )
     try:
         port = SocketCanPort(bus, can_ids=node.hears)
     except OSError as error:

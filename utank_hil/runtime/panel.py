@@ -20,7 +20,10 @@ from utank_hil.runtime.stations import ADDRESSES
 from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
-"""How long an edge-triggered button stays pressed: longer than two lost messages."""
+"""How long an edge-triggered button stays pressed: longer than two lost messages. So long the arm
+bit is taken back, too, before it is set again."""
+SILENT_NS = 300_000_000
+"""After so long without a status no controller is heard."""
 _UNDER_POWER = (Mode.ACTIVE, Mode.PASSIVE, None)
 """Modes that a stop has not ended yet."""
 _SPARE_ALARMS = 5
@@ -82,9 +85,13 @@ class OperatorPanel:
         Scheduled button presses, for benches.
     station : Station
         Which of the two stations it is.
+    period_ns : int
+        Time between two looks at the buttons; the cycle of OPERATOR_CMD is a multiple of it.
 
     Attributes
     ----------
+    period_ns : int
+        As given.
     status : ControllerStatus or None
         Latest status of the controller.
     stopping : bool
@@ -94,7 +101,6 @@ class OperatorPanel:
     """
 
     name = "panel"
-    period_ns = 10 * TICK_NS
 
     def __init__(
         self,
@@ -103,11 +109,13 @@ class OperatorPanel:
         configuration_version: int,
         script: Iterable[TimedAction] = (),
         station: Station = Station.OPERATOR,
+        period_ns: int = 10 * TICK_NS,
     ) -> None:
         address = ADDRESSES[station]
+        self.period_ns = period_ns
         self.station = station
         self._sender = catalogue.transmitter(OperatorCommand, address)
-        self._cycle_ticks = self._sender.cycle_ns // self.period_ns
+        self._cycle_ticks = self._sender.cycle_ns // period_ns
         self._listener = catalogue.receiver(ControllerStatus)
         self._alarm_listener = catalogue.receiver(Alarm)
         self.hears = frozenset([self._listener.can_id, self._alarm_listener.can_id])
@@ -120,7 +128,7 @@ class OperatorPanel:
         self._armed = False
         self._forbidden = False
         self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
-        self._stopped_ns = 0
+        self._stopped_ns = self._arms_ns = 0
         self.stopping = False
         self._pressed: list[Action] = []
         self._sent: OperatorCommand | None = None
@@ -144,6 +152,10 @@ class OperatorPanel:
         return tuple(
             sorted((alarm for alarm, _ in self._alarms.values()), key=lambda each: each.place or 0)
         )
+
+    def silent(self, now_ns: int) -> bool:
+        """Whether no controller is heard."""
+        return self.heard_ns is None or now_ns - self.heard_ns > SILENT_NS
 
     def press(self, action: Action) -> None:
         """Press a button; it takes effect with the next tick."""
@@ -178,7 +190,7 @@ class OperatorPanel:
         self._pressed.clear()
         command = OperatorCommand(
             mode_request=self._mode,
-            arm=self._armed,
+            arm=self._armed and now_ns >= self._arms_ns,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
             acknowledge=now_ns < self._pressed_until_ns[Action.ACCEPT],
@@ -214,9 +226,12 @@ class OperatorPanel:
         if action is Action.STOP:
             self.stopping, self._stopped_ns = True, now_ns
         if action is Action.TAKE:
-            self._adopt()
+            self._adopt(now_ns)
         if action is Action.ARM:
             if not self.stopping:
+                # without another rising edge a second press would do nothing after a fault
+                if self._armed and (self.status is None or self.status.mode is not Mode.ACTIVE):
+                    self._arms_ns = now_ns + EDGE_NS
                 self._mode, self._armed = Mode.ACTIVE, True
         elif action in (Action.FORBID, Action.PERMIT):
             self._forbidden = action is Action.FORBID
@@ -225,12 +240,12 @@ class OperatorPanel:
         elif action in (Action.STANDBY, Action.STOP):
             self._mode, self._armed = Mode.STANDBY, False
 
-    def _adopt(self) -> None:
+    def _adopt(self, now_ns: int) -> None:
         """Take over what the controller does: who takes the command is not to change it."""
-        status = self.status
-        self._armed = status is not None and status.mode is Mode.ACTIVE and not self.stopping
+        status = None if self.silent(now_ns) else self.status
+        mode = None if status is None else status.mode
+        self._armed = mode is Mode.ACTIVE and not self.stopping
         if self._armed:
             self._mode = Mode.ACTIVE
         else:
-            passive = status is not None and status.mode is Mode.PASSIVE
-            self._mode = Mode.PASSIVE if passive else Mode.STANDBY
+            self._mode = Mode.PASSIVE if mode is Mode.PASSIVE else Mode.STANDBY
