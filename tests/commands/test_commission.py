@@ -14,7 +14,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.cli import app
 from utank_hil.commands import commission as module
-from utank_hil.commands import run
+from utank_hil.commands import commissioning_record, run
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -110,7 +110,45 @@ def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Pat
     assert "these changed: catalogue_version" in reason(file)
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"passed": true}', "\x00"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"checks": []},
+        {"checks": [{"verdict": "pass"}, {"verdict": "fail"}]},
+        {"ended": "Disarmed before the end."},
+    ],
+)
+def test_one_that_says_passed_and_was_not_does_not_admit(file: Path, changes: Any) -> None:
+    path = passed(file)
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    assert "was not passed" in reason(file)
+
+
+@pytest.mark.parametrize("changes", [{"bus": None}, {"commissioned_for": []}, {"passed": 1}])
+def test_one_with_a_value_of_another_type_is_none(file: Path, changes: Any) -> None:
+    path = passed(file)
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    assert "is no record of a commissioning that can be read" in reason(file)
+
+
+def test_a_default_that_a_later_version_changes_makes_it_void(file: Path) -> None:
+    record = json.loads(passed(file).read_text())["commissioned_for"]
+    assert record["sensors"]["roll_noise_rad"] == loaded(file).sensors.roll_noise_rad
+    assert record["ship"]["wind_moment_nm"] == 0.0
+
+
+def test_hardware_under_the_name_of_an_emulated_bus_asks_for_one(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(commissioning_record, "INTERFACES", tmp_path / "net")
+    assert reason(file, "vcan_pump") == ""
+    (tmp_path / "net/vcan_pump/device").mkdir(parents=True)
+    assert "there is no record" in reason(file, "vcan_pump")
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", "{}", '{"passed": true}', "\x00", "[" * 100_000]
+)
 def test_a_file_that_is_no_record_does_not_admit(file: Path, content: str) -> None:
     record_path(file).write_text(content)
     assert "is no record of a commissioning that can be read; run" in reason(file)

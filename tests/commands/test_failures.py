@@ -91,6 +91,13 @@ def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> N
     assert done.stderr == "error: No space left on device\n"
 
 
+def test_a_pipe_that_nobody_reads_is_no_refusal() -> None:
+    read, written = os.pipe()
+    os.close(read)
+    with os.fdopen(written, "w") as closed:
+        assert started(("check", GPC), stdout=closed).returncode == ExitCode.USAGE
+
+
 def test_no_output_at_all_ends_with_the_same_code() -> None:
     with Path("/dev/full").open("w") as full:
         assert started(("check", GPC), stdout=full, stderr=full).returncode == ExitCode.USAGE

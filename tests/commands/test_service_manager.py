@@ -1,6 +1,7 @@
 """What the service manager is told, and when it is not."""
 
 import socket
+import threading
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from typer.testing import CliRunner
 
 from utank_hil.cli import app
 from utank_hil.commands import run as module
+from utank_hil.commands import service_manager
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.service_manager import ServiceManager
 
@@ -45,6 +47,27 @@ def test_watchdog_is_fed_by_the_count_of_ticks_and_several_times_in_its_time(man
         for _ in range(1000):  # the loop's process lives, but nothing goes on
             service.progress(101)
         assert messages(manager) == []
+
+
+def test_ready_waits_for_a_manager_that_is_busy(manager) -> None:
+    with ServiceManager(environment(manager)) as service:
+        for _ in range(1000):  # its queue is full after some
+            service.progress(0)
+        reading = threading.Timer(0.2, manager.recv, [4096])
+        reading.start()
+        service.ready("here")
+        reading.join()
+        service.progress(0)  # a sign of life never waits
+    assert messages(manager)[-1] == "READY=1\nSTATUS=here"
+
+
+def test_a_manager_that_never_takes_it_is_an_error(manager, monkeypatch) -> None:
+    monkeypatch.setattr(service_manager, "READY_S", 0.05)
+    with ServiceManager(environment(manager)) as service:
+        for _ in range(1000):
+            service.progress(0)
+        with pytest.raises(TimeoutError):
+            service.ready("here")
 
 
 def test_without_a_watchdog_nothing_is_fed_and_without_a_manager_nothing_is_sent(manager) -> None:

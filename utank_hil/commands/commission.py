@@ -1,7 +1,5 @@
 """``utank-hil commission``: signs, zeros and scales at the quay, before anything may be armed."""
 
-import json
-import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -14,7 +12,7 @@ from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import PortError, SocketCanPort
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.commissioning_record import make_record, record_path, write_record
-from utank_hil.commands.common import Json, fail, load, why_not_writable
+from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
@@ -97,10 +95,12 @@ def commission(
         write_record(path, made)
     except OSError as error:
         fail(f"{path}: the record can't be written: {error.strerror}")
-    if json_:
-        sys.stdout.write(json.dumps({**made, "record": str(path)}) + "\n")
-    else:
-        _print(made, path, config)
+    # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
+    with suppress(OSError, SystemExit):
+        if json_:
+            print_json({**made, "record": str(path)})
+        else:
+            _print(made, path, config)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
 
 

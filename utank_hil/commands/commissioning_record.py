@@ -7,17 +7,19 @@ import tempfile
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel
 
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.vessel import not_by_default
 from utank_hil.provenance import PROGRAM, commit, version
 from utank_hil.runtime.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
 EMULATED: Final = ("vcan", "vxcan")
 """Begin the names of interfaces that no hardware is on."""
+INTERFACES: Final = Path("/sys/class/net")
 
 
 def record_path(config: Path) -> Path:
@@ -31,9 +33,9 @@ def commissioned_for(config: ControllerConfig) -> dict[str, Any]:
     parts = {name: getattr(vessel, name) for name in ("ship", "tank", "pump", "valve")}
     return {
         "catalogue_version": load_catalogue().version,
-        **{name: not_by_default(part) for name, part in parts.items() if part is not None},
-        "redundancy": not_by_default(vessel.redundancy),
-        "sensors": not_by_default(config.sensors),
+        **{name: asdict(part) for name, part in parts.items() if part is not None},
+        "redundancy": asdict(vessel.redundancy),
+        "sensors": asdict(config.sensors),
     }
 
 
@@ -121,25 +123,46 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
     path = path or record_path(file)
     remedy = f"run utank-hil commission {file} --bus {bus} at the quay"
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        stands_for, passed, date = (record[key] for key in ("commissioned_for", "passed", "date"))
-        on_bus = str(record["bus"])
+        record = _Record.model_validate_json(path.read_bytes(), strict=True)
     except FileNotFoundError:
         return f"{path}: there is no record of a commissioning; {remedy}"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError):
         return f"{path}: is no record of a commissioning that can be read; {remedy}"
-    changed = _differences(stands_for, json.loads(json.dumps(commissioned_for(config))))
+    stands_for = json.loads(json.dumps(commissioned_for(config)))
+    changed = _differences(record.commissioned_for, stands_for)
     if changed:
-        return f"{path}: since {date} these changed: {', '.join(changed)}; {remedy}"
-    if passed is not True:
-        return f"{path}: the commissioning of {date} was not passed; {remedy}"
-    if _is_emulated(on_bus) and not _is_emulated(bus):
-        return f"{path}: was made on {on_bus}, where no hardware is; {remedy}"
+        return f"{path}: since {record.date} these changed: {', '.join(changed)}; {remedy}"
+    if not record.whole:
+        return f"{path}: the commissioning of {record.date} was not passed; {remedy}"
+    if _is_emulated(record.bus) and not _is_emulated(bus):
+        return f"{path}: was made on {record.bus}, where no hardware is; {remedy}"
     return ""
 
 
+class _Verdict(BaseModel):
+    verdict: Literal["pass", "fail"]
+
+
+class _Record(BaseModel):
+    """What is read of a record."""
+
+    commissioned_for: dict[str, Any]
+    passed: bool
+    ended: str
+    date: str
+    bus: str
+    checks: list[_Verdict]
+
+    @property
+    def whole(self) -> bool:
+        """Whether it was passed, by each of its checks."""
+        passed = [check.verdict == "pass" for check in self.checks]
+        return self.passed and not self.ended and bool(passed) and all(passed)
+
+
 def _is_emulated(bus: str) -> bool:
-    return bus.startswith(EMULATED)
+    # any name may be given to an interface: one with hardware behind it has a device
+    return bus.startswith(EMULATED) and not (INTERFACES / bus / "device").exists()
 
 
 def _differences(before: Any, now: Any, key: str = "") -> list[str]:

@@ -143,13 +143,18 @@ def run(
             manager.progress(statistics.ticks)
             return stop()
 
-        with suppress(PortError):  # the loop meets it too, and its node reacts
-            port.receive()  # what came while the node was built is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.say(line)
             notes.say(f"{loaded.name} on {bus}; Ctrl-C ends it.")
-            manager.ready(f"{loaded.name} on {bus}")
+            try:
+                manager.ready(f"{loaded.name} on {bus}")
+            except OSError as error:
+                fail(
+                    f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM
+                )
+            with suppress(PortError):  # the loop meets it too, and its node reacts
+                port.receive()  # what came before is old, and must not look fresh
             RealTimeLoop([on_bus], port, statistics=statistics).run(
                 ended, None if duration is None else round(duration * 1e9)
             )

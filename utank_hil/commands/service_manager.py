@@ -11,6 +11,7 @@ from utank_hil.tick import TICK_NS
 
 _FEEDS: Final = 4
 """Signs of life in the watchdog's time."""
+READY_S: Final = 30.0
 
 
 class ServiceManager(Closing):
@@ -45,8 +46,20 @@ class ServiceManager(Closing):
             self._every_ticks = max(1, watchdog_ns // (_FEEDS * TICK_NS))
 
     def ready(self, status: str) -> None:
-        """Tell that the loop begins; from here on the watchdog waits for ticks."""
-        self._send(f"READY=1\nSTATUS={status}")
+        """Tell that the loop begins; from here on the watchdog waits for ticks.
+
+        It is said once, and a manager that misses it ends the program after a while. So it waits
+        for one that is busy.
+
+        Raises
+        ------
+        OSError
+            If the manager does not take it in time.
+        """
+        if self._socket is not None:
+            self._socket.settimeout(READY_S)
+            self._socket.send(f"READY=1\nSTATUS={status}".encode())
+            self._socket.setblocking(False)
 
     def progress(self, ticks: int) -> None:
         """Feed the watchdog by the loop's own progress: only as the count of ticks goes on.

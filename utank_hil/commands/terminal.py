@@ -11,6 +11,8 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from utank_hil.commands.exit_codes import ExitCode
+
 UNLIMITED: Final = 10_000
 
 
@@ -43,6 +45,13 @@ class Terminal(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def on_broken_pipe(self) -> None:
+        """End as where results can't be written; Rich's own exit code is that of a refusal."""
+        try:
+            super().on_broken_pipe()
+        except SystemExit:
+            raise SystemExit(ExitCode.USAGE) from None
 
     def say(self, text: str = "", *, red: str = "", yellow: str = "", green: str = "") -> None:
         """Print a line, however long, after words in a colour."""
