@@ -1,8 +1,12 @@
 """A run's recording: named by its time, and never a reason not to control."""
 
+import json
 import os
 import re
 import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -46,6 +50,7 @@ class Instant:
     """A recorder that leaves a file and takes no time."""
 
     url = None
+    has_ended = False
 
     def __init__(
         self,
@@ -149,3 +154,66 @@ def test_recorder_that_fails_on_the_way_is_told_with_its_file(
     assert summary.file is not None
     assert summary.error == "the recorder failed: disk full"
     assert summary.rows is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (signal.SIGKILL, "the recorder failed: exit code -9"),
+        (signal.SIGTERM, "the recorder ended before the run"),
+    ],
+)
+def test_recorder_that_is_ended_is_told_once_while_the_run_goes_on(
+    tmp_path: Path, number: int, words: str
+) -> None:
+    recording = RunRecording(tmp_path)
+    assert recording.recorder_pid is not None
+    assert recording.failure() == ""
+    os.kill(recording.recorder_pid, number)
+    os.waitid(os.P_PID, recording.recorder_pid, os.WEXITED | os.WNOWAIT)
+    assert [recording.failure() for _ in range(3)] == [words, "", ""]
+    for row in rows(10):
+        recording.write(row)
+    recording.stop()
+    assert recording.summary.error == words
+
+
+@pytest.mark.slow
+def test_run_says_within_a_second_that_nothing_is_recorded_any_longer(tmp_path: Path) -> None:
+    program = (
+        "import ports, utank_hil.commands.run\n"
+        "utank_hil.commands.run.SocketCanPort = ports.QuietBus\n"
+        "from utank_hil.cli import main; main()"
+    )
+    gpc = "configs/controllers/gpc.yaml"
+    words = ["run", gpc, "--bus", "any0", "--duration", "60", "--out", str(tmp_path), "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-c", program, *words],
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as run:
+        assert run.stderr is not None
+        told: list[str] = []
+        for line in run.stderr:
+            told.append(line)
+            if "Ctrl-C ends it" in line:
+                os.kill(recorder_of(run.pid), signal.SIGKILL)
+            if "not recorded" in line:
+                break
+        run.send_signal(signal.SIGINT)
+        output = run.communicate()[0]
+    assert told[-1] == "not recorded any longer: the recorder failed: exit code -9\n"
+    assert json.loads(output)["recording"]["error"] == "the recorder failed: exit code -9"
+
+
+def recorder_of(run: int) -> int:
+    children = Path(f"/proc/{run}/task/{run}/children").read_text().split()
+    (found,) = [
+        int(child)
+        for child in children
+        if b"utank_hil.telemetry.recorder" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    return found

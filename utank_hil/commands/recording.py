@@ -150,12 +150,23 @@ class RunRecording:
         if self._records is not None:
             self._records.write(records)
 
+    def failure(self) -> str:
+        """Why the recorder has ended before the run, once; never waits."""
+        if self._recorder is None or not self._recorder.has_ended:
+            return ""
+        self._end_recorder()
+        self.summary.error = self.summary.error or "the recorder ended before the run"
+        return self.summary.error
+
     def stop(self) -> None:
         """Have the summary completed; idempotent."""
         self._close_records()  # before the other, whose end is what ends the recorder
         ring, self._ring = self._ring, None
         if ring is not None:
             ring.close()
+        self._end_recorder()
+
+    def _end_recorder(self) -> None:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             try:

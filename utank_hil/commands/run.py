@@ -47,6 +47,8 @@ from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 
 _REFUSALS: Final = (errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOSPC)
+LOOK_TICKS: Final = 100
+"""Between two looks at the recorder."""
 _COMMAND_LINE: Final = "from utank_hil.cli import main; main()"
 
 
@@ -140,7 +142,12 @@ def run(
             on_bus = NodeTap(node, recording.write_records, desks.taps, ROW_TICKS)
 
         def ended() -> bool:
-            manager.progress(statistics.ticks)
+            ticks = statistics.ticks
+            manager.progress(ticks)
+            if ticks % LOOK_TICKS == 0:
+                failure = recording.failure()
+                if failure:
+                    alarms.say(f"not recorded any longer: {failure}")
             return stop()
 
         with real_time_scheduling() as scheduling:
@@ -150,9 +157,7 @@ def run(
             try:
                 manager.ready(f"{loaded.name} on {bus}")
             except OSError as error:
-                fail(
-                    f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM
-                )
+                fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
             with suppress(PortError):  # the loop meets it too, and its node reacts
                 port.receive()  # what came before is old, and must not look fresh
             RealTimeLoop([on_bus], port, statistics=statistics).run(

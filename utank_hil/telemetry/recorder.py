@@ -314,6 +314,11 @@ class RecorderProcess(Closing):
         """Number of the process."""
         return self._process.pid
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process has ended."""
+        return self._process.poll() is not None
+
     def stop(self) -> RecorderReport:
         """Write the last rows and wait for the end of the process; idempotent.
 
