@@ -127,7 +127,7 @@ def test_the_largest_law_fits_its_mailbox_and_a_larger_one_is_refused() -> None:
     largest = law_of(MOST_STATES, 4, MOST_KNOTS, MOST_SAMPLES, 3)
     horizon = dataclasses.replace(largest.law.horizon, terminal=np.eye(MOST_STATES))
     whole = dataclasses.replace(largest, law=dataclasses.replace(largest.law, horizon=horizon))
-    assert len(answer_bytes(whole)) == LONGEST_BYTES
+    assert len(answer_bytes(whole)) <= LONGEST_BYTES
     for sizes in (
         (MOST_STATES + 1, 1, 1, 9, 0),
         (3, 1, MOST_KNOTS + 1, MOST_SAMPLES, 0),

@@ -19,8 +19,9 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning.number_reader import NumberReader
 
-# a law of these sizes is condensed in a few milliseconds, once
-MOST_STATES: Final = 64
+# a law of these sizes is condensed in a few milliseconds, once, between two ticks; shipped laws have
+# 22 states, 19 knots and 60 samples
+MOST_STATES: Final = 32
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
 _MOST_OUTPUTS: Final = len(STATES)
