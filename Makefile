@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom docs lock clean
+.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -31,6 +31,7 @@ help:
 	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
 	@echo "make site       the documentation as web pages, out/site"
 	@echo "make sbom       the list of parts of a deployed controller, out/sbom.json"
+	@echo "make wheel      the package for a ship's PC and the lock of what it needs there, dist/"
 	@echo "make docs       write the generated documents and tables anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
@@ -110,6 +111,12 @@ sbom: setup
 	@mkdir -p out
 	$(PYTHON) -m tools.sbom > out/sbom.json
 	@echo "out/sbom.json"
+
+# for a ship's PC, with the lock of what runs there
+wheel: setup
+	$(PYTHON) -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+	$(PYTHON) -m tools.sbom --extra viewer --lock > dist/requirements.txt
+	@ls dist/*
 
 docs: setup
 	$(PYTHON) -m tools.documents.write

@@ -1,10 +1,12 @@
 """The list of parts of a deployed controller, CycloneDX JSON, from the lock.
 
     python -m tools.sbom [--extra viewer] > out/sbom.json
+    python -m tools.sbom [--extra viewer] --lock > dist/requirements.txt
 
-The parts are what the package requires without its extras, and what those require in turn, in the
-versions and with the hashes of requirements.lock. `cyclonedx-py` writes them; who requires whom is
-added from the packages' own metadata.
+The second is what pip installs these parts by, and none else. The parts are what the package
+requires without its extras, and what those require in turn, in the versions and with the hashes of
+requirements.lock. `cyclonedx-py` writes them; who requires whom is added from the packages' own
+metadata.
 """
 
 import argparse
@@ -94,9 +96,14 @@ def main() -> None:
     """Print it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--extra", action="append", default=[], help="an extra that is installed")
+    parser.add_argument("--lock", action="store_true", help="as requirements of pip, with hashes")
     arguments = parser.parse_args()
+    extras = frozenset(arguments.extra)
+    if arguments.lock:
+        sys.stdout.write(locked(closure(extras).keys() - {PROJECT}))
+        return
     warnings.simplefilter("error")
-    json.dump(sbom(frozenset(arguments.extra)), sys.stdout, indent=1)
+    json.dump(sbom(extras), sys.stdout, indent=1)
     sys.stdout.write("\n")
 
 

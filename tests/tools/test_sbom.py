@@ -3,8 +3,10 @@
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from tools.sbom import closure, locked, sbom
 
@@ -68,3 +70,21 @@ def test_a_part_that_the_lock_lacks_is_named() -> None:
     assert "numpy==" in locked({"numpy"})
     with pytest.raises(SystemExit, match="lacks numppy, skippy"):
         locked({"numpy", "numppy", "skippy"})
+
+
+def test_the_lock_of_a_ships_pc_has_the_listed_parts_with_hashes_and_pip_takes_it(
+    tmp_path: Path,
+) -> None:
+    command = [sys.executable, "-m", "tools.sbom", "--extra", "viewer", "--lock"]
+    text = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    entries = [entry for entry in text.splitlines() if not entry.startswith(" ")]
+    pinned = {Requirement(entry.rstrip("\\ ")).name: entry for entry in entries}
+    assert pinned.keys() == closure(frozenset({"viewer"})).keys() - {"utank-hil"}
+    assert all("==" in entry for entry in entries)
+    file = tmp_path / "requirements.txt"
+    file.write_text(text)
+    install = ["-m", "pip", "install", "--dry-run", "--no-index", "--require-hashes", "-r"]
+    done = subprocess.run(
+        [sys.executable, *install, str(file)], check=True, stdout=subprocess.PIPE, text=True
+    )
+    assert "Would install" not in done.stdout

@@ -19,8 +19,8 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning.number_reader import NumberReader
 
-# a law of these sizes is condensed in a few milliseconds, once, between two ticks; shipped laws have
-# 22 states, 19 knots and 60 samples
+# a law of these sizes is condensed in a few milliseconds; a shipped one has 22 states, 19 knots and
+# 60 samples
 MOST_STATES: Final = 32
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
