@@ -8,13 +8,16 @@ from pydantic import AfterValidator
 
 from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span, Spoil, Spoiled
 from firmware_sim.fault_injection.place import Bench
-from utank_hil.canbus import Address, load_catalogue
+from utank_hil.canbus import Address, Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
+from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.configuration import Section
 from utank_hil.configuration.known_keys import nearest
-from utank_hil.parameters import NotNegative, Positive, Problem
+from utank_hil.parameters import Problem, Range
 
 SECOND_NS: Final = 1_000_000_000
+LONGEST_FAULT_S: Final = 86_400.0
+"""A day, the longest run of a scenario: no time of a fault is greater."""
 
 NODE_OF: Final = {
     Address.SENSORS: "sensors",
@@ -55,6 +58,10 @@ AnyMessageName = Annotated[
 NodeName = Annotated[str, AfterValidator(partial(_choice, "node", list(NODE_OF.values())))]
 
 
+FaultTime = Annotated[float, Range(least=0, most=LONGEST_FAULT_S)]
+FaultSpan = Annotated[float, Range(above=0, most=LONGEST_FAULT_S)]
+
+
 class Fault(Section, ABC):
     """When a fault is there: `at_s` after the start, for `for_s` or till the end."""
 
@@ -63,8 +70,8 @@ class Fault(Section, ABC):
     needs: ClassVar[tuple[str, ...]] = ()
     """Nodes that must be emulated for any fault of the kind."""
 
-    at_s: NotNegative = 0.0
-    for_s: Positive | None = None
+    at_s: FaultTime = 0.0
+    for_s: FaultSpan | None = None
 
     def span(self, start_ns: int) -> Span:
         """When it is there, of a run whose faults count from `start_ns`."""
@@ -99,6 +106,11 @@ class MessageFault(Fault):
         """Spoil the message's frames where they leave their node."""
         _, source, codec = self.named
         bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, spoil, codec.can_id))
+
+
+def intact(named: NamedMessage, frame: Frame) -> Any:
+    """What a frame of the message says, None if another fault has been at it."""
+    return named.codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
 
 
 def signal_problems(

@@ -161,7 +161,7 @@ class FaultyBus:
                 frames.remove(arrived)
             elif each.does == "doubles":
                 frames.append(arrived)
-            elif each.does == "changes":
+            elif each.does == "changes" and frame.data:
                 place = int(self._draw() * len(frame.data))
                 data = bytearray(frame.data)
                 data[place] ^= 1 + int(self._draw() * 255)

@@ -8,12 +8,13 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from firmware_sim.fault_injection.fault import MessageFault
+from firmware_sim.fault_injection.fault import MessageFault, intact
 from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.e2e import data_ids, profile2_crc
+from utank_hil.parameters import Range
 
 _FOREIGN_DATA_IDS: Final = data_ids(127)
 """Of no message of the catalogue."""
@@ -86,7 +87,7 @@ class Doubled(FrameFault):
     """Every frame is sent so many times."""
 
     kind: Literal["doubled"]
-    times: Annotated[int, Field(ge=2)] = 2
+    times: Annotated[int, Range(least=2, most=100)] = 2
     """So often each is sent."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
@@ -98,7 +99,7 @@ class Inserted(FrameFault):
     """Beside each new frame one of some cycles ago."""
 
     kind: Literal["inserted"]
-    back: Annotated[int, Field(ge=1)]
+    back: Annotated[int, Range(least=1, most=10_000)]
     """So many cycles ago."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
@@ -131,7 +132,9 @@ class Counter(FrameFault):
             left_out[0] = (left_out[0] + 1) % self.one_of
             if left_out[0]:
                 return ()
-            message = codec.decode(frame.data)
+            message = intact(self.named, frame)
+            if message is None:
+                return (frame,)
             counter.append(frame.data[1] & 15 if not counter else counter.pop() + self.step)
             return (Frame(codec.can_id, codec.encode(message, counter[0] & 15)),)
 
@@ -168,9 +171,10 @@ class Corrupted(Damaged):
     """Whose bits are wrong."""
 
     def damage(self, data: bytes) -> bytes:
-        """As in `Damaged`."""
+        """As in `Damaged`; a frame that another fault has left too short for it stays."""
         wrong = bytearray(data)
-        wrong[self.byte] ^= 0x24
+        if self.byte < len(wrong):
+            wrong[self.byte] ^= 0x24
         return bytes(wrong)
 
 
@@ -180,7 +184,9 @@ class WrongDataId(Damaged):
     kind: Literal["data_id"]
 
     def damage(self, data: bytes) -> bytes:
-        """As in `Damaged`."""
+        """As in `Damaged`; a frame that another fault has left too short stays."""
+        if len(data) < FRAME_BYTES:
+            return data
         return bytes([profile2_crc(data, _FOREIGN_DATA_IDS)]) + data[1:]
 
 

@@ -5,11 +5,11 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from firmware_sim.fault_injection.fault import SECOND_NS, Fault, NodeName
+from firmware_sim.fault_injection.fault import SECOND_NS, Fault, FaultSpan, NodeName
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import DriveFault
-from utank_hil.parameters import Finite, NotNegative, Positive
+from utank_hil.parameters import Finite, NotNegative
 from utank_hil.tick import TICK_S
 
 
@@ -72,7 +72,7 @@ class Slow(NodeFault):
     """The node's frames leave late."""
 
     kind: Literal["slow"]
-    by_s: Positive
+    by_s: FaultSpan
     """Delay of every frame."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002

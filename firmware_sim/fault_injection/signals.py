@@ -4,16 +4,17 @@ import random
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from enum import IntEnum
 from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
-from firmware_sim.fault_injection.fault import MessageFault, signal_problems
+from firmware_sim.fault_injection.fault import FaultSpan, MessageFault, intact, signal_problems
 from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import NamedMessage
-from utank_hil.canbus.codec import FRAME_BYTES, field_kind
+from utank_hil.canbus.codec import field_kind
 from utank_hil.parameters import Finite, Positive, refuse
 
 Change = Callable[[Sequence[Any], float], Sequence[Any]]
@@ -67,8 +68,8 @@ def _altered(named: NamedMessage, change: Callable[[Any, float], Any]) -> Spoil:
     codec = named.codec
 
     def alter(frame: Frame, since_s: float) -> Iterable[Frame]:
-        message = codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None
-        if message is None:  # another fault has been at it
+        message = intact(named, frame)
+        if message is None:
             return (frame,)
         data = codec.encode(change(message, since_s), frame.data[1] & 15)
         return (Frame(codec.can_id, data),)
@@ -189,7 +190,7 @@ class Late(SignalFault):
     """The signals are as they were some time ago."""
 
     kind: Literal["late"]
-    by_s: Positive
+    by_s: FaultSpan
     """Age of what is sent."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
@@ -263,7 +264,11 @@ def value_problems(named: Any, values: dict[str, Any]) -> list[tuple[str, str]]:
     for name, written in values.items():
         try:
             if name in hints:
-                value_of(hints[name], written)
+                value = value_of(hints[name], written)
+                most = named.codec.not_available[name]
+                # a number may be none of the table's, but must fit; others are clipped in encoding
+                if issubclass(field_kind(hints[name]), IntEnum) and not 0 <= (value or 0) <= most:
+                    raise ValueError(f"must be 0 to {most}")
         except ValueError as error:
             problems.append((f"values.{name}", f"{error} (got {written!r})"))
     return problems

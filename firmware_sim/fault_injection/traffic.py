@@ -9,6 +9,7 @@ from firmware_sim.fault_injection.fault import (
     SECOND_NS,
     AnyMessageName,
     Fault,
+    FaultSpan,
     MessageName,
     NodeName,
 )
@@ -18,7 +19,7 @@ from firmware_sim.fault_injection.place import Bench
 from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.canbus import Frame, Station, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
-from utank_hil.parameters import Positive, refuse
+from utank_hil.parameters import refuse
 from utank_hil.runtime.panel import OperatorPanel, TimedAction
 
 BIT_RATE: Final = 250_000
@@ -54,7 +55,7 @@ class Disturbed(BusFault):
     """Of the frames, by chance."""
     message: MessageName | None = None
     """All of them if none is named."""
-    by_s: Positive | None = None
+    by_s: FaultSpan | None = None
     """Delay."""
 
     @model_validator(mode="after")
@@ -240,5 +241,5 @@ class SecondPanel(Fault):
             script=self.operator,
             station=Station.OPERATOR_2,
         )
-        panel.name = "second panel"
+        panel.name = f"second panel {len(bench.joining)}"
         bench.joining.append(panel)

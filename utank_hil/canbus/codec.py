@@ -10,7 +10,7 @@ cantools' time, which control loop and lockstep runs need. Tests compare both wi
 
 import math
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from types import NoneType, UnionType
@@ -89,6 +89,8 @@ class Codec(Generic[T]):
         ``decode(data) -> message``, or None if the CRC is wrong; `data` must be 8 bytes.
     source : str
         Text of both functions.
+    not_available : mapping of str to int
+        Raw value of each signal that says so: all ones, the largest that fits.
     """
 
     name: str
@@ -98,6 +100,7 @@ class Codec(Generic[T]):
     encode: Callable[[T, int], bytes]
     decode: Callable[[bytes], T | None]
     source: str
+    not_available: Mapping[str, int]
 
 
 def compile_codec(
@@ -136,7 +139,8 @@ def compile_codec(
     if functions is None:
         exec(compile(source, f"<codec of {name}>", "exec"), scope)
         functions = scope[f"encode_{name}"], scope[f"decode_{name}"]
-    return Codec(name, can_id, cycle_ns, data_ids is not None, *functions, source)
+    largest = {signal.name: signal.not_available for signal in signals}
+    return Codec(name, can_id, cycle_ns, data_ids is not None, *functions, source, largest)
 
 
 def field_kind(annotation: Any) -> type:
