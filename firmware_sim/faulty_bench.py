@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from firmware_sim.fault_injection.breakable_law import BreakableLaw
+from firmware_sim.fault_injection.breakable_law import BreakableLaw, LawFailures
 from firmware_sim.fault_injection.faulty_bus import FaultyBus
 from firmware_sim.fault_injection.faulty_node import FaultyNode
 from firmware_sim.fault_injection.kinds import AnyFault, place_all
@@ -79,7 +79,7 @@ class FaultyBench:
         self._retuner, self._estimating = retuner, estimating
         self._commissioned = commissioned
         self.ship: ShipSide = build_ship_side(scenario, seed, script)
-        self.breakable: BreakableLaw | None = None
+        self._law_failures = LawFailures()
         self._tapped = tapped
         self._controller = FaultyNode(self._new_controller())
         self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
@@ -90,8 +90,7 @@ class FaultyBench:
 
     def _new_controller(self) -> Node:
         def controller() -> Controller:
-            self.breakable = BreakableLaw(self._law.controller())
-            return self.breakable
+            return BreakableLaw(self._law.controller(), self._law_failures)
 
         law = replace(self._law, controller=controller)
         self.node = build_controller_node(
@@ -124,7 +123,7 @@ class FaultyBench:
             self.ship.valve,
             self.ship.vessel.version,
             self.bus,
-            self.breakable,
+            self._law_failures,
             self.restart_controller,
         )
         place_all(faults, bench, self.lockstep.now_ns, self._seed)

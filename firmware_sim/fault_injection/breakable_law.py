@@ -1,5 +1,6 @@
 """A control law that fails on demand."""
 
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -10,29 +11,42 @@ from utank_hil.control.interface import Controller
 LEANING_PA: Final = 1e4
 
 
-class BreakableLaw:
-    """A controller that can be made to raise, or to answer what is no number.
+@dataclass(slots=True)
+class LawFailures:
+    """What the laws of a bench do: an error, no number, the negative, the same to one side.
 
-    Attributes
-    ----------
-    raises, answers_nan, opposite, leans : bool
-        What it does: an error, no number, the negative of what it should, the same to one side.
+    Apart from the law itself, which a controller that is started anew has made for it.
     """
 
-    def __init__(self, law: Controller) -> None:
+    raises: bool = False
+    answers_nan: bool = False
+    opposite: bool = False
+    leans: bool = False
+
+
+class BreakableLaw:
+    """A controller that can be made to fail.
+
+    Parameters
+    ----------
+    fails : LawFailures
+        What it does; looked up at each step.
+    """
+
+    def __init__(self, law: Controller, fails: LawFailures) -> None:
         self._law = law
-        self.raises = self.answers_nan = self.opposite = self.leans = False
+        self._fails = fails
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """As `Controller.step`, unless it fails."""
-        answer = self._law.step(y, reference)
-        if self.raises:
+        answer, fails = self._law.step(y, reference), self._fails
+        if fails.raises:
             raise ArithmeticError("injected")
-        if self.answers_nan:
+        if fails.answers_nan:
             return np.full_like(answer, np.nan)
-        if self.leans:
+        if fails.leans:
             return np.full_like(answer, LEANING_PA)
-        return -answer if self.opposite else answer
+        return -answer if fails.opposite else answer
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._law, name)

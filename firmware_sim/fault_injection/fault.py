@@ -108,6 +108,11 @@ class MessageFault(Fault):
         bench.nodes[NODE_OF[source]].spoiled.append(Spoiled(span, spoil, codec.can_id))
 
 
+def whole_cycles(by_s: float, cycle_ns: int) -> int:
+    """Cycles that a delay takes: no less than it, and one at least."""
+    return max(1, -(-round(by_s * SECOND_NS) // cycle_ns))
+
+
 def intact(named: NamedMessage, frame: Frame) -> Any:
     """What a frame of the message says, None if another fault has been at it."""
     return named.codec.decode(frame.data) if len(frame.data) == FRAME_BYTES else None

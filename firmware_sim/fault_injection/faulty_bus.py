@@ -141,8 +141,14 @@ class FaultyBus:
         if count < PASSIVE <= count + 8:
             self.warn(time_ns, sender)
         if count + 8 >= OFF:
-            ends = [span.end_ns for span, _, of in self.bit_errors if of in (None, sender)]
-            self._off_until_ns[sender] = max(ends)
+            self._off_until_ns[sender] = max(
+                (
+                    span.end_ns
+                    for span, _, of in self.bit_errors
+                    if of in (None, sender) and span.holds(time_ns)
+                ),
+                default=time_ns,  # the fault has ended while its last attempts were under way
+            )
             self.error_counts[sender] = 0
             self.cut_off(time_ns, sender)
         return False

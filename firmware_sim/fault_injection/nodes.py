@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from firmware_sim.fault_injection.fault import SECOND_NS, Fault, FaultSpan, NodeName
+from firmware_sim.fault_injection.fault import Fault, FaultSpan, NodeName, whole_cycles
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import DriveFault
@@ -69,16 +69,16 @@ class Deaf(NodeFault):
 
 
 class Slow(NodeFault):
-    """The node's frames leave late."""
+    """The node's frames leave late, by whole periods of the node."""
 
     kind: Literal["slow"]
     by_s: FaultSpan
-    """Delay of every frame."""
+    """Delay of every frame, rounded up to whole periods of the node."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Hold its frames back."""
         node = bench.nodes[self.node]
-        node.late_ticks.append((span, round(self.by_s * SECOND_NS / node.period_ns)))
+        node.late_ticks.append((span, whole_cycles(self.by_s, node.period_ns)))
 
 
 class Link(NodeFault):
@@ -102,7 +102,7 @@ class Link(NodeFault):
 class Pump(Fault):
     """While enabled, the pump presses with `times` its set-point and `plus_pa`, after `lag_s`.
 
-    With `off_too`, no command takes `plus_pa` away.
+    With `off_too`, no command takes `plus_pa` away. Of several the one that began last is there.
     """
 
     needs = ("drive",)
@@ -126,10 +126,17 @@ class Pump(Fault):
             pressure_pa[0] += share * (wrong_pa - pressure_pa[0])
             return pressure_pa[0]
 
-        drive = bench.nodes["drive"]
-        bench.plant.presses_off = self.off_too
-        drive.at(span.begin_ns, lambda: setattr(bench.plant, "broken_pump", broken))
-        drive.at(span.end_ns, lambda: setattr(bench.plant, "broken_pump", None))
+        drive, plant = bench.nodes["drive"], bench.plant
+
+        def begin() -> None:
+            plant.broken_pump, plant.presses_off = broken, self.off_too
+
+        def end() -> None:
+            if plant.broken_pump is broken:  # else another fault has begun since
+                plant.broken_pump, plant.presses_off = None, False
+
+        drive.at(span.begin_ns, begin)
+        drive.at(span.end_ns, end)
 
 
 class Drive(Fault):
@@ -171,7 +178,10 @@ class Valve(Fault):
 
 
 class Law(Fault):
-    """The control law raises an error, or answers no number, the opposite or one side."""
+    """The control law raises an error, or answers no number, the opposite or one side.
+
+    That of a controller that is started anew meanwhile does so, too.
+    """
 
     replayable = False
     needs = ("controller",)

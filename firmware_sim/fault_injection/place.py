@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from firmware_sim.fault_injection.breakable_law import BreakableLaw
+from firmware_sim.fault_injection.breakable_law import LawFailures
 from firmware_sim.fault_injection.faulty_bus import FaultyBus
 from firmware_sim.fault_injection.faulty_node import FaultyNode
 from utank_hil.canbus import DriveFault
@@ -44,8 +44,8 @@ class Bench:
         Of the ship's configuration.
     bus : FaultyBus or None
         None on a real bus.
-    law : BreakableLaw or None
-        None where the controller is another process's.
+    law : LawFailures or None
+        Of whatever controller runs; None where the controller is another process's.
     restart : callable or None
         Puts a controller in the place of the one there is.
     joining : list of Node
@@ -58,6 +58,6 @@ class Bench:
     valve: Sticks | None
     version: int
     bus: FaultyBus | None = None
-    law: BreakableLaw | None = None
+    law: LawFailures | None = None
     restart: Callable[[], None] | None = None
     joining: list[Node] = field(default_factory=list)

@@ -9,7 +9,13 @@ from typing import Annotated, Any, Literal, get_type_hints
 
 from pydantic import Field, model_validator
 
-from firmware_sim.fault_injection.fault import FaultSpan, MessageFault, intact, signal_problems
+from firmware_sim.fault_injection.fault import (
+    FaultSpan,
+    MessageFault,
+    intact,
+    signal_problems,
+    whole_cycles,
+)
 from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.canbus import Frame
@@ -191,12 +197,12 @@ class Late(SignalFault):
 
     kind: Literal["late"]
     by_s: FaultSpan
-    """Age of what is sent."""
+    """Age of what is sent, rounded up to whole cycles of the message."""
 
     def change(self, seed: int) -> Change:  # noqa: ARG002
         """As in `SignalFault`."""
-        cycle_s = self.named.codec.cycle_ns * 1e-9
-        line: deque[Sequence[Any]] = deque(maxlen=round(self.by_s / cycle_s) + 1)
+        cycles = whole_cycles(self.by_s, self.named.codec.cycle_ns)
+        line: deque[Sequence[Any]] = deque(maxlen=cycles + 1)
 
         def delay(values: Sequence[Any], _: float) -> Sequence[Any]:
             line.append(values)

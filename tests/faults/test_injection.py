@@ -250,6 +250,67 @@ def test_pump_drive_law_and_operator_fail() -> None:
     assert any(other.decode(frame.data).stop for frame in panel.of(other))
 
 
+def placed(*faults: dict[str, object], until_s: float, arm_s: float | None = None) -> FaultyBench:
+    """A bench with faults from the start."""
+    script = () if arm_s is None else (TimedAction(arm_s, Action.ARM),)
+    bench = FaultyBench(storm(), storm().controllers["gpc"], law(), seed=1, script=script)
+    bench.place([TypeAdapter(AnyFault).validate_python(each) for each in faults])
+    bench.run(round(until_s * SECOND))
+    return bench
+
+
+@pytest.mark.parametrize("fails_s", [0.1, 2.0], ids=["killed while it fails", "killed before"])
+def test_a_law_fails_in_a_controller_that_was_started_anew(fails_s: float) -> None:
+    killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
+    failing = {"kind": "law", "fails": "raises", "at_s": fails_s, "for_s": 3.0}
+    bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
+    assert "injected" in bench.node.law_error
+    assert bench.node.fault is Fault.INTERNAL
+
+
+def test_a_law_whose_fault_is_over_when_it_is_started_anew_is_sound() -> None:
+    killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
+    failing = {"kind": "law", "fails": "raises", "at_s": 0.1, "for_s": 0.25}
+    bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
+    assert bench.node.law_error == ""
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_a_pump_fails_between_its_own_times_whatever_other_faults_it_has() -> None:
+    first = {"kind": "pump", "plus_pa": 8000.0, "off_too": True, "at_s": 0.2, "for_s": 0.5}
+    second = {"kind": "pump", "times": 0.5, "at_s": 1.0}
+    bench = placed(first, second, until_s=0.1)
+    plant = bench.ship.plant
+    off_pa = plant.pressure_pa
+    for until_s, pressure_pa in ((0.5, 8000.0), (0.9, off_pa), (1.5, off_pa)):
+        bench.run(round(until_s * SECOND))
+        assert plant.pressure_pa == pytest.approx(pressure_pa, abs=500.0)
+    # the end of one is not the end of another that has begun since
+    overlapping = placed(second, {**first, "at_s": 1.1}, {**second, "for_s": 0.2}, until_s=1.3)
+    assert overlapping.ship.plant.pressure_pa == pytest.approx(8000.0)
+
+
+def test_a_sender_that_is_off_the_bus_comes_back_when_the_fault_at_hand_is_over() -> None:
+    errors = {"kind": "bit_errors", "share": 1.0, "node": "sensors", "for_s": 0.3}
+    bus = Bus({**errors, "at_s": 0.05}, {**errors, "at_s": 50.0})
+    sent_s = [time_ns / SECOND - FAULT_S for time_ns, by, _ in bus.heard if by == "sensors"]
+    assert min((each for each in sent_s if each > 0.15), default=END_S) == pytest.approx(
+        0.35, abs=0.02
+    )
+
+
+@pytest.mark.parametrize(
+    ("by_s", "period_s", "late_s"), [(0.001, 0.01, 0.01), (0.025, 0.01, 0.03), (0.03, 0.01, 0.03)]
+)
+def test_a_delay_is_never_shorter_than_stated(by_s: float, period_s: float, late_s: float) -> None:
+    slow = Bus({"kind": "slow", "node": "sensors", "by_s": by_s})
+    assert len(slow.of(MOTION)) == len(sound().of(MOTION)) - round(late_s / period_s)
+    late = Bus({"kind": "late", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "by_s": by_s})
+    shift = round(late_s / period_s)
+    true, shown = sound().said(MOTION, "roll_rad"), late.said(MOTION, "roll_rad")
+    assert shown[: shift + 3] == [true[0]] * shift + true[:3]
+
+
 def test_an_impostor_sends_beside_the_sender() -> None:
     values = {"mode_request": "STANDBY", "arm": False, "stop": True, "reset": False,
               "acknowledge": False}  # fmt: skip
