@@ -1,4 +1,8 @@
-"""The CiA 402 state machine of a drive (IEC 61800-7-201), as far as a pump drive needs it."""
+"""The CiA 402 state machine of a drive (IEC 61800-7-201), as far as a pump drive needs it.
+
+QUICK_STOP and a fault brake the motor before it is switched off. DISABLE_VOLTAGE and SHUTDOWN
+switch it off at once, as by the standard, and its rotor runs down.
+"""
 
 from utank_hil.canbus import ControlWord, DriveFault, DriveState
 

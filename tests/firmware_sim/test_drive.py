@@ -1,4 +1,5 @@
 import math
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -188,6 +189,38 @@ def test_a_stop_out_of_sequence_is_heard_and_an_enable_is_not(lost: int, word: C
     bench.command(2000.0)
     bench.ticks(2)
     assert bench.told.command_echo == echo
+
+
+PAGE = Path("docs/how-to/drive.md").read_text(encoding="utf-8")
+STOP_ROWS = re.findall(r"^\| ([A-Z_]+) \| ([A-Z_]+) \| ([\d.]+) kPa \| ([\d.]+) s \|$", PAGE, re.M)
+
+
+def test_the_page_for_makers_says_of_each_stop_word_what_it_does() -> None:
+    assert {row[0] for row in STOP_ROWS} == {word.name for word in STOPS}
+    assert "from 30 kPa" in PAGE
+
+
+@pytest.mark.parametrize(("word", "state", "left_kpa", "five_percent_s"), STOP_ROWS)
+def test_a_stop_word_brakes_or_not_as_the_page_for_makers_says(
+    word: str, state: str, left_kpa: str, five_percent_s: str
+) -> None:
+    bench = armed(30e3)
+    for _ in range(100):
+        bench.command(30e3)
+        bench.ticks(2)
+    stopped_ns = bench.now_ns
+    bench.command(0.0, ControlWord[word])
+    bench.tick()
+    assert bench.told.state is DriveState[state]
+    left_pa = {0: 30e3}
+    while (after_ms := (bench.now_ns - stopped_ns) // MS) <= 800:
+        bench.tick()
+        left_pa[after_ms] = abs(bench.plant.pressure_pa)
+    assert left_pa[130] == pytest.approx(float(left_kpa) * 1e3, abs=100.0)
+    assert bench.told.state is not DriveState.OPERATION_ENABLED
+    little = [ms for ms, left in left_pa.items() if left < 0.05 * DriveLimits().pressure_pa]
+    assert min(little) * 1e-3 == pytest.approx(float(five_percent_s), abs=0.011)
+    assert (min(little) <= 130) is (word == "QUICK_STOP")
 
 
 def test_status_can_say_the_power_of_every_shipped_pump(monkeypatch: pytest.MonkeyPatch) -> None:
