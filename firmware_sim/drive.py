@@ -33,6 +33,8 @@ STOPPED_SHARE = 0.02
 """Of the drive's pressure limit: less is as good as none."""
 LONGEST_STOP_NS = 500_000_000
 """A motor that can't take the pressure away in this time is switched off all the same."""
+WARNED_MESSAGES = 2
+"""So many DRIVE_STATUS_2 tell of one command that was not taken."""
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN)
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ENABLED = DriveState.OPERATION_ENABLED
@@ -93,6 +95,7 @@ class PumpDrive:
         self._grace_pa = limits.pressure_rate_pa_s * self.period_ns * NANOSECONDS
         self._credit_pa = self._grace_pa
         self._refused_in_a_row = 0
+        self._warnings_left = 0
         self._shown_state = self._states.state
         self._ticks = 0
         self.refused = 0
@@ -101,7 +104,10 @@ class PumpDrive:
         """Take a command if it is intact and inside the drive's own limits."""
         if frame.can_id != self._commands.can_id:
             return
+        lost = self._commands.lost
         command = self._commands.accept(frame)
+        if command is None or self._commands.lost > lost:
+            self._warnings_left = WARNED_MESSAGES
         if command is None:
             # out of sequence it may ask for nothing, but it may say stop
             intact = self._commands.intact(frame)
@@ -114,6 +120,7 @@ class PumpDrive:
                 self._states.command(command.control_word)
             self.refused += 1
             self._refused_in_a_row += 1
+            self._warnings_left = WARNED_MESSAGES
             if self._refused_in_a_row >= MISCODED_COMMANDS_TO_TRIP:
                 self._states.trip(DriveFault.COMMAND_REFUSED)
             return
@@ -219,6 +226,8 @@ class PumpDrive:
         )
 
     def _status_2_frame(self) -> Frame:
+        warned = self._warnings_left > 0
+        self._warnings_left = max(self._warnings_left - 1, 0)
         return self._status_2.frame(
             DriveStatus2(
                 fault=self._states.fault,
@@ -228,7 +237,7 @@ class PumpDrive:
                 drive_temperature_c=math.nan,
                 temperature_warning=False,
                 voltage_warning=False,
-                command_warning=self._refused_in_a_row > 0,
+                command_warning=warned,
                 sensor_warning=False,
             )
         )

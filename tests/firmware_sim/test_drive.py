@@ -347,19 +347,74 @@ def test_a_drive_that_is_switched_off_by_itself_is_in_no_fault() -> None:
 def test_status_2_comes_every_100_ms_and_warns_of_refused_commands_only() -> None:
     bench = armed()
     sent: dict[int, Frame] = {}
-    for k in range(30):
+    for k in range(40):
         # one is refused, just before the second status
         bench.command(60e3 if k - 10 in sent and len(sent) == 1 else 20e3)
         bench.tick()
         for frame in bench.frames:
             if frame.can_id == CATALOGUE.codec(DriveStatus2).can_id:
                 sent[k] = frame
-    assert len(sent) == 3
+    assert len(sent) == 4
     warned = [CATALOGUE.codec(DriveStatus2).decode(frame.data) for frame in sent.values()]
-    assert [each.command_warning for each in warned if each is not None] == [False, True, False]
+    shown = [each.command_warning for each in warned if each is not None]
+    assert shown == [False, True, True, False]
     for each in warned:
         warnings = each.temperature_warning, each.voltage_warning, each.sensor_warning
         assert not any(warnings)
+
+
+def discard(bench: DriveBench, why: str) -> None:
+    """Send a command that the drive does not take, or lose one."""
+    if why == "refused":
+        bench.command(60e3)
+        return
+    if why in ("lost", "out of sequence"):
+        for _ in range(1 if why == "lost" else 4):
+            bench.commands.frame(PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05))
+        bench.command()
+        return
+    frame = bench.commands.frame(PumpCommand(0.0, ControlWord.ENABLE_OPERATION, 0.05))
+    data = frame.data[:3] if why == "short" else bytes([frame.data[0] ^ 1]) + frame.data[1:]
+    bench.drive.receive(Frame(frame.can_id, data), bench.now_ns)
+
+
+WHYS = ["refused", "CRC", "short", "lost", "out of sequence"]
+
+
+@pytest.mark.parametrize("phase", range(10))
+@pytest.mark.parametrize("why", WHYS)
+def test_one_command_that_was_rejected_or_lost_is_told_in_two_messages(
+    why: str, phase: int
+) -> None:
+    bench = DriveBench()
+    bench.enable()
+    told = []
+    for tick in range(60):
+        if tick == 20 + phase:
+            discard(bench, why)
+        elif tick % 2 == 0:
+            bench.command()
+        bench.tick()
+        if any(frame.can_id == CATALOGUE.codec(DriveStatus2).can_id for frame in bench.frames):
+            told.append(bench.status_2.command_warning)
+    assert len(told) == 6
+    # the command after one that was discarded tells that it is missing, too
+    assert sum(told) in ((2,) if why in ("refused", "lost") else (2, 3))
+    assert sum(a is not b for a, b in pairwise(told)) == 2
+    assert told[:2] == [False, False]
+    assert not told[-1]
+
+
+def test_the_warning_lasts_as_long_as_commands_are_rejected() -> None:
+    bench = armed(2e3)
+    told = []
+    for tick in range(100):
+        if tick % 2 == 0:
+            bench.command(60e3 if tick % 8 == 0 else 2e3)  # one of four
+        bench.tick()
+        if any(frame.can_id == CATALOGUE.codec(DriveStatus2).can_id for frame in bench.frames):
+            told.append(bench.status_2.command_warning)
+    assert told == [True] * 10
 
 
 def test_many_frames_in_a_moment_have_one_tick_of_grace_together() -> None:
