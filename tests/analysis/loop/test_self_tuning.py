@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.analysis.loop import self_tuning
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.observer_search import ObserverSearch
 from utank_hil.analysis.loop.robustness import robustness
@@ -65,14 +64,6 @@ def test_passive_roll_is_that_of_the_sum_over_components():
     system = coupled_model(PLANT.ship, PLANT.tank)
     motion = motion_in_sea(None, system, ("roll_rad",), moment())
     assert passive_roll_rad(PLANT, SEA) == pytest.approx(motion.roll_rms_rad, rel=0.01)
-
-
-@pytest.fixture
-def short_search(monkeypatch):
-    """An observer that is better than the first, not the best; no other test gets its laws."""
-    monkeypatch.setattr("utank_hil.analysis.loop.observer_search._ITERATIONS", 10)
-    yield
-    self_tuning._tuned.cache_clear()
 
 
 def test_a_power_budget_is_kept_and_costs_roll(short_search):
