@@ -37,6 +37,7 @@ def estimated(ship: ShipFigures = SHIP, factor: float = 1.0) -> MotionEstimate:
     return MotionEstimate(Verdict.GOOD, Verdict.GOOD, ship, waves, 0.05, 4.0, 10.0, 1200.0)
 
 
+@pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize("period", [1.0, 14.4 / 12.57])
 def test_the_law_is_for_the_estimated_ship_at_the_sample_time_of_the_one_in_charge(
     period: float,
