@@ -94,7 +94,7 @@ def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "below", "seconds"),
-    [("naval_vessel", 0.15, 400), ("patti_b", 0.2, 400), ("semi_active", 0.15, 240)],
+    [("naval_vessel", 0.15, 180), ("patti_b", 0.2, 180), ("semi_active", 0.15, 240)],
 )
 def test_controller_of_each_other_ship_rolls_less_than_her_passive_tank(
     name: str, below: float, seconds: int
