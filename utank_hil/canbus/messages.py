@@ -1,6 +1,7 @@
 """The messages of the catalogue: one typed tuple each, declared here and in the DBC only.
 
-Field names are the DBC's signal names. `utank_hil.canbus` exports every message of this file.
+Field names are the DBC's signal names; what a field means is the signal's comment there, and stands
+in docs/can-catalogue.md. `utank_hil.canbus` exports every message of this file.
 Types of fields:
 
 * `float`: a value in the unit of the name. NaN is "not available"; a raw value out of range decodes
@@ -54,17 +55,7 @@ def _dbc_message(name: str) -> Callable[[_T], _T]:
 
 @_dbc_message("PUMP_CMD")
 class PumpCommand(NamedTuple):
-    """PUMP_CMD, controller to drive, 20 ms.
-
-    Attributes
-    ----------
-    pressure_pa
-        Set-point of the pump's differential pressure; positive raises the starboard level.
-    control_word
-        CiA 402 command. None must not enable anything.
-    timeout_s
-        The drive goes to zero pressure by itself after this time without a valid command.
-    """
+    """PUMP_CMD, controller to drive, 20 ms; without a control word nothing may be enabled."""
 
     pressure_pa: float
     control_word: ControlWord | None
@@ -73,21 +64,7 @@ class PumpCommand(NamedTuple):
 
 @_dbc_message("DRIVE_STATUS_1")
 class DriveStatus1(NamedTuple):
-    """DRIVE_STATUS_1, drive to controller, 20 ms.
-
-    Attributes
-    ----------
-    pressure_pa
-        Differential pressure as the drive measures it, signed as the command.
-    speed_rad_s
-        Shaft speed of the pump, positive for positive pressure.
-    state
-        CiA 402 state.
-    command_echo
-        Counter of the last PUMP_CMD accepted; None before the first.
-    pressure_limited, speed_limited, rate_limited, power_limited
-        The limit is active.
-    """
+    """DRIVE_STATUS_1, drive to controller, 20 ms."""
 
     pressure_pa: float
     speed_rad_s: float
@@ -101,23 +78,7 @@ class DriveStatus1(NamedTuple):
 
 @_dbc_message("DRIVE_STATUS_2")
 class DriveStatus2(NamedTuple):
-    """DRIVE_STATUS_2, drive to controller, 100 ms; power is `bus_voltage_v * current_a`.
-
-    Attributes
-    ----------
-    fault
-        Why the drive is in its fault state.
-    bus_voltage_v, current_a
-        Direct-current bus of the drive; current into the drive is positive.
-    motor_temperature_c, drive_temperature_c
-        Temperatures in degrees Celsius.
-    temperature_warning, voltage_warning
-        Near the limit that would trip the drive.
-    command_warning
-        Commands were rejected or lost recently.
-    sensor_warning
-        The drive's pressure feedback is implausible.
-    """
+    """DRIVE_STATUS_2, drive to controller, 100 ms; power is `bus_voltage_v * current_a`."""
 
     fault: DriveFault | None
     bus_voltage_v: float
@@ -132,17 +93,7 @@ class DriveStatus2(NamedTuple):
 
 @_dbc_message("VALVE_CMD")
 class ValveCommand(NamedTuple):
-    """VALVE_CMD, controller to valve, 20 ms.
-
-    Attributes
-    ----------
-    opening
-        Open share asked for: 0 as shut as the valve gets, 1 open.
-    control
-        Whether to follow it. None must not move anything away from the fail position.
-    timeout_s
-        The valve goes to its fail position by itself after this time without a valid command.
-    """
+    """VALVE_CMD, controller to valve, 20 ms; without `control` it is to keep its fail position."""
 
     opening: float
     control: ValveControl | None
@@ -151,25 +102,7 @@ class ValveCommand(NamedTuple):
 
 @_dbc_message("VALVE_STATUS")
 class ValveStatus(NamedTuple):
-    """VALVE_STATUS, valve to controller, 20 ms.
-
-    Attributes
-    ----------
-    opening
-        Open share as the position sensor measures it.
-    state
-        What the valve does.
-    fault
-        Why it is in its fault state.
-    command_echo
-        Counter of the last VALVE_CMD accepted; None before the first.
-    fail_position
-        Where it goes without a command.
-    moving
-        It is on its way.
-    open_limit, shut_limit
-        The limit switch of that end is closed.
-    """
+    """VALVE_STATUS, valve to controller, 20 ms."""
 
     opening: float
     state: ValveState | None
@@ -195,17 +128,7 @@ class SensorMotion(NamedTuple):
 
 @_dbc_message("SENSOR_TANK")
 class SensorTank(NamedTuple):
-    """SENSOR_TANK, sensors to controller, 20 ms.
-
-    Attributes
-    ----------
-    port_level_m, starboard_level_m
-        Level above the still-water level, measured independently; negative below.
-    port_high, starboard_high
-        Independent high-level switches.
-    quality
-        Quality of both levels.
-    """
+    """SENSOR_TANK, sensors to controller, 20 ms."""
 
     port_level_m: float
     starboard_level_m: float
@@ -216,17 +139,7 @@ class SensorTank(NamedTuple):
 
 @_dbc_message("SENSOR_PUMP")
 class SensorPump(NamedTuple):
-    """SENSOR_PUMP, sensors to controller, 20 ms.
-
-    Attributes
-    ----------
-    pressure_pa
-        Differential pressure across the pump, signed as the command.
-    flow_m3_s
-        Flow through the duct, positive to starboard; NaN where no flow meter is fitted.
-    quality
-        Quality of the pressure.
-    """
+    """SENSOR_PUMP, sensors to controller, 20 ms."""
 
     pressure_pa: float
     flow_m3_s: float
@@ -235,17 +148,7 @@ class SensorPump(NamedTuple):
 
 @_dbc_message("HARDWIRED_INPUTS")
 class HardwiredInputs(NamedTuple):
-    """HARDWIRED_INPUTS, a node apart from sensors and drive to controller, 50 ms.
-
-    Attributes
-    ----------
-    port_high, starboard_high
-        Hard-wired high-level switches.
-    stop_loop
-        ON where the hard-wired stop loop is open: a stop is asked for.
-    quality
-        Quality of all inputs.
-    """
+    """HARDWIRED_INPUTS, a node apart from sensors and drive to controller, 50 ms."""
 
     port_high: Switch | None
     starboard_high: Switch | None
@@ -255,33 +158,7 @@ class HardwiredInputs(NamedTuple):
 
 @_dbc_message("CTRL_STATUS")
 class ControllerStatus(NamedTuple):
-    """CTRL_STATUS, controller to all, 100 ms.
-
-    Attributes
-    ----------
-    mode
-        Mode of the controller.
-    fault
-        The fault that is active or latched.
-    armed
-        Pump and valve may be commanded.
-    alarm
-        An alarm is waiting to be acknowledged.
-    degraded
-        Running with a substitute or at a reduced limit.
-    saturated
-        The command is held at a limit.
-    not_realtime
-        The controller runs without real-time scheduling.
-    bus_load
-        Share of the bus in use, 0 to 1.
-    catalogue_version, configuration_version
-        Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
-    retuning
-        State of its retuning; None if it has none.
-    station
-        Operator station in command.
-    """
+    """CTRL_STATUS, controller to all, 100 ms."""
 
     mode: Mode | None
     fault: Fault | None
@@ -299,21 +176,7 @@ class ControllerStatus(NamedTuple):
 
 @_dbc_message("SEA_ESTIMATE")
 class SeaEstimate(NamedTuple):
-    """SEA_ESTIMATE, controller to panels, 1 s.
-
-    Attributes
-    ----------
-    verdict
-        Whether the sea can be told.
-    significant_height_m, peak_period_s
-        Significant wave height, and encounter period of the spectrum's peak.
-    moment_rms_rad
-        RMS of the wave's roll moment over the roll stiffness: the static heel of that moment.
-    relative_deviation
-        Standard deviation of `moment_rms_rad`, as a share of it.
-    age_s
-        Time since the estimate was made.
-    """
+    """SEA_ESTIMATE, controller to panels, 1 s."""
 
     verdict: Verdict | None
     significant_height_m: float
@@ -325,19 +188,7 @@ class SeaEstimate(NamedTuple):
 
 @_dbc_message("SHIP_ESTIMATE")
 class ShipEstimate(NamedTuple):
-    """SHIP_ESTIMATE, controller to panels, 1 s.
-
-    Attributes
-    ----------
-    verdict
-        Whether the ship can be told.
-    roll_period_s, roll_period_deviation_s
-        Natural roll period with the tank's water at rest, and its standard deviation.
-    gm_m, gm_deviation_m
-        Metacentric height and its standard deviation; NaN where the displacement is not known.
-    age_s
-        Time since the estimate was made.
-    """
+    """SHIP_ESTIMATE, controller to panels, 1 s."""
 
     verdict: Verdict | None
     roll_period_s: float
@@ -349,17 +200,7 @@ class ShipEstimate(NamedTuple):
 
 @_dbc_message("PASSIVE_TWIN")
 class PassiveTwin(NamedTuple):
-    """PASSIVE_TWIN, controller to panels, 100 ms: the ship with a passive tank in the same waves.
-
-    Attributes
-    ----------
-    quality
-        Quality of the twin's roll.
-    twin_roll_rad
-        Its roll angle, positive starboard down.
-    twin_rms_rad, roll_rms_rad
-        RMS of the twin's and of the ship's own roll over some roll periods.
-    """
+    """PASSIVE_TWIN, controller to panels, 100 ms: the same ship with a passive tank."""
 
     quality: Quality | None
     twin_roll_rad: float
@@ -372,19 +213,6 @@ class Alarm(NamedTuple):
     """ALARM, controller to panels, 100 ms: one alarm of the list a frame, one after the other.
 
     An empty list is one frame of 0 `alarms`, code NONE and state NORMAL.
-
-    Attributes
-    ----------
-    state
-        State of the alarm.
-    code
-        What it is about.
-    place, alarms
-        Place in the list, 0 the most urgent, and number of alarms in it.
-    times_raised
-        How often it was raised since it was last accepted.
-    age_s
-        Time since it was last raised.
     """
 
     state: AlarmState | None
@@ -400,31 +228,6 @@ class OperatorCommand(NamedTuple):
     """OPERATOR_CMD, operator panel to controller, 200 ms and on change.
 
     OPERATOR_CMD_2 is that of a second station.
-
-    Attributes
-    ----------
-    mode_request
-        Requested mode; None for no request.
-    arm
-        Permission to use the pump; a rising edge arms, False disarms.
-    stop
-        Zero pressure at once.
-    reset
-        Rising edge: clear a latched fault.
-    acknowledge
-        Rising edge: accept the alarms.
-    retune
-        Rising edge: identify the ship and retune the controller.
-    undo
-        Rising edge: back to the law before the last retuning.
-    forbid_retuning
-        No retuning, requested or automatic; one under way is cancelled.
-    take_command
-        Rising edge: ask for the command, which one station has at a time.
-    acknowledge_code
-        Code of the alarm that `acknowledge` accepts; None accepts all.
-    power_budget_w
-        Mean electric power that the pump may take; NaN asks for the greatest comfort.
     """
 
     mode_request: Mode | None
@@ -442,21 +245,7 @@ class OperatorCommand(NamedTuple):
 
 @_dbc_message("HEARTBEAT")
 class Heartbeat(NamedTuple):
-    """HEARTBEAT_<NODE>, every node to all, 100 ms.
-
-    Attributes
-    ----------
-    state
-        State of the node.
-    reset_cause
-        Cause of its last start.
-    uptime_s
-        Time since then, in steps of 10 s; a decrease means a restart.
-    catalogue_version, configuration_version
-        Hashes of the DBC and of the configuration, to be equal on all nodes before arming.
-    transmit_error_count, receive_error_count
-        CAN error counters in steps of 16 (96 warning, 128 error passive); NaN where unknown.
-    """
+    """HEARTBEAT_<NODE>, every node to all, 100 ms."""
 
     state: NodeState | None
     reset_cause: ResetCause | None
