@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firmware_sim.drive import PumpDrive
-from firmware_sim.external_drive import ExternalDrive
-from firmware_sim.external_valve import ExternalValve
+from firmware_sim.external_nodes import ExternalDrive, ExternalValve
 from firmware_sim.hardwired import HardwiredNode
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario

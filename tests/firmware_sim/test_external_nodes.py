@@ -15,7 +15,7 @@ from foreign_nodes import (
     ForeignSensors,
 )
 
-from firmware_sim.external_drive import STALE_NS, ExternalDrive
+from firmware_sim.external_nodes import STALE_NS, ExternalDrive
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder

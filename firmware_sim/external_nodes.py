@@ -1,0 +1,87 @@
+"""The emulated ship's pump and valve when real ones take the place of the emulated ones.
+
+Each has the plant do what the hardware reports, and sends nothing. A report acts from the tick
+after its receipt until the next one, for `STALE_NS` at most. A frame that fails CRC or counter is
+no report, nor is one whose value is not available.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any, Final
+
+from firmware_sim.plant import Plant
+from utank_hil.canbus import Catalogue, DriveStatus1, Frame, Receiver, ValveStatus
+from utank_hil.dynamics.tank import Tank
+from utank_hil.dynamics.valves import Valve
+from utank_hil.tick import TICK_NS
+
+STALE_NS: Final = 60_000_000
+"""Three cycles of the reports, after which the controller too calls a drive or valve silent."""
+
+
+class _ExternalNode:
+    period_ns = TICK_NS
+
+    def __init__(self, plant: Plant, receiver: Receiver[Any], signal: str) -> None:
+        self._plant, self._receiver, self._signal = plant, receiver, signal
+        self.hears = frozenset([receiver.can_id])  # see `Selective`
+        self._value = math.nan
+        self._reported_ns = -STALE_NS - 1
+        self._ticks = self._fresh_ticks = 0
+
+    @property
+    def reported_share(self) -> float:
+        """Share of the ticks so far that had a report no older than `STALE_NS`."""
+        return self._fresh_ticks / max(self._ticks, 1)
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take the report."""
+        if frame.can_id != self._receiver.can_id:
+            return
+        status = self._receiver.accept(frame)
+        if status is not None and math.isfinite(value := getattr(status, self._signal)):
+            self._value, self._reported_ns = value, now_ns
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Advance the plant, and have the report act from now on."""
+        self._plant.advance(now_ns)
+        fresh = now_ns - self._reported_ns <= STALE_NS
+        self._ticks += 1
+        self._fresh_ticks += fresh
+        self._act(self._value if fresh else None)
+        return ()
+
+    def _act(self, value: float | None) -> None:
+        raise NotImplementedError
+
+
+class ExternalDrive(_ExternalNode):
+    """Imposes the pressure of DRIVE_STATUS_1, in every state of the drive.
+
+    Without a report the rotor turns freely.
+    """
+
+    name = "external drive"
+
+    def __init__(self, plant: Plant, catalogue: Catalogue) -> None:
+        super().__init__(plant, catalogue.receiver(DriveStatus1), "pressure_pa")
+
+    def _act(self, value: float | None) -> None:
+        if value is None:
+            self._plant.drive_pump(0.0, enabled=False)
+        else:
+            self._plant.impose_pressure(value)
+
+
+class ExternalValve(_ExternalNode):
+    """Sets the loss of VALVE_STATUS's opening; without a report that of the fail position."""
+
+    name = "external valve"
+
+    def __init__(self, plant: Plant, tank: Tank, valve: Valve, catalogue: Catalogue) -> None:
+        super().__init__(plant, catalogue.receiver(ValveStatus), "opening")
+        self._tank, self._valve = tank, valve
+
+    def _act(self, value: float | None) -> None:
+        opening = self._valve.fail_opening if value is None else value
+        self._plant.set_valve_loss(self._valve.loss(self._tank, opening))
