@@ -1,7 +1,6 @@
 """Waves: model and measured spectra, irregular seas, roll moment."""
 
 from utank_hil.sea.encounter import encounter_frequency as encounter_frequency
-from utank_hil.sea.encounter import wave_frequencies as wave_frequencies
 from utank_hil.sea.harmonics import Harmonics as Harmonics
 from utank_hil.sea.measured import MeasuredSpectra as MeasuredSpectra
 from utank_hil.sea.models import ittc as ittc
