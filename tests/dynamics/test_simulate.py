@@ -70,8 +70,7 @@ def test_compiled_accelerations_equal_the_model(ship):
     values = [
         accelerations(
             model.coefficients,
-            1 / model.restoring.piece_rad,
-            model.restoring.coefficients_nm,
+            *model.packed[1:],
             *state,
             w,
             tank.reservoir_area_m2 * p,

@@ -369,14 +369,5 @@ def advance_batch(
             phase[n % phase.shape[0]],
             pressure[n % pressure.shape[0]],
             valve_loss[n % valve_loss.shape[0]],
-            hold,
-            capsize,
-            first,
-            steps,
-            dt,
-            state[n],
-            summary[n],
-            np.empty((0, 5)),
-            out[n],
-            stride,
-        )
+            hold, capsize, first, steps, dt, state[n], summary[n], np.empty((0, 5)), out[n], stride,
+        )  # fmt: skip

@@ -93,6 +93,12 @@ class RollModel:
         object.__setattr__(self, "coefficients", _coefficients(self.ship, self.tank))
         object.__setattr__(self, "restoring", restoring(self.ship))
 
+    @property
+    def packed(self) -> tuple[FloatArray, float, FloatArray]:
+        """Coefficients, pieces of the restoring moment per rad, and their coefficients."""
+        pieces = self.restoring
+        return np.array(self.coefficients), 1 / pieces.piece_rad, pieces.coefficients_nm
+
     def derivative(
         self,
         state: npt.ArrayLike,

@@ -132,26 +132,11 @@ def simulate(
     out = np.empty((-(-steps // record_every), 4))
     summary = _blank_summary(1)[0]
     impacts = np.empty((IMPACTS_KEPT, 5))
+    pressure, valve_loss = _rows(pressure_pa)[0], _rows(valve_loss_pa_per_m2_s2)[0]
     kernels.advance(
-        np.array(model.coefficients),
-        1 / model.restoring.piece_rad,
-        model.restoring.coefficients_nm,
-        amplitude[0],
-        frequency[0],
-        phase[0],
-        _rows(pressure_pa)[0],
-        _rows(valve_loss_pa_per_m2_s2)[0],
-        hold,
-        capsize_rad,
-        0,
-        steps,
-        step_s,
-        state,
-        summary,
-        impacts,
-        out,
-        record_every,
-    )
+        *model.packed, amplitude[0], frequency[0], phase[0], pressure, valve_loss, hold,
+        capsize_rad, 0, steps, step_s, state, summary, impacts, out, record_every,
+    )  # fmt: skip
     capsized_s = float(summary[kernels.CAPSIZED_S])
     time = step_s * np.append(np.arange(0, steps, record_every), steps)
     history = np.vstack([out, state])
@@ -198,9 +183,8 @@ def simulate_batch(
     steps = whole_steps("duration_s", duration_s, step_s)
     hold = whole_steps("hold_s", step_s if hold_s is None else hold_s, step_s)
     models = [models] if isinstance(models, RollModel) else list(models)
-    rows = np.array([model.coefficients for model in models])
-    per_piece = 1 / np.array([model.restoring.piece_rad for model in models])
-    restoring = _stacked([model.restoring.coefficients_nm for model in models])
+    coefficients, pieces, tables = zip(*(model.packed for model in models), strict=True)
+    rows, per_piece, restoring = np.array(coefficients), np.array(pieces), _stacked(list(tables))
     if record_every is not None:
         _check_record_every(record_every)
     amplitude, frequency, phase = _sea(wave)
@@ -224,24 +208,9 @@ def simulate_batch(
         part = slice(first // stride, (first + chunk) // stride)
         count = min(chunk, steps - first)
         kernels.advance_batch(
-            rows,
-            per_piece,
-            restoring,
-            amplitude,
-            frequency,
-            phase,
-            pressure,
-            valve_loss,
-            hold,
-            capsize_rad,
-            first,
-            count,
-            step_s,
-            state,
-            summary,
-            history[:, part],
-            stride,
-        )
+            rows, per_piece, restoring, amplitude, frequency, phase, pressure, valve_loss, hold,
+            capsize_rad, first, count, step_s, state, summary, history[:, part], stride,
+        )  # fmt: skip
     return BatchResult(
         state,
         summary[:, kernels.CAPSIZED_S].copy(),

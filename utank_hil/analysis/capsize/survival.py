@@ -88,7 +88,7 @@ def controlled_run(
     hold = whole_steps("sample time", controller.sample_time_s, step_s)
     samples = whole_steps("duration_s", duration_s, controller.sample_time_s)
     state = np.zeros(4) if initial is None else np.array(initial, dtype=np.float64)
-    coefficients = np.array(model.coefficients)
+    packed = model.packed
     amplitude, frequency, phase = (np.ascontiguousarray(x, dtype=np.float64) for x in wave)
     summary = np.zeros(kernels.SUMMARY)
     summary[kernels.CAPSIZED_S] = np.inf
@@ -106,25 +106,9 @@ def controlled_run(
         if each_step is not None:
             each_step(k * controller.sample_time_s, state, command)
         kernels.advance(
-            coefficients,
-            1 / model.restoring.piece_rad,
-            model.restoring.coefficients_nm,
-            amplitude,
-            frequency,
-            phase,
-            inputs[0],
-            inputs[1],
-            hold,
-            capsize_rad,
-            k * hold,
-            hold,
-            step_s,
-            state,
-            summary,
-            impacts,
-            nowhere,
-            hold,
-        )
+            *packed, amplitude, frequency, phase, inputs[0], inputs[1], hold,
+            capsize_rad, k * hold, hold, step_s, state, summary, impacts, nowhere, hold,
+        )  # fmt: skip
         if math.isfinite(summary[kernels.CAPSIZED_S]):
             break
     return Survival(
