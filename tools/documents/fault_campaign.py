@@ -1,19 +1,12 @@
 """The tables of docs/faults.md, made from configs/faults/campaign.yaml."""
 
-from pathlib import Path
-
 from firmware_sim.fault_campaign.campaign import REACTIONS, Campaign
+from tools.documents.marked import DOCS, written_anew
 from utank_hil.configuration import load_config
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "faults.md"
-CAMPAIGN = ROOT / "configs" / "faults" / "campaign.yaml"
+PAGE = DOCS / "faults.md"
+CAMPAIGN = DOCS.parent / "configs" / "faults" / "campaign.yaml"
 
-BEGIN = (
-    "<!-- Written by tools/documents/fault_campaign.py (make docs) from "
-    "configs/faults/campaign.yaml; do not edit down to the end mark. -->\n"
-)
-END = "<!-- End of the generated tables. -->\n"
 REQUIREMENTS = (
     "| requirement | fault | found by | within | reaction | shown by |\n|---|---|---|---|---|---|\n"
 )
@@ -37,10 +30,6 @@ def requirements(campaign: Campaign) -> list[str]:
 
 def page() -> str:
     """The page as it stands, with the tables written anew."""
-    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"{PAGE}: the tables must stand between the lines\n{BEGIN}{END}")
     campaign = load_config(CAMPAIGN, Campaign)
     rows = [
         f"| `{row.id}` | {REACTIONS[row.reaction]} | "
@@ -48,6 +37,4 @@ def page() -> str:
         f"{', '.join(f'`{name}` {value:g}' for name, value in row.counts_from.items())} |\n"
         for row in campaign.rows
     ]
-    return "".join(
-        [before + BEGIN + REQUIREMENTS, *requirements(campaign), ROWS, *rows, END, after]
-    )
+    return written_anew(PAGE, (REQUIREMENTS, *requirements(campaign), ROWS, *rows))

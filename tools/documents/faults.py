@@ -2,18 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 
+from tools.documents.marked import DOCS, written_anew
 from utank_hil.runtime.faults import FAULTS, FaultRow
 from utank_hil.runtime.safety_limits import SafetyLimits
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "safety.md"
-
-BEGIN = (
-    "<!-- Written by tools/documents/faults.py (make docs) from utank_hil/runtime/faults.py; "
-    "do not edit down to the end mark. -->\n"
-)
-END = "<!-- End of the generated tables. -->\n"
+PAGE = DOCS / "safety.md"
 
 CONDITIONS = "| fault | found by | reaction | keeps the controller in INIT |\n|---|---|---|---|\n"
 WORDS = "\n| fault | what happened | what to do |\n|---|---|---|\n"
@@ -35,16 +29,6 @@ def conditions(row: FaultRow) -> Iterator[str]:
 
 def page() -> str:
     """The page as it stands, with the tables written anew."""
-    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"{PAGE}: the tables must stand between the lines\n{BEGIN}{END}")
-    return "".join(
-        [
-            before + BEGIN + CONDITIONS,
-            *(line for row in FAULTS for line in conditions(row)),
-            WORDS,
-            *(f"| {row.code.name} | {row.happened} | {row.remedy} |\n" for row in FAULTS),
-            END + after,
-        ]
-    )
+    found = (line for row in FAULTS for line in conditions(row))
+    words = (f"| {row.code.name} | {row.happened} | {row.remedy} |\n" for row in FAULTS)
+    return written_anew(PAGE, (CONDITIONS, *found, WORDS, *words))

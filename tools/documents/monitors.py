@@ -1,21 +1,14 @@
 """The thresholds of the shipped ships in docs/monitors.md, as the code computes them."""
 
 import math
-from pathlib import Path
 from typing import Final
 
+from tools.documents.marked import DOCS, written_anew
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds, thresholds_of
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "monitors.md"
+PAGE = DOCS / "monitors.md"
 CONTROLLERS: Final = ("gpc", "naval_constrained_gpc", "patti_b_constrained_gpc")
-
-BEGIN = (
-    "<!-- Written by tools/documents/monitors.py (make docs) from utank_hil/runtime/monitors/"
-    "thresholds.py; do not edit down to the end mark. -->\n"
-)
-END = "<!-- End of the generated table. -->\n"
 
 DEGREES: Final = math.degrees(1.0)
 ROWS: Final = (
@@ -37,7 +30,7 @@ ROWS: Final = (
 
 def thresholds(controller: str) -> tuple[str, MonitorThresholds]:
     """A shipped controller's vessel, and her thresholds."""
-    path = ROOT / "configs" / "controllers" / f"{controller}.yaml"
+    path = DOCS.parent / "configs" / "controllers" / f"{controller}.yaml"
     config = load_config(path, ControllerConfig)
     found = thresholds_of(config.plant, config.safety.roll_limit_rad, config.sensors)
     return config.vessel.name, found
@@ -45,10 +38,6 @@ def thresholds(controller: str) -> tuple[str, MonitorThresholds]:
 
 def page() -> str:
     """The page as it stands, with the table written anew."""
-    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"{PAGE}: the table must stand between the lines\n{BEGIN}{END}")
     ships = [thresholds(name) for name in CONTROLLERS]
     lines = [
         f"| threshold | {' | '.join(name for name, _ in ships)} |\n",
@@ -60,4 +49,4 @@ def page() -> str:
             for words, field, times in ROWS
         ),
     ]
-    return "".join([before, BEGIN, *lines, END, after])
+    return written_anew(PAGE, lines)
