@@ -225,7 +225,7 @@ def assert_takes_over_as_new(name, build, names):
 @every_law
 def test_reset_is_as_newly_built(name):
     used, new = ALL[name][0](), ALL[name][0]()
-    for k in range(300):
+    for k in range(700):  # beyond the room of the predictive laws' memory
         used.step(measured(name, motion(k * used.sample_time_s)))
     used.reset()
     for k in range(20):

@@ -128,16 +128,6 @@ def test_frequency_response_is_that_of_the_state_space_form():
         np.testing.assert_allclose(response, system(point, squeeze=False), rtol=1e-9)
 
 
-def test_take_over_without_a_bump():
-    law = small_law()
-    waiting, other = law.controller(), law.controller()
-    y = np.random.default_rng(6).normal(size=(20, 3))
-    for sample in y[:-1]:
-        waiting.step(sample, np.ones(3))  # wants something else
-        waiting.applied(other.step(sample))
-    np.testing.assert_array_equal(waiting.step(y[-1]), other.step(y[-1]))
-
-
 def test_constant_reference_is_reached_where_inputs_suffice():
     model = random_model(7, inputs=2, outputs=2)
     law = design_lqg(model, design_lqr(model, 1.0, 1.0), np.eye(5), np.eye(2))

@@ -116,14 +116,6 @@ def test_wave_frequencies_pass_and_steady_values_do_not():
     assert abs(ratio[1] - 1) < 0.07
 
 
-def test_reset_forgets_the_mean():
-    used, new = WASHED.controller(), WASHED.controller()
-    for _ in range(50):
-        used.step(np.ones(2))
-    used.reset()
-    np.testing.assert_array_equal(used.step(np.ones(2)), new.step(np.ones(2)))
-
-
 def test_corner_must_be_positive():
     with pytest.raises(ValueError, match="corner_rad_s"):
         WashoutLaw(LAW, 0.0)

@@ -1,4 +1,4 @@
-"""The steppable predictive controller: its law, its memory, anti-windup and take-over."""
+"""The steppable predictive controller: its law, its memory and anti-windup."""
 
 import control
 import numpy as np
@@ -54,35 +54,6 @@ def test_what_was_really_commanded_enters_the_past():
         stepped.append(controller.step(sample))
         controller.applied(command)
     np.testing.assert_allclose(stepped, by_the_book(law, y, commanded), atol=1e-9)
-
-
-def test_take_over_without_a_bump():
-    # told what another controller commands, it answers as one that had commanded so itself
-    law = random_law(5)
-    waiting, other = law.controller(), law.controller()
-    y = np.random.default_rng(6).normal(size=(20, 3))
-    for sample in y[:-1]:
-        waiting.step(sample, np.ones(3))  # wants something else
-        waiting.applied(other.step(sample))
-    np.testing.assert_array_equal(waiting.step(y[-1]), other.step(y[-1]))
-
-
-def test_result_belongs_to_the_caller():
-    controller = random_law().controller()
-    first = controller.step(np.ones(3))
-    kept = first.copy()
-    controller.applied(np.zeros(2))
-    controller.step(np.ones(3))
-    np.testing.assert_array_equal(first, kept)
-
-
-def test_reset_is_as_newly_built():
-    law = random_law(7)
-    used, new = law.controller(), law.controller()
-    for sample in np.random.default_rng(8).normal(size=(700, 3)):
-        used.step(sample)
-    used.reset()
-    np.testing.assert_array_equal(used.step(np.ones(3)), new.step(np.ones(3)))
 
 
 def test_reference_for_the_whole_horizon_or_for_each_sample():
