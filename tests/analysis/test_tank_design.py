@@ -2,13 +2,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.tank_design import best_passive_tank, tank_figures
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import Tank, coupled_model
 from utank_hil.dynamics.linear import coupled_matrices
-
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 
 
 def peak(tank: Tank) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rolling_ship import SHIP, TANK
 from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.control import (
@@ -27,14 +28,12 @@ from utank_hil.control.lqg import design_lqr
 from utank_hil.control.semi_active import ClippedValve, OnOffValve
 from utank_hil.control.stimulation import Stimulation
 from utank_hil.control.tracking_error import ErrorDynamics
-from utank_hil.dynamics import RollModel, RollShip, Tank
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.valves import ValveRange
 from utank_hil.sea import jonswap
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 MODEL = RollModel(SHIP, TANK)
 PREDICTOR = Predictor(("roll_rad", "level_m"), (2.8e-3, 0.044), 30, 0.61, 0.012, 0.054, 1340.0)
 GPC = PredictiveDesign("gpc", PREDICTOR, 40, 50, (1e12, 1.5e7), first_output=28)

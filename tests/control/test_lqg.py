@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.control.lqg import LQGLaw, design_lqg, design_lqr, kalman_predictor
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import LinearModel, sampled_model
-
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 
 
 def random_model(seed, states=5, inputs=2, outputs=3):

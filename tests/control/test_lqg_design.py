@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from shipped_designs import LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
@@ -11,10 +12,8 @@ from utank_hil.analysis.loop.margins import margins
 from utank_hil.control import DesignPlant, WashoutLaw, pump_model
 from utank_hil.control.lqg_design import LQGDesign, wave_plant
 from utank_hil.control.predictive.design import Predictor
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import RollShip, coupled_model
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 DESIGN = LQG_ROLL_RATE_LEVEL
 MEASURED = DESIGN.predictor.measured
 

@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.optimal_tank import passive_optimum, ship_ratios
 from utank_hil.control.pd import PD_MEASURED, design_pd
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.linear import coupled_matrices, pump_model
-
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 
 
 def test_level_in_a_ship_held_still_has_the_optimal_frequency_and_damping():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 
 from utank_hil.control.feedback_linearization import FeedbackLinearization, level_brake
 from utank_hil.control.fuzzy.basis import FuzzyBasis
@@ -9,11 +10,9 @@ from utank_hil.control.fuzzy.direct import RobustFuzzy, SmallGainFuzzy
 from utank_hil.control.fuzzy.indirect import IndirectFuzzy
 from utank_hil.control.slope import slope_at_rest
 from utank_hil.control.tracking_error import ErrorDynamics
-from utank_hil.dynamics import RollModel, RollShip, Tank
+from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import state_matrices
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 ERROR = ErrorDynamics(1.5, 0.7, 2.5)
 RANGES = (0.5, 0.5, 4.0, 4.0)
 GAIN = 1.8e-8

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.capsize.survival import controlled_run
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.stimulation import Stimulation
-from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, harmonic_response
+from utank_hil.dynamics import RollModel, WaveMoment, harmonic_response
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 CALM = WaveMoment([], [], [])
 PLAN = Stimulation(
     ship=SHIP,

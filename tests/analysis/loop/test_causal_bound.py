@@ -4,17 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from scipy.linalg import solve_discrete_are
 
 from utank_hil.analysis.loop.causal_bound import CausalProblem, CausalRun, causal_bound
 from utank_hil.analysis.loop.loop_simulation import SensorNoise
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.sea import jonswap
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 PLANT = DesignPlant(SHIP, TANK, limits=PumpLimits(level_m=4.0))
 SPECTRUM = jonswap(4.7, 10.0)
 SEA = SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density))

@@ -4,20 +4,18 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.clairvoyant import NoHistoryError, clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.active_set import ActiveSetSolver
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 from utank_hil.tick import TICK_S
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 LIMITS = PumpLimits(level_m=3.0)
 MOMENT = Sea.irregular(jonswap(4.7, 10.0), 3, components=128).roll_moment(
     SHIP.stiffness_nm_rad, EffectiveSlope(0.5)

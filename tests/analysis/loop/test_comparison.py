@@ -8,13 +8,14 @@ import matplotlib.image
 import numpy as np
 import pytest
 from rich.console import Console
+from rolling_ship import SHIP, TANK
 from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.comparison import Loop, compare, comparison_table
 from utank_hil.analysis.loop.sea_response import CalmSeaError
 from utank_hil.analysis.loop.trade import trade
 from utank_hil.control import PD_MEASURED, DesignPlant, PredictiveLaw, design_pd
-from utank_hil.dynamics import RollShip, Tank
+from utank_hil.dynamics import Tank
 from utank_hil.pictures.loops import draw_bode, draw_nyquist
 from utank_hil.pictures.records import draw_phase, draw_time
 from utank_hil.pictures.style import COLORS
@@ -22,8 +23,6 @@ from utank_hil.sea import Harmonics
 
 pytestmark = pytest.mark.slow
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 WAVES = Harmonics(np.array([1e7, 2e7]), np.array([0.48, 0.62]), np.zeros(2))
 GPC = Loop("GPC", GPC_ROLL.law(DesignPlant(SHIP, TANK)), ("roll_rad",))
 # pushes the water the wrong way, hard

@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from scipy.integrate import solve_ivp
 
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PassiveController, PumpLimits
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.sea import Harmonics
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 SILENT = SensorNoise(0.0, 0.0, 0.0, 0.0)
 FREE = PumpLimits(pressure_pa=1e9, rate_pa_s=1e12, level_m=1e6)
 WAVES = Harmonics(np.array([2e7, 1e7]), np.array([0.55, 0.9]), np.array([0.3, 2.0]))

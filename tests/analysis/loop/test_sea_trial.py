@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
@@ -19,12 +20,9 @@ from utank_hil.analysis.loop.sea_trial import (
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.control import DesignPlant, PredictiveLaw, PumpLimits
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
 from utank_hil.tick import TICK_S
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 LIMITS = PumpLimits(pressure_pa=30e3)
 GPC = Entrant("gpc", GPC_ROLL.law(DesignPlant(SHIP, TANK)), ("roll_rad",), LIMITS)
 SEA = jonswap(4.0, 10.0)

@@ -6,20 +6,18 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL, LQG_ROLL_RATE_LEVEL
 
 from utank_hil.analysis.loop.trade import scaled, trade, varied
 from utank_hil.control import DesignPlant
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.sea_plant import SeaModel
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.pictures.trade import draw_trade
 from utank_hil.sea import EffectiveSlope, Sea, ittc
 
 pytestmark = pytest.mark.slow
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 MOMENT = Sea.irregular(ittc(4.7, 10.0), 1).roll_moment(SHIP.stiffness_nm_rad, EffectiveSlope(0.5))
 FACTORS = (10.0, 0.1, 1.0)
 

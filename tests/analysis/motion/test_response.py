@@ -1,10 +1,9 @@
 import numpy as np
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.motion.response import simulated_response
 from utank_hil.dynamics import RollModel, RollShip, Tank, harmonic_response
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
 FREQUENCY = np.array([0.3, 0.45, 0.5, 0.7])
 
 

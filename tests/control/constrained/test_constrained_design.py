@@ -4,19 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, jonswap
 from utank_hil.tick import TICK_S
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 SPECTRUM = jonswap(4.7, 10.0)
 DESIGN = ConstrainedDesign(
     "constrained_gpc", SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density))

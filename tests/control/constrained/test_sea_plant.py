@@ -2,19 +2,17 @@
 
 import numpy as np
 import pytest
+from rolling_ship import SHIP, TANK
 from scipy.linalg import solve_discrete_lyapunov
 
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, coupled_model, pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.sea import jonswap
 
-SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.81875e7)
-TANK = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.10)
 SPECTRUM = jonswap(4.7, 10.0)
 TS = 0.2
 
