@@ -5,22 +5,23 @@ frames spoil the identified ship, and a machine that holds a process up for long
 command timeout stops the pump: then it is tried again.
 """
 
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from pathlib import Path
 
 import pytest
 import yaml
-from busy_machine import judged_by
 from two_processes import (
-    CHANNEL,
     CONFIGS,
     Candump,
     Logged,
     Program,
     Watcher,
     patient_controller,
-    running,
+    run_controller,
+    run_ship,
+    watched,
 )
 
 from utank_hil.canbus import DriveState, Mode, RetuningState
@@ -111,31 +112,22 @@ def tell_story(
     """Order a retuning and wait for how it ends."""
     controller_config = controller_file(folder, shipped, changes)
     scenario = scenario_file(folder, controller_config)
-    candump, watcher = Candump(folder), Watcher()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(
-                Program(folder, "firmware-sim", scenario, "--bus", CHANNEL, "--duration", 3600,
-                        "--json")
-            ) as ship,
-            running(
-                Program(folder, "utank-hil", "run", controller_config, "--bus", CHANNEL, "--json")
-            ) as controller,
-        ):  # fmt: skip
-            watcher.wait(lambda w: both_speak(w, ship, controller))
-            watcher.wait_in_charge()
-            watcher.wait(ended, timeout_s=1.5 * takes_s + 120.0)
-            watcher.watch(3.0)
-            ended(watcher)
-            (controller_report, _), (ship_report, _) = controller.end(), ship.end()
-            story = Story(candump.stop(*READ), controller_report, ship_report)
-            assert story.states[-1] is last, story.reasons
-            if last is RETUNED:
-                assert_ship_is_found(story)
-    finally:
-        watcher.close()
-        candump.close()
+    with (
+        closing(Candump(folder)) as candump,
+        watched() as watcher,
+        run_ship(folder, scenario, duration_s=3600) as ship,
+        run_controller(folder, controller_config) as controller,
+    ):
+        watcher.wait(lambda w: both_speak(w, ship, controller))
+        watcher.wait_in_charge()
+        watcher.wait(ended, timeout_s=1.5 * takes_s + 120.0)
+        watcher.watch(3.0)
+        ended(watcher)
+        (controller_report, _), (ship_report, _) = controller.end(), ship.end()
+        story = Story(candump.stop(*READ), controller_report, ship_report)
+        assert story.states[-1] is last, story.reasons
+        if last is RETUNED:
+            assert_ship_is_found(story)
     return story
 
 

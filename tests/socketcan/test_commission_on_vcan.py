@@ -1,13 +1,22 @@
 """``utank-hil commission`` on vcan0: refused before, led through, and armed with its record."""
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from busy_machine import first_that_can_be_judged, judged_by
-from two_processes import CHANNEL, CONFIGS, Program, Watcher, patient_controller, running
+from busy_machine import first_that_can_be_judged
+from two_processes import (
+    CHANNEL,
+    CONFIGS,
+    Program,
+    patient_controller,
+    run_controller,
+    run_ship,
+    watched,
+)
 
 from utank_hil.canbus import Fault, Mode
 from utank_hil.commands.exit_codes import ExitCode
@@ -31,45 +40,31 @@ def still_water(folder: Path, controller: Path, arm_s: float) -> Path:
     return path
 
 
-def ship_of(folder: Path, controller: Path, arm_s: float) -> Program:
-    quay = still_water(folder, controller, arm_s)
-    return Program(folder, "firmware-sim", quay, "--bus", CHANNEL, "--json")
-
-
 def run_until(folder: Path, controller: Path, record: Path, mode: Mode, fault: Fault) -> str:
     """Have an operator arm under `run`, until mode and fault are there; what it said."""
-    words = ("utank-hil", "run", controller, "--bus", CHANNEL, "--record", record, "--json")
-    watcher = Watcher()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(ship_of(folder, controller, 1.0)),
-            running(Program(folder, *words)) as run,
-        ):
-            watcher.wait(
-                lambda w: w.status is not None and (w.status.mode, w.status.fault) == (mode, fault)
-            )
-            return run.end()[1]
-    finally:
-        watcher.close()
+    with (
+        watched() as watcher,
+        run_ship(folder, still_water(folder, controller, 1.0)),
+        run_controller(folder, controller, "--record", record) as run,
+    ):
+        watcher.wait(
+            lambda w: w.status is not None and (w.status.mode, w.status.fault) == (mode, fault)
+        )
+        return run.end()[1]
 
 
 def commission(folder: Path, controller: Path, record: Path) -> dict[str, Any]:
     words = ("utank-hil", "commission", controller, "--bus", CHANNEL, "--json")
-    watcher = Watcher()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(ship_of(folder, controller, 24.0)),
-            running(Program(folder, *words, "--record", record)) as program,
-        ):
-            watcher.wait(lambda w: program.code is not None, timeout_s=400.0)
-            made, _ = program.end(ExitCode.OK, ExitCode.REFUSED, interrupt=False)
-            failed = [each for each in made["checks"] if each["verdict"] != "pass"]
-            assert made["passed"], (made["ended"], failed)
-            return made
-    finally:
-        watcher.close()
+    with (
+        watched() as watcher,
+        run_ship(folder, still_water(folder, controller, 24.0)),
+        closing(Program(folder, *words, "--record", record)) as program,
+    ):
+        watcher.wait(lambda w: program.code is not None, timeout_s=400.0)
+        made, _ = program.end(ExitCode.OK, ExitCode.REFUSED, interrupt=False)
+        failed = [each for each in made["checks"] if each["verdict"] != "pass"]
+        assert made["passed"], (made["ended"], failed)
+        return made
 
 
 def story(folder: Path) -> dict[str, Any]:

@@ -10,12 +10,12 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from busy_machine import first_that_can_be_judged, judged_by
+from busy_machine import first_that_can_be_judged
 from two_processes import (
     BIN,
     CHANNEL,
@@ -24,9 +24,11 @@ from two_processes import (
     Logged,
     Program,
     Watcher,
+    link_down,
     patient_controller,
-    running,
-    set_link,
+    run_controller,
+    run_ship,
+    watched,
 )
 
 from utank_hil.canbus import DriveState, Fault, Mode
@@ -67,40 +69,25 @@ class Panel:
 @contextmanager
 def operated() -> Iterator[tuple[Watcher, Panel]]:
     """Someone who watches, and a panel."""
-    watcher, panel = Watcher(), Panel()
-    try:
-        with judged_by(watcher.machine.failure):
-            yield watcher, panel
-    finally:
-        panel.close()
-        watcher.close()
+    with closing(Panel()) as panel, watched() as watcher:
+        yield watcher, panel
 
 
 @contextmanager
 def logged(folder: Path) -> Iterator[tuple[Candump, Watcher, Panel]]:
     """The same, and a log."""
-    candump = Candump(folder)
-    try:
-        with operated() as (watcher, panel):
-            yield candump, watcher, panel
-    finally:
-        candump.close()
+    with closing(Candump(folder)) as candump, operated() as (watcher, panel):
+        yield candump, watcher, panel
 
 
-def ship(folder: Path) -> Program:
+def ship(folder: Path) -> closing[Program]:
     folder.mkdir(exist_ok=True)
-    return Program(
-        folder, "firmware-sim", STORM, "--bus", CHANNEL, "--without", "panel",
-        "--duration", 7200, "--json",
-    )  # fmt: skip
+    return run_ship(folder, STORM, "--without", "panel", duration_s=7200)
 
 
-def controller(folder: Path) -> Program:
+def controller(folder: Path) -> closing[Program]:
     folder.mkdir(exist_ok=True)
-    config = patient_controller(folder, 100.0)
-    return Program(
-        folder, "utank-hil", "run", config, "--bus", CHANNEL, "--out", folder / "out", "--json"
-    )
+    return run_controller(folder, patient_controller(folder, 100.0), "--out", folder / "out")
 
 
 def arm(watcher: Watcher, panel: Panel) -> None:
@@ -122,10 +109,10 @@ def pauses(log: list[Logged], name: str) -> list[tuple[float, float]]:
 
 def kill_controllers(folder: Path) -> list[Logged]:
     draw = random.Random(1)
-    with logged(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
+    with logged(folder) as (candump, watcher, panel), ship(folder / "ship"):
         watcher.wait(lambda w: w.drive is not None)
         for number in range(KILLS):
-            with running(controller(folder / str(number))) as running_one:
+            with controller(folder / str(number)) as running_one:
                 arm(watcher, panel)
                 watcher.watch(draw.uniform(0, 2))
                 running_one.signal(signal.SIGKILL)
@@ -137,7 +124,7 @@ def kill_controllers(folder: Path) -> list[Logged]:
             assert recording["mode"][-1] == Mode.ACTIVE
             file.unlink()
         # the last one restarts: it waits for the operator, who holds the arm bit
-        with running(controller(folder / "last")):
+        with controller(folder / "last"):
             watcher.wait(lambda w: w.statuses >= 30)
             assert watcher.mode is Mode.STANDBY
         return candump.stop("PUMP_CMD", "DRIVE_STATUS_1", "SENSOR_PUMP", "CTRL_STATUS")
@@ -165,10 +152,10 @@ def kill_ships(folder: Path) -> list[Logged]:
     draw = random.Random(2)
     with (
         logged(folder) as (candump, watcher, panel),
-        running(controller(folder / "controller")) as one,
+        controller(folder / "controller") as one,
     ):
         for number in range(KILLS):
-            with running(ship(folder / f"ship{number}")) as running_one:
+            with ship(folder / f"ship{number}") as running_one:
                 watcher.wait(lambda w: w.drive is not None)
                 arm(watcher, panel)
                 watcher.watch(draw.uniform(0, 2))
@@ -198,9 +185,9 @@ def test_a_signal_under_pressure_ends_with_the_pump_at_zero(
     number: signal.Signals, tmp_path: Path
 ) -> None:
     def signalled(folder: Path) -> list[Logged]:
-        with logged(folder) as (candump, watcher, panel), running(ship(folder / "ship")):
+        with logged(folder) as (candump, watcher, panel), ship(folder / "ship"):
             watcher.wait(lambda w: w.drive is not None)
-            with running(controller(folder / "controller")) as one:
+            with controller(folder / "controller") as one:
                 arm(watcher, panel)
                 one.signal(number)
                 one.end(interrupt=False)
@@ -214,26 +201,22 @@ def test_a_signal_under_pressure_ends_with_the_pump_at_zero(
 def test_a_hundred_flaps_of_the_interface_are_survived_without_arming(tmp_path: Path) -> None:
     def flap(folder: Path) -> None:
         draw = random.Random(3)
-        try:
-            with (
-                operated() as (watcher, panel),
-                running(ship(folder / "ship")) as ship_program,
-                running(controller(folder / "controller")) as one,
-            ):
-                watcher.wait(lambda w: w.drive is not None)
-                arm(watcher, panel)
-                for _ in range(FLAPS):
-                    set_link(up=False)
+        with (
+            operated() as (watcher, panel),
+            ship(folder / "ship") as ship_program,
+            controller(folder / "controller") as one,
+        ):
+            watcher.wait(lambda w: w.drive is not None)
+            arm(watcher, panel)
+            for _ in range(FLAPS):
+                with link_down():
                     time.sleep(draw.uniform(0, 0.1))
-                    set_link(up=True)
-                    watcher.watch(draw.uniform(0.02, 0.2))
-                watcher.forget()
-                watcher.wait(lambda w: w.statuses >= 20)
-                assert (watcher.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
-                assert ship_program.code is None
-                arm(watcher, panel)  # and it works again when the operator says so
-                one.end(ExitCode.OK, ExitCode.BUS_LOST)
-        finally:
-            set_link(up=True)
+                watcher.watch(draw.uniform(0.02, 0.2))
+            watcher.forget()
+            watcher.wait(lambda w: w.statuses >= 20)
+            assert (watcher.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
+            assert ship_program.code is None
+            arm(watcher, panel)  # and it works again when the operator says so
+            one.end(ExitCode.OK, ExitCode.BUS_LOST)
 
     first_that_can_be_judged(flap, tmp_path)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from busy_machine import first_that_can_be_judged, judged_by
-from two_processes import CHANNEL, Program, Watcher, patient_controller, running
+from busy_machine import first_that_can_be_judged
+from two_processes import Watcher, patient_controller, run_controller, run_ship, watched
 
 from utank_hil.canbus import DriveState, Fault, Mode
 from utank_hil.commands.exit_codes import ExitCode
@@ -62,24 +62,17 @@ def until_it_ends(
     folder: Path, flaw: str, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Watcher, dict[str, object]]:
     """In charge until the law fails; the bus at the end, and the controller's report."""
-    ship = ("firmware-sim", STORM, "--bus", CHANNEL, "--duration", 1200, "--json")
     config = controller_of(folder, flaw)
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    watcher = Watcher()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(Program(folder, *ship)),
-            running(
-                Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, "--json")
-            ) as controller,
-        ):
-            watcher.wait(lambda w: w.mode is Mode.ACTIVE)
-            watcher.wait(lambda w: w.mode is Mode.FAULT)
-            watcher.watch(2.0)
-            report, _ = controller.end(ExitCode.FAULT)
-    finally:
-        watcher.close()
+    with (
+        watched() as watcher,
+        run_ship(folder, STORM),
+        run_controller(folder, config) as controller,
+    ):
+        watcher.wait(lambda w: w.mode is Mode.ACTIVE)
+        watcher.wait(lambda w: w.mode is Mode.FAULT)
+        watcher.watch(2.0)
+        report, _ = controller.end(ExitCode.FAULT)
     return watcher, report
 
 

@@ -1,12 +1,13 @@
 """``utank-hil bench --realtime --bus vcan0``, and the same waves in lockstep beside it."""
 
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from busy_machine import first_that_can_be_judged, judged_by, lost
-from two_processes import CHANNEL, CONFIGS, Program, patient_controller, running
+from two_processes import CHANNEL, CONFIGS, Program, patient_controller
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.lockstep_run import run_lockstep
@@ -75,7 +76,7 @@ def attempt(folder: Path) -> Bench:
         folder, "utank-hil", "bench", scenario, "--realtime", "--bus", CHANNEL,
         "--duration", DURATION_S, "--out", folder, "--frames", "--json",
     )  # fmt: skip
-    with running(program):
+    with closing(program):
         # a machine that is busy for long is judged below
         codes = ExitCode.OK, ExitCode.NOT_RANKED
         report, _ = program.end(*codes, interrupt=False, timeout_s=300.0)

@@ -3,20 +3,21 @@
 import re
 import subprocess
 import time
+from contextlib import closing
 from itertools import takewhile
 from pathlib import Path
 
 import pytest
-from busy_machine import first_that_can_be_judged, judged_by
+from busy_machine import first_that_can_be_judged
 from two_processes import (
     CHANNEL,
     LINE,
     Candump,
-    Program,
-    Watcher,
+    link_down,
     patient_controller,
-    running,
-    set_link,
+    run_controller,
+    run_ship,
+    watched,
 )
 
 from utank_hil.assembly import build_law
@@ -37,25 +38,17 @@ PLAYED_NS = 2_500_000_000
 
 def driven(folder: Path) -> Path:
     """The frame log of a run in which the pump was driven, and then the interface was down."""
-    watcher = Watcher()
-    ship = Program(folder, "firmware-sim", STORM, "--bus", CHANNEL, "--duration", 600, "--json")
-    words = ("run", patient_controller(folder), "--bus", CHANNEL, "--out", folder, "--json")
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(ship),
-            running(Program(folder, "utank-hil", *words)) as controller,
-        ):
-            watcher.wait_in_charge(1e3)
-            watcher.watch(2.0)
-            set_link(up=False)
+    with (
+        watched() as watcher,
+        run_ship(folder, STORM),
+        run_controller(folder, patient_controller(folder), "--out", folder) as controller,
+    ):
+        watcher.wait_in_charge(1e3)
+        watcher.watch(2.0)
+        with link_down():
             watcher.watch(0.3)
-            set_link(up=True)
-            watcher.watch(0.5)
-            report, _ = controller.end(ExitCode.BUS_LOST)
-    finally:
-        set_link(up=True)
-        watcher.close()
+        watcher.watch(0.5)
+        report, _ = controller.end(ExitCode.BUS_LOST)
     recording = report["recording"]
     assert isinstance(recording, dict)
     assert recording["records_lost"] == 0
@@ -90,19 +83,13 @@ def test_canplayer_puts_an_exported_log_on_the_bus_frame_by_frame(tmp_path: Path
     first = list(takewhile(lambda entry: entry.time_ns < PLAYED_NS, entries))
     file = tmp_path / "kept.log"
     write_bus_log(file, first)
-    candump = Candump(tmp_path)
-    try:
+    with closing(Candump(tmp_path)):
         wait_for_listener()
         player = subprocess.run(
             ["canplayer", "-I", str(file), f"{CHANNEL}=can0"],
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+            capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
         assert player.returncode == 0, player.stderr
-    finally:
-        candump.close()
     heard = [
         (int(parts["id"], 16), bytes.fromhex(parts["data"]))
         for line in (tmp_path / "candump.log").read_text().splitlines()

@@ -5,11 +5,12 @@ import shlex
 import signal
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
-from busy_machine import first_that_can_be_judged, judged_by
-from two_processes import CHANNEL, Candump, Program, Watcher, patient_controller, running
+from busy_machine import first_that_can_be_judged
+from two_processes import CHANNEL, Candump, Program, patient_controller, watched
 
 from utank_hil.canbus import Mode
 
@@ -35,13 +36,13 @@ def commands(folder: Path) -> dict[str, list[str]]:
 def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
     """Until the pump works; the ship's report and the log."""
     said = commands(folder)
-    candump, watcher = Candump(folder), Watcher()
     sensors = subprocess.Popen([sys.executable, *said["python"][1:]])
     try:
         with (
-            judged_by(watcher.machine.failure),
-            running(Program(folder, *said["firmware-sim"], "--duration", 1200, "--json")) as ship,
-            running(Program(folder, *said["utank-hil"], "--json")) as controller,
+            closing(Candump(folder)) as candump,
+            watched() as watcher,
+            closing(Program(folder, *said["firmware-sim"], "--duration", 1200, "--json")) as ship,
+            closing(Program(folder, *said["utank-hil"], "--json")) as controller,
         ):
             watcher.wait_in_charge(PRESSURE_PA)
             watcher.watch(1.0)
@@ -53,8 +54,6 @@ def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
     finally:
         sensors.send_signal(signal.SIGINT)
         assert sensors.wait(60) == 0
-        watcher.close()
-        candump.close()
     return report, candump
 
 

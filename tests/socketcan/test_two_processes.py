@@ -2,22 +2,23 @@
 
 import signal
 import time
+from contextlib import closing
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from busy_machine import first_that_can_be_judged, judged_by
+from busy_machine import first_that_can_be_judged
 from two_processes import (
-    CHANNEL,
     Candump,
     Logged,
     Program,
-    Watcher,
+    link_down,
     patient_controller,
-    running,
-    set_link,
+    run_controller,
+    run_ship,
+    watched,
 )
 
 from utank_hil.canbus import ControlWord, DriveState, Fault, Mode
@@ -32,13 +33,8 @@ TIMEOUT_S = 0.05
 COMMAND_S = 0.02  # from one pump command to the next
 
 
-def ship_program(folder: Path) -> Program:
-    return Program(folder, "firmware-sim", STORM, "--bus", CHANNEL, "--duration", 1200, "--json")
-
-
-def controller_program(folder: Path, out: Path) -> Program:
-    config = patient_controller(folder)
-    return Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, "--out", out, "--json")
+def controller_into(folder: Path, out: Path) -> closing[Program]:
+    return run_controller(folder, patient_controller(folder), "--out", out)
 
 
 def only_recording(folder: Path) -> Path:
@@ -71,27 +67,23 @@ def tell_story(folder: Path) -> Story:
     told = Story()
     again = folder / "again"
     again.mkdir()
-    candump, watcher = Candump(folder), Watcher()
-    try:
-        with judged_by(watcher.machine.failure), running(ship_program(folder)) as ship:
+    with closing(Candump(folder)) as candump:
+        with watched() as watcher, run_ship(folder, STORM) as ship:
             watcher.wait(lambda w: w.drive is not None)
-            with running(controller_program(folder, folder / "first")) as controller:
+            with controller_into(folder, folder / "first") as controller:
                 watcher.wait_in_charge(15e3)
                 controller.signal(signal.SIGKILL)
             watcher.forget()
             watcher.watch(1.0)
             told.killed_states = {watcher.drive.state}
-            with running(controller_program(again, folder / "second")) as controller:
+            with controller_into(again, folder / "second") as controller:
                 watcher.wait(lambda w: w.statuses >= 50)  # five seconds of it
                 told.statuses_after_restart = watcher.statuses
                 told.reports.append(controller.end()[0])
             told.reports.append(ship.end()[0])
         told.log = candump.stop()
-        for name in ("first", "second"):
-            told.recordings.append(read_recording(only_recording(folder / name))["live"])
-    finally:
-        watcher.close()
-        candump.close()
+    for name in ("first", "second"):
+        told.recordings.append(read_recording(only_recording(folder / name))["live"])
     return told
 
 
@@ -222,29 +214,22 @@ def test_counters_step_by_one_so_nothing_was_lost(story: Story) -> None:
 
 def take_the_link_down(folder: Path) -> tuple[dict[str, object], Path]:
     """Interface down for half a second under an armed controller; its report and recording."""
-    watcher = Watcher()
-    (folder / "ship").mkdir()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(ship_program(folder / "ship")) as ship,
-            running(controller_program(folder, folder / "out")) as controller,
-        ):
-            watcher.wait_in_charge()
-            set_link(up=False)
+    with (
+        watched() as watcher,
+        run_ship(folder, STORM) as ship,
+        controller_into(folder, folder / "out") as controller,
+    ):
+        watcher.wait_in_charge()
+        with link_down():
             time.sleep(0.5)
-            set_link(up=True)
-            watcher.forget()
-            watcher.wait(lambda w: w.mode is Mode.FAULT)
-            watcher.watch(2.0)  # the link is back, arming is not
-            assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
-            assert watcher.drive.state is DriveState.FAULT
-            report, notes = controller.end(ExitCode.BUS_LOST)
-            ship.end()
-            assert f"ALARM in FAULT: {fault_text(Fault.BUS_LOST)}" in notes
-    finally:
-        set_link(up=True)
-        watcher.close()
+        watcher.forget()
+        watcher.wait(lambda w: w.mode is Mode.FAULT)
+        watcher.watch(2.0)  # the link is back, arming is not
+        assert (watcher.status.mode, watcher.status.fault) == (Mode.FAULT, Fault.BUS_LOST)
+        assert watcher.drive.state is DriveState.FAULT
+        report, notes = controller.end(ExitCode.BUS_LOST)
+        ship.end()
+        assert f"ALARM in FAULT: {fault_text(Fault.BUS_LOST)}" in notes
     return report, only_recording(folder / "out")
 
 

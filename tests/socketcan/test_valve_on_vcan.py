@@ -1,19 +1,19 @@
 """A semi-active tank on vcan0: the valve follows, and goes to its fail position with its master."""
 
 import signal
+from contextlib import closing
 from pathlib import Path
 
 import pytest
-from busy_machine import first_that_can_be_judged, judged_by
+from busy_machine import first_that_can_be_judged
 from two_processes import (
-    CHANNEL,
     CONFIGS,
     Candump,
     Logged,
-    Program,
-    Watcher,
     patient_controller,
-    running,
+    run_controller,
+    run_ship,
+    watched,
 )
 
 from utank_hil.canbus import Mode, ValveControl, ValveFault, ValveState
@@ -27,25 +27,20 @@ def kill_the_controller(folder: Path) -> Candump:
     """Arm the on-off law, let it work, kill it; the log."""
     config = patient_controller(folder, 1e3 * TIMEOUT_S, "valve_on_off", "thesis_first_valve")
     scenario = CONFIGS / "scenarios" / "semi_active.yaml"
-    bus = ("--bus", CHANNEL, "--json")
-    candump, watcher = Candump(folder), Watcher()
-    try:
-        with (
-            judged_by(watcher.machine.failure),
-            running(Program(folder, "firmware-sim", scenario, *bus, "--duration", 1200)) as ship,
-            running(Program(folder, "utank-hil", "run", config, *bus)) as controller,
-        ):
-            watcher.wait_in_charge()
-            watcher.watch(15.0)
-            assert watcher.mode is Mode.ACTIVE
-            controller.signal(signal.SIGKILL)
-            watcher.watch(2.0)
-            report, notes = ship.end()
-        assert "emulated: sensors, drive, valve, panel" in notes
-        assert report["refused_commands"] == 0
-    finally:
-        watcher.close()
-        candump.close()
+    with (
+        closing(Candump(folder)) as candump,
+        watched() as watcher,
+        run_ship(folder, scenario) as ship,
+        run_controller(folder, config) as controller,
+    ):
+        watcher.wait_in_charge()
+        watcher.watch(15.0)
+        assert watcher.mode is Mode.ACTIVE
+        controller.signal(signal.SIGKILL)
+        watcher.watch(2.0)
+        report, notes = ship.end()
+    assert "emulated: sensors, drive, valve, panel" in notes
+    assert report["refused_commands"] == 0
     return candump
 
 

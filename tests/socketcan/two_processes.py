@@ -10,13 +10,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import cantools
 import yaml
-from busy_machine import Timekeeping
+from busy_machine import Timekeeping, judged_by
 
 from utank_hil.canbus import (
     ControllerStatus,
@@ -39,11 +39,20 @@ VALVE_LIMITS = (
 START_S = 180.0  # imports take long in a user-mode kernel
 LINE = re.compile(r"\((?P<s>\d+)\.(?P<us>\d{6})\) \S+ (?P<id>[0-9A-F]{8})#(?P<data>[0-9A-F]*)")
 
-
 _GET_FLAGS, _SET_FLAGS, _UP = 0x8913, 0x8914, 0x1  # ioctl of <linux/sockios.h>, IFF_UP
 
 
-def set_link(*, up: bool) -> None:
+@contextmanager
+def link_down() -> Iterator[None]:
+    """The interface is down, and up again however that ends."""
+    _set_link(up=False)
+    try:
+        yield
+    finally:
+        _set_link(up=True)
+
+
+def _set_link(*, up: bool) -> None:
     """Take the interface up or down without starting a process, which would make ticks late."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
         request = struct.pack("16sH14x", CHANNEL.encode(), 0)
@@ -248,9 +257,20 @@ class Program:
 
 
 @contextmanager
-def running(program: Program) -> Iterator[Program]:
-    """A program that does not outlive the test."""
-    try:
-        yield program
-    finally:
-        program.close()
+def watched() -> Iterator[Watcher]:
+    """Someone who watches; what is asserted meanwhile fails only where the machine kept time."""
+    with closing(Watcher()) as watcher, judged_by(watcher.machine.failure):
+        yield watcher
+
+
+def run_ship(
+    folder: Path, scenario: Path, *words: object, duration_s: int = 1200
+) -> closing[Program]:
+    """The ship's side, for the time of a test at most."""
+    words = ("firmware-sim", scenario, "--bus", CHANNEL, "--duration", duration_s, *words)
+    return closing(Program(folder, *words, "--json"))
+
+
+def run_controller(folder: Path, config: Path, *words: object) -> closing[Program]:
+    """The controller, for the time of a test at most."""
+    return closing(Program(folder, "utank-hil", "run", config, "--bus", CHANNEL, *words, "--json"))
