@@ -18,9 +18,15 @@ pytestmark = pytest.mark.slow
 
 HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim")
 
+SHORT_SEARCH = """
+from utank_hil.analysis.loop import observer_search
+observer_search._ITERATIONS = 10
+"""
+"""As the fixture `short_search`: what a search loads is loaded by its first step."""
+
 COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.panel"
 
-LOOP = """
+LOOP = f"""{SHORT_SEARCH}
 from pathlib import Path
 from utank_hil.canbus import SocketCanPort
 from utank_hil.commands.common import load
@@ -36,7 +42,7 @@ assert SocketCanPort
 files = sorted(Path("configs/controllers").glob("*.yaml"))
 configs = [load(path, ControllerConfig) for path in files]
 # one of each kind
-for config in {(type(each.law), each.retuning is None): each for each in configs}.values():
+for config in {{(type(each.law), each.retuning is None): each for each in configs}}.values():
     with RingWriter(SIGNALS, capacity=64) as ring:
         node = build_controller_node(config, sink=ring.write)
         with stop_on_signals() as stop, real_time_scheduling():
@@ -104,6 +110,7 @@ sys.path.insert(0, "tests/commands")
 import ports
 import utank_hil.commands.run
 utank_hil.commands.run.SocketCanPort = ports.QuietBus
+{short_search}
 from {module}.cli import main
 sys.argv = {words!r}
 try:
@@ -115,7 +122,9 @@ finally:
 
 def without_extras(module: str, *words: str) -> subprocess.CompletedProcess[str]:
     """A command where only the dependencies of `run` are installed; prints what it has loaded."""
-    source = WITHOUT_EXTRAS.format(missing=set(EXTRA_OF), module=module, words=["x", *words])
+    source = WITHOUT_EXTRAS.format(
+        missing=set(EXTRA_OF), module=module, words=["x", *words], short_search=SHORT_SEARCH
+    )
     return subprocess.run(
         [sys.executable, "-c", source], capture_output=True, text=True, timeout=120, check=False
     )
