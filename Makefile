@@ -2,8 +2,8 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
-# a worker on each core; a file's tests stay together, for their fixtures
-PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile
+# a worker on each core; a file's tests stay together, for their fixtures; the longest files first
+PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile --no-loadscope-reorder
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 # extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it

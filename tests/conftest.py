@@ -31,6 +31,22 @@ settings.register_profile("few", settings.get_profile("same"), max_examples=10) 
 settings.load_profile("same")
 
 
+LONGEST = (
+    *("faults/test_fault_campaign.py", "firmware_sim/test_worker_pool.py", "test_cli.py"),
+    *("documents/test_changes.py", "tools/test_law_tools.py", "documents/test_how_to.py"),
+    *("test_imports.py", "analysis/loop/test_self_tuning.py", "configuration/test_shipped.py"),
+    *("firmware_sim/test_renewed_bench.py", "commands/test_viewer_pixels.py"),
+    *("firmware_sim/test_init_command.py", "campaign/test_campaign.py"),
+)
+"""Files of 15 s of CPU and more: a worker that begins one at the end is waited for."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first, for the workers to end together."""
+    place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(place)))
+
+
 @pytest.fixture(autouse=True)
 def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Look at each picture that is drawn, whichever test has it drawn (`legible`)."""
