@@ -25,7 +25,7 @@ COLORS: Final = (
     "#E69F00",
     "#000000",
 )
-DASHES: Final = (
+DASHES: Final[tuple[str | tuple[float, tuple[float, ...]], ...]] = (
     "-",
     "-",
     (0, (5, 1.5)),
