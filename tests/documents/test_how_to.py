@@ -5,7 +5,7 @@ A page is walked from top to bottom in a folder that has ``configs`` only:
 * a block that names a file, after the fence or in a line "`path`:" above it, becomes that file; if
   the repository has the file, the block must be quoted from it;
 * the commands of an ``sh`` block are run, if all are ``utank-hil`` or ``firmware-sim`` without a
-  bus, or ``sed``; a page with ``sh slow`` is a slow test, commands of ``exits-6`` end so;
+  bus, or ``sed``; those of ``sh slow`` in the slow tests only, those of ``exits-6`` end so;
 * other ``python`` blocks are run.
 """
 
@@ -64,19 +64,23 @@ def has_slow_steps(page: Path) -> bool:
 
 
 @pytest.mark.parametrize(
-    "page",
+    ("page", "slow"),
     [
-        pytest.param(page, id=page.stem, marks=[pytest.mark.slow] if has_slow_steps(page) else [])
-        for page in HOW_TO
+        *(pytest.param(page, False, id=page.stem) for page in HOW_TO),
+        *(
+            pytest.param(page, True, id=f"{page.stem}-slow", marks=pytest.mark.slow)
+            for page in HOW_TO
+            if has_slow_steps(page)
+        ),
     ],
 )
 def test_the_steps_of_a_page_work(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: Path, slow: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(ROOT / "configs", tmp_path / "configs")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    walk(page, tmp_path, slow=True)
+    walk(page, tmp_path, slow=slow)
 
 
 @pytest.mark.parametrize(
