@@ -1,7 +1,7 @@
 """All monitors of a controller node, fed once a tick; one of them is due in each tick.
 
-Motion, drive and twin are due every 50 ms, all else every 100 ms. So a tick pays for one of them,
-and the gates and the running integral of the rate are all that is done in every tick.
+Motion, drive, twin and volume are due every 50 ms, all else every 100 ms. So a tick pays for one of
+them, and the gates and the running integral of the rate are all that is done in every tick.
 """
 
 import math
@@ -254,18 +254,17 @@ class Monitors:
             self._look_at_twin(inbox, level_rate_m_s, excused=excused)
         elif phase == 3:
             self._look_at_water(now_ns, inbox, seen, held_pa)
-        elif phase == 4:
+        elif phase == 4 or phase == 9:
             if seen.tank_age_ms <= STALE_MS:
                 port_m, starboard_m = inbox.port_level_m, inbox.starboard_level_m
-                volume = self.volume.update(port_m, starboard_m, LONG_S)
+                volume = self.volume.update(port_m, starboard_m, SHORT_S)
                 stuck = self._port_stuck.update(port_m, starboard_m)
                 stuck |= self._starboard_stuck.update(starboard_m, port_m)
                 self._of_volume = volume | stuck if volume & _VOLUME else volume
-        elif phase == 8:
+        else:
             elapsed_s = (now_ns - self._senders_ns) * 1e-9
             self._senders_ns = now_ns
             self._of_senders = self._senders.update(inbox.foreign, elapsed_s)
-        else:
             self._of_saturation = self._saturation.update(
                 seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
             )
