@@ -276,6 +276,20 @@ def test_everything_is_looked_at_in_a_round() -> None:
         assert found & finding
 
 
+def test_the_levels_are_looked_at_every_50_ms() -> None:
+    """Seven looks in the memory of their noise were too few: some noise was found after 2 s."""
+    table, level_m = Table(), 0.05
+    table.say_levels(0.0, 0.0)
+    table.tick(ROUND_TICKS * TICK_S)
+    for _ in range(10):  # a sum that one look in two sees
+        table.say_levels(level_m, level_m)
+        table.tick(ROUND_TICKS / 2 * TICK_S)
+        sum_m = table.monitors.volume.sum_m
+        table.say_levels(0.0, 0.0)
+        table.tick(ROUND_TICKS / 2 * TICK_S)
+        assert table.monitors.volume.sum_m == pytest.approx(sum_m * (1 - 0.05 / 2.0))
+
+
 def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not() -> None:
     table = Table()
     foreign = min(set(range(100)) - CATALOGUE.can_ids)
