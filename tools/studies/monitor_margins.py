@@ -23,7 +23,7 @@ from utank_hil.runtime import Lockstep, SimulatedBus
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.finding import Finding
-from utank_hil.runtime.monitors.tank_equation import SIGN_GAIN, STUCK_GAIN
+from utank_hil.runtime.monitors.tank_equation import STUCK_GAIN
 from utank_hil.tick import TICK_NS
 
 LOOK_TICKS = 5
@@ -37,8 +37,8 @@ def shares(monitors: Monitors) -> dict[str, float]:
         "roll noise": monitors.motion.noise.share,
         "rate noise": monitors.rate_noise.share,
         "volume": abs(monitors.volume.sum_m) / limits.volume_m,
-        "roll sign": (1 - equation.roll_gain) / (1 - SIGN_GAIN),
-        "pump sign": (1 - equation.pump_gain) / (1 - SIGN_GAIN),
+        "roll sign": (1 - equation.roll_gain) / (1 - equation.sign_gain),
+        "pump sign": (1 - equation.pump_gain) / (1 - equation.sign_gain),
         "level stuck": (1 - equation.level_gain) / (1 - STUCK_GAIN),
         "motion late": equation.late_s / limits.motion_late_s,
         "drive": monitors.drive.late_pa / limits.pressure_error_pa,

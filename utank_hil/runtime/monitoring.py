@@ -364,7 +364,8 @@ class Monitors:
             for _ in range(steps):
                 self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
         told, equation = self._told_by_water, self._used.equation
-        self._used.water = water = equation.update(roll_rad, level_m, pressure_pa, steps) & told
+        water = equation.update(roll_rad, level_m, pressure_pa, steps, held_pa) & told
+        self._used.water = water
         self._note_watch(equation, elapsed_s, sound=not water)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
@@ -373,7 +374,8 @@ class Monitors:
             spare.restart_water()
         else:
             spare_rad = motions.spare.roll_rad
-            spare.water = spare.equation.update(spare_rad, level_m, pressure_pa, steps) & told
+            found = spare.equation.update(spare_rad, level_m, pressure_pa, steps, held_pa)
+            spare.water = found & told
         self._leave_accused(inbox, motions, seen, spare)
 
     def _note_watch(self, equation: TankEquation, elapsed_s: float, *, sound: bool) -> None:

@@ -26,11 +26,18 @@ EXACT = replace(
 
 
 def equation_of(
-    x: complex, p: complex, gain_x: float = 1.0, gain_p: float = 1.0, *, valve: bool = False
+    x: complex,
+    p: complex,
+    gain_x: float = 1.0,
+    gain_p: float = 1.0,
+    *,
+    valve: bool = False,
+    held: float = 0.0,
 ) -> tuple[TankEquation, Finding]:
     """After a minute in which roll and pump push the water by `x` and `p` times their gains.
 
-    Pushes are phasors at W, in m^2/s^2, as root mean squares behind the filters.
+    Pushes are phasors at W, in m^2/s^2, as root mean squares behind the filters. A valve holds
+    back a share `held` of `p`.
     """
     equation = TankEquation(SHIP, TANK, EXACT, STEP_S, valve=valve)
     x, p = x / FILTERED, p / FILTERED
@@ -38,7 +45,8 @@ def equation_of(
     found = 0
     for k in range(1200):
         turn = math.sqrt(2) * cmath.exp(1j * W * k * STEP_S)
-        found = equation.update(*((each * turn).real for each in phasors))
+        roll_rad, level_m, pressure_pa = ((each * turn).real for each in phasors)
+        found = equation.update(roll_rad, level_m, pressure_pa, held_pa=held * pressure_pa)
     return equation, Finding(found)
 
 
@@ -76,9 +84,13 @@ def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(
     assert said == found
 
 
-@pytest.mark.parametrize(("valve", "share"), [(False, 0.06), (True, 0.2)])
+@pytest.mark.parametrize(
+    ("valve", "held", "share", "pumps"),
+    [(False, 0.0, 0.06, 0.06), (True, 1.0, 0.306, 0.3), (True, 0.5, 0.162, 0.3),
+     (True, 0.0, 0.06, 0.3)],
+)  # fmt: skip
 def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
-    valve: bool, share: float
+    valve: bool, held: float, share: float, pumps: float
 ) -> None:
     """The sums swell and ebb by a fifth: what is far enough above or below is as said."""
     for times, told in ((0.75, False), (1.35, True)):
@@ -86,9 +98,9 @@ def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
             (times * LEAST, 0.0, "roll_gain"),
             (0.0, times * LEAST, "pump_gain"),
             (times * share * 60 * LEAST, 60j * LEAST, "roll_gain"),
-            (60j * LEAST, times * share * 60 * LEAST, "pump_gain"),
+            (60j * LEAST, times * pumps * 60 * LEAST, "pump_gain"),
         ):
-            equation, _ = equation_of(x, p, valve=valve)
+            equation, _ = equation_of(x, p, valve=valve, held=held)
             assert math.isfinite(getattr(equation, which)) is told, (which, times)
 
 

@@ -18,7 +18,8 @@ No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a
 pass. Something is found only if no constant of that size explains it.
 The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
 push is large enough, in itself and beside the other one: an error of the model of 3 % of a push
-sixteen times as large is half of it.
+sixteen times as large is half of it. What a valve holds back is known less well than what a pump
+presses: the roll's push has to be larger beside it.
 """
 
 import math
@@ -36,7 +37,7 @@ from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 SIGN_GAIN: Final = -0.25
 VALVE_SIGN_GAIN: Final = -0.5
-"""The same behind a valve: one that holds back half as much again as configured makes it -0.38."""
+"""The same behind a valve: one that holds back half as much again as configured makes it -0.23."""
 SETTLED: Final = 6.0
 """Time constants of the filters after which their start is forgotten."""
 STUCK_GAIN: Final = 0.3
@@ -48,8 +49,8 @@ LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
 """Of the least push: with less, noise looked like a delay in healthy hours of calm sea."""
 LEAST_SHARE: Final = 0.06
-VALVE_SHARE: Final = 0.2
-"""Of a push beside the other one; with what a valve holds back in that one."""
+VALVE_SHARE: Final = 0.3
+"""Of the roll's push beside what a valve holds back, of the pump's beside the roll's then."""
 FULL_SHARE: Final = 0.9
 """Of the tank's height: beyond, roof and bottom push too."""
 
@@ -135,6 +136,8 @@ class TankEquation:
         that speaks most for sound sensors.
     late_s : float
         Delay of the motion sensor, the same; NaN as long as the roll is too small to tell.
+    sign_gain : float
+        Gain below which a sign is wrong.
     obeyed : bool
         Whether roll or level gain is now of a size that no zeros of wrong sensors explain.
     settled : bool
@@ -150,8 +153,8 @@ class TankEquation:
         *,
         valve: bool = False,
     ) -> None:
-        self._least_share = (VALVE_SHARE if valve else LEAST_SHARE) ** 2
-        self._sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
+        self._pump_share = (VALVE_SHARE if valve else LEAST_SHARE) ** 2
+        self.sign_gain = VALVE_SIGN_GAIN if valve else SIGN_GAIN
         mass, _, stiffness = coupled_matrices(ship, tank)
         density = tank.density_kg_m3
         water_kg_m = density * tank.reservoir_area_m2
@@ -168,6 +171,7 @@ class TankEquation:
         self._level = DerivativeFilter(2 * frequency_rad_s, period_s)
         self._roll = DerivativeFilter(2 * frequency_rad_s, period_s)
         self._pump = DerivativeFilter(2 * frequency_rad_s, period_s)
+        self._held = DerivativeFilter(2 * frequency_rad_s, period_s) if valve else None
         self._settle = math.ceil(SETTLED / (2 * frequency_rad_s * period_s))
         self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.roll_period_s))
         self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.roll_period_s))
@@ -188,27 +192,42 @@ class TankEquation:
         """Begin anew after a gap."""
         self._wait = -1
         self.settled = self.obeyed = False
-        self._xx = self._pp = self._rest_x = self._rest_p = self._both = self._level_both = 0.0
+        self._xx = self._pp = self._vv = self._rest_x = self._rest_p = self._both = (
+            self._level_both
+        ) = 0.0
         self._x = self._p = self._left = self._weight = self._lead = self._d = self._dd = 0.0
         self._samples = self._still = 0
         self._roll_rad = math.inf
         self._unmoved = 0.0
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
 
-    def update(self, roll_rad: float, level_m: float, pressure_pa: float, steps: int = 1) -> int:
+    def update(
+        self,
+        roll_rad: float,
+        level_m: float,
+        pressure_pa: float,
+        steps: int = 1,
+        held_pa: float = 0.0,
+    ) -> int:
         """Take a sample of all three; return what was found.
 
-        Between two samples that are some `steps` apart all three are taken to run straight.
+        Between two samples that are some `steps` apart all three are taken to run straight. The
+        pressure is that on the water, with what a valve holds back, `held_pa`, taken off.
         """
+        held, push, held_m2_s2 = self._held, pressure_pa / self._density, held_pa / self._density
         if self._wait < 0:
             self._roll.start(roll_rad)
             self._level.start(level_m)
-            self._pump.start(pressure_pa / self._density)
+            self._pump.start(push)
+            if held is not None:
+                held.start(held_m2_s2)
             self._wait = self._settle
             return 0
         found = 0
-        level, roll, pump, push = self._level, self._roll, self._pump, pressure_pa / self._density
+        level, roll, pump = self._level, self._roll, self._pump
         for left in range(steps, 0, -1):
+            if held is not None:
+                held.update(held.last + (held_m2_s2 - held.last) / left)
             found = self._take(
                 roll.last + (roll_rad - roll.last) / left,
                 level.last + (level_m - level.last) / left,
@@ -239,6 +258,8 @@ class TankEquation:
         self._pp = pp = keep * self._pp + p * p
         self._rest_x = keep * self._rest_x + (y - p) * x
         self._rest_p = keep * self._rest_p + (y - x) * p
+        if self._held is not None:
+            self._vv = keep * self._vv + self._held.value * self._held.value
         self._both = both = keep * self._both + push * push
         self._level_both = keep * self._level_both + y * push
         left = y - push
@@ -261,23 +282,23 @@ class TankEquation:
     def _judge(self, xx: float, pp: float, both: float, dd: float) -> int:
         found = 0
         self.obeyed = False
-        share, zero = self._least_share, self._zero
+        zero = self._zero
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
-        if xx > self._least_xx and xx > share * pp:
+        if xx > self._least_xx and xx > LEAST_SHARE**2 * pp + VALVE_SHARE**2 * self._vv:
             feigned = zero * abs(self._x)
             self.roll_gain = gain = (self._rest_x + feigned) / xx
             self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
-            if gain < self._sign_gain:
+            if gain < self.sign_gain:
                 found = _WATER_SIGN
-        if pp > self._least_pp and pp > share * xx:
+        if pp > self._least_pp and pp > self._pump_share * xx:
             self.pump_gain = gain = (self._rest_p + zero * abs(self._p)) / pp
-            if gain < self._sign_gain:
+            if gain < self.sign_gain:
                 found |= _PUMP_SIGN
         if both > self._least_xx + self._least_pp:
             feigned = zero * abs(self._x + self._p)
             self.level_gain = gain = (self._level_both + feigned) / both
             self.obeyed = self.obeyed or self._level_both - feigned > STUCK_GAIN * both
-            if gain < self._sign_gain:
+            if gain < self.sign_gain:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
