@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import signal
 import threading
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
@@ -45,6 +46,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the longest files first, for the workers to end together."""
     place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(place)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _signals_reach_the_processes_of_tests() -> None:
+    """Ignored signals, as under `nohup`, are inherited; a handler that does nothing is not."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 @pytest.fixture(autouse=True)
