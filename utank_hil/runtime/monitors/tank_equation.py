@@ -192,9 +192,8 @@ class TankEquation:
         """Begin anew after a gap."""
         self._wait = -1
         self.settled = self.obeyed = False
-        self._xx = self._pp = self._vv = self._rest_x = self._rest_p = self._both = (
-            self._level_both
-        ) = 0.0
+        self._xx = self._pp = self._vv = self._rest_x = self._rest_p = 0.0
+        self._both = self._level_both = 0.0
         self._x = self._p = self._left = self._weight = self._lead = self._d = self._dd = 0.0
         self._samples = self._still = 0
         self._roll_rad = math.inf
