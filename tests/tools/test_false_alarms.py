@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ from scipy.stats import gumbel_r
 
 from tools.evidence.sources import ROOT
 from tools.studies import false_alarms
-from tools.studies.false_alarms import by_monitor, hours, judged, rate_per_hour, sail
+from tools.studies.false_alarms import by_monitor, code, hours, judged, rate_per_hour, sail
 
 
 def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
@@ -43,6 +44,7 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
         return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
 
     monkeypatch.setattr(false_alarms, "CACHE", tmp_path)
+    monkeypatch.setattr(false_alarms, "RECORD", tmp_path / "false_alarms.json")
     monkeypatch.setattr(false_alarms, "margins", margins)
     sea, scenario = next(iter(hours("adaptive_gpc")))
     assert len(sail("adaptive_gpc", sea, scenario, 2)) == 2
@@ -50,17 +52,52 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     assert ordered == [(seed, seed % 2 == 0) for seed in range(1, 7)]
     assert [run["largest"]["drift"] for run in runs] == pytest.approx(0.1 * np.arange(1, 7))
     row = judged("adaptive_gpc", sea, runs)
-    assert (row["hours"], row["worst"], row["found_in_hours"]) == (6, "drift", {"DRIFT": 1})
+    assert (row["hours"], row["worst"], row["found_in_hours"]) == (6, "drift", {"DRIFT": [2]})
+    assert row["maxima"]["drift"] == pytest.approx(0.1 * np.arange(1, 7))
+
+
+def test_hours_of_the_record_are_gone_on_from_if_they_are_of_this_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sailed = []
+
+    def margins(scenario: Any, name: str, seed: int, seconds: float) -> dict[str, Any]:
+        sailed.append(seed)
+        return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
+
+    monkeypatch.setattr(false_alarms, "margins", margins)
+    monkeypatch.setattr(false_alarms, "RECORD", tmp_path / "false_alarms.json")
+    sea, scenario = next(iter(hours("gpc")))
+    monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "first")
+    row = judged("gpc", sea, sail("gpc", sea, scenario, 3))
+    for of, more in ((code(), [4, 5]), ("another", [1, 2, 3, 4, 5])):
+        record = {"result": {"code": of, "runs": [row]}}
+        (tmp_path / "false_alarms.json").write_text(json.dumps(record))
+        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / of)
+        sailed.clear()
+        whole = judged("gpc", sea, sail("gpc", sea, scenario, 5))
+        assert sailed == more
+        assert whole["maxima"]["drift"] == [0.1, 0.2, 0.3, 0.4, 0.5]
+        assert whole["found_in_hours"] == {"DRIFT": [2]}
 
 
 def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:
     rows = [
-        {"law": "gpc", "maxima": {"drift": [0.2, 0.4]}},
-        {"law": "dpc", "maxima": {"drift": [0.6], "noise": [0.1]}},
-        {"law": "pd", "maxima": {"drift": [5.0]}},
+        {
+            "law": law,
+            "sea": sea,
+            "hours": len(maxima["drift"]),
+            "maxima": maxima,
+            "rate_per_hour": rates,
+        }
+        for law, sea, maxima, rates in (
+            ("self_tuned", "storm", {"drift": [0.2, 0.4]}, {"drift": 0.1}),
+            ("dpc", "voyage", {"drift": [0.6], "noise": [0.1]}, {"drift": 0.3, "noise": 0.0}),
+            ("pd", "calm", {"drift": [5.0]}, {"drift": 1.0}),
+            ("self_tuned", "voyage", {"drift": [6.0]}, {"drift": 1.0}),
+        )
     ]
-    found = by_monitor(rows)
-    assert {name: (each["hours"], each["largest"]) for name, each in found.items()} == {
-        "drift": (3, 0.6),
-        "noise": (1, 0.1),
+    assert by_monitor(rows) == {
+        "drift": {"hours": 3, "largest": 0.6, "rate_per_hour": pytest.approx(0.2)},
+        "noise": {"hours": 1, "largest": 0.1, "rate_per_hour": 0.0},
     }

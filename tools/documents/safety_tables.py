@@ -30,7 +30,7 @@ def false_alarms(result: dict[str, Any]) -> Rows:
     seas = list(dict.fromkeys(run["sea"] for run in result["runs"]))
     found: dict[str, dict[str, str]] = {}
     for run in result["runs"]:
-        words = [f"{name} in {hours}" for name, hours in run["found_in_hours"].items()]
+        words = [f"{name} in {len(hours)}" for name, hours in run["found_in_hours"].items()]
         found.setdefault(run["law"], {})[run["sea"]] = f"{', '.join(words) or 'none'}"
     return [
         ["law", *seas],
