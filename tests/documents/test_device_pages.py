@@ -151,7 +151,7 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
     [
         ("sensor", "no good SENSOR_MOTION | 40 ms", LIMITS.motion_age_ms),
         ("sensor", "no good SENSOR_TANK | 100 ms; 1 s", LIMITS.tank_degraded_age_ms),
-        ("sensor", "no good SENSOR_PUMP | 1 s", LIMITS.pump_age_ms),
+        ("sensor", "no good SENSOR_PUMP | 200 ms; 1 s", LIMITS.pump_degraded_age_ms),
         ("sensor", "no HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
         ("drive", "DRIVE_STATUS_1 silent | 60 ms", LIMITS.drive_age_ms),
         ("drive", "the echo stands still | 100 ms", LIMITS.echo_age_ms),
