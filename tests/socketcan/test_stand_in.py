@@ -36,24 +36,26 @@ def commands(folder: Path) -> dict[str, list[str]]:
 def arm_with_stand_in(folder: Path) -> tuple[dict[str, object], Candump]:
     """Until the pump works; the ship's report and the log."""
     said = commands(folder)
-    sensors = subprocess.Popen([sys.executable, *said["python"][1:]])
-    try:
-        with (
-            closing(Candump(folder)) as candump,
-            watched() as watcher,
-            closing(Program(folder, *said["firmware-sim"], "--duration", 1200, "--json")) as ship,
-            closing(Program(folder, *said["utank-hil"], "--json")) as controller,
-        ):
-            watcher.wait_in_charge(PRESSURE_PA)
-            watcher.watch(1.0)
-            assert watcher.mode is Mode.ACTIVE
-            assert sensors.poll() is None
-            controller.end()
-            report, notes = ship.end()
-        assert "emulated: drive, panel" in notes
-    finally:
-        sensors.send_signal(signal.SIGINT)
-        assert sensors.wait(60) == 0
+    with closing(Candump(folder)) as candump:
+        sensors = subprocess.Popen([sys.executable, *said["python"][1:]])
+        try:
+            with (
+                watched() as watcher,
+                closing(
+                    Program(folder, *said["firmware-sim"], "--duration", 1200, "--json")
+                ) as ship,
+                closing(Program(folder, *said["utank-hil"], "--json")) as controller,
+            ):
+                watcher.wait_in_charge(PRESSURE_PA)
+                watcher.watch(1.0)
+                assert watcher.mode is Mode.ACTIVE
+                assert sensors.poll() is None
+                controller.end()
+                report, notes = ship.end()
+            assert "emulated: drive, panel" in notes
+        finally:
+            sensors.send_signal(signal.SIGINT)
+            assert sensors.wait(60) == 0
     return report, candump
 
 
@@ -65,7 +67,10 @@ def test_controller_works_with_sensors_that_know_nothing_of_this_repository(
     rolls = [frame.signals["roll_rad"] for frame in log if frame.name == "SENSOR_MOTION"]
     # the stand-in's ship, of one degree, and no emulated sensor's in the storm
     assert 0.015 < max(map(abs, rolls)) < 0.018
-    assert not [frame for frame in log if frame.name == "ADDRESS_CLAIM_SENSORS"]
+    # the stand-in's, which comes before all else of it, and no emulated sensor's
+    own = [frame.name for frame in log if frame.name != "PUMP_CMD"]
+    assert own[0] == "ADDRESS_CLAIM_SENSORS"
+    assert own.count("ADDRESS_CLAIM_SENSORS") == 1
     commands = [frame.signals["pressure_pa"] for frame in log if frame.name == "PUMP_CMD"]
     assert max(map(abs, commands)) > PRESSURE_PA
     pump = report["pump"]
