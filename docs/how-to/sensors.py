@@ -44,8 +44,9 @@ def measurements(time_s: float) -> dict[str, dict[str, float]]:
 
 def protected(message: Message, signals: dict[str, float], counter: int) -> bytes:
     """The eight bytes of a frame: CRC-8, polynomial 0x2F, over bytes 1 to 7 and the data ID."""
-    # not strict: what is not available is beyond a signal's range
-    data = message.encode({**signals, "crc": 0, "counter": counter}, strict=False)
+    # a measurement out of its range is an error; error counts that are not available are so, too
+    strict = not message.name.startswith("HEARTBEAT")
+    data = message.encode({**signals, "crc": 0, "counter": counter}, strict=strict)
     assert message.dbc is not None
     data_ids = bytes.fromhex(str(message.dbc.attributes["DataIDs"].value))
     crc = 0xFF
