@@ -46,6 +46,14 @@ def test_the_valve_of_a_ship_that_was_found_is_kept(tmp_path: Path) -> None:
     assert load_config(files["vessel"], Vessel).valve == vessel.valve
 
 
+def test_the_least_gm_of_a_ship_that_was_found_is_still_watched(tmp_path: Path) -> None:
+    vessel = load_config(CONFIG, ControllerConfig).vessel
+    ship = dataclasses.replace(vessel.ship, displacement_n=1.42e8)
+    watched = vessel.model_copy(update={"ship": ship, "least_gm_m": 0.7})
+    files = IdentifiedShips(tmp_path, watched, read_controller(CONFIG)).write(FOUND)
+    assert load_config(files["vessel"], Vessel).least_gm_m == 0.7
+
+
 def test_ship_found_later_is_written_beside_the_earlier(tmp_path: Path) -> None:
     keep = ships(tmp_path)
     pairs = [keep.write(FOUND) for _ in range(5)]

@@ -97,7 +97,7 @@ def noisy_table(times: float) -> tuple[Table, int, int]:
         roll_rad, rate_rad_s = random.standard_normal(2) * (2e-4, 5e-4) * noise
         table.say_roll(roll_rad, rate_rad_s)
         found |= table.tick()
-    return table, found, table.monitors.gates.discarded
+    return table, found, table.monitors.gates.motions[0].discarded
 
 
 def test_samples_that_noise_has_discarded_are_no_spikes() -> None:

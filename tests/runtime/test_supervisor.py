@@ -90,6 +90,7 @@ SIGNS: list[tuple[Fault, Reaction, dict[str, object]]] = [
     (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.ROLL_STUCK}),
     (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.RATE_STUCK}),
     (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.LEVEL_STUCK}),
+    (Fault.STUCK_SIGNAL, Reaction.RAMP, {"found": Finding.MOTION_REPEATS}),
     (Fault.DRIFT, Reaction.RAMP, {"found": Finding.DRIFT_LASTS}),
     (Fault.VOLUME, Reaction.RAMP, {"found": Finding.VOLUME_LASTS}),
     (Fault.SPIKES, Reaction.RAMP, {"found": Finding.SPIKES}),

@@ -56,29 +56,63 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     assert row["maxima"]["drift"] == pytest.approx(0.1 * np.arange(1, 7))
 
 
-def test_hours_of_the_record_are_gone_on_from_if_they_are_of_this_code(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("of", "factor", "found", "more"),
+    [
+        ("", 1.0, "DRIFT", [4, 5]),
+        # of another code: the second once more, and all of them if it is another
+        ("another", 1.0, "DRIFT", [2, 4, 5]),
+        ("another", 1.001, "DRIFT", [2, 1, 2, 3, 4, 5]),
+        ("another", 1.0, "SPIKES", [2, 1, 2, 3, 4, 5]),
+    ],
+)
+def test_hours_of_the_record_are_gone_on_from_if_this_code_makes_the_same(
+    of: str,
+    factor: float,
+    found: str,
+    more: list[int],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    sailed = []
+    sailed: list[int] = []
+    now = {"factor": 1.0, "found": "DRIFT"}
 
     def margins(scenario: Any, name: str, seed: int, seconds: float) -> dict[str, Any]:
         sailed.append(seed)
-        return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
+        finds = {now["found"]: 3.0} if seed == 2 else {}
+        return {"largest": {"drift": 0.1 * seed * now["factor"]}, "found_s": finds}
 
     monkeypatch.setattr(false_alarms, "margins", margins)
     monkeypatch.setattr(false_alarms, "RECORD", tmp_path / "false_alarms.json")
     sea, scenario = next(iter(hours("gpc")))
     monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "first")
     row = judged("gpc", sea, sail("gpc", sea, scenario, 3))
-    for of, more in ((code(), [4, 5]), ("another", [1, 2, 3, 4, 5])):
-        record = {"result": {"code": of, "runs": [row]}}
-        (tmp_path / "false_alarms.json").write_text(json.dumps(record))
-        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / of)
+    assert row["hours_of_code"] == {code(): 3}
+    del row["hours_of_code"]
+    record = {"result": {"code": of or code(), "runs": [row]}}
+    (tmp_path / "false_alarms.json").write_text(json.dumps(record))
+    monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "then")
+    sailed.clear()
+    now.update(factor=factor, found=found)
+    whole = judged("gpc", sea, sail("gpc", sea, scenario, 5))
+    assert sailed == more
+    kept = len(more) < 4
+    assert whole["hours_of_code"] == ({of: 3, code(): 2} if of and kept else {code(): 5})
+    factors = [1.0 if kept and hour <= 3 else factor for hour in range(1, 6)]
+    drift = [0.1 * hour * each for hour, each in enumerate(factors, 1)]
+    assert whole["maxima"]["drift"] == pytest.approx(drift, abs=1e-4)
+    assert whole["found_in_hours"] == {found: [2]}
+    # a record that was gone on from says of each hour what it is of
+    if of and kept:
+        (tmp_path / "false_alarms.json").write_text(
+            json.dumps({"result": {"code": "a third", "runs": [whole]}})
+        )
+        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "later")
         sailed.clear()
-        whole = judged("gpc", sea, sail("gpc", sea, scenario, 5))
-        assert sailed == more
-        assert whole["maxima"]["drift"] == [0.1, 0.2, 0.3, 0.4, 0.5]
-        assert whole["found_in_hours"] == {"DRIFT": [2]}
+        assert judged("gpc", sea, sail("gpc", sea, scenario, 5)) == whole
+        assert sailed == [2]
+        # nor is a law kept that the record does not have
+        assert false_alarms.recorded("dpc", sea, lambda _: {}) == []
 
 
 def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:

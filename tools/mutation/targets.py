@@ -100,10 +100,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "motion.roll_rate_rad_s) and (gate is None or gate.passes(motion.roll_rad, "
         "motion.roll_rate_rad_s, now_ns)):": _SUM,
         "Inbox._on_motion: if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and "
-        "(self._gates is None or self._gates.motion.passes(motion.roll_rad, "
+        "(self._gates is None or self._gates.motions[0].passes(motion.roll_rad, "
         "motion.roll_rate_rad_s, now_ns)): -> if math.isfinite(motion.roll_rad - "
         "motion.roll_rate_rad_s) and (self._gates is None or "
-        "self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
+        "self._gates.motions[0].passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)):": _SUM,
         "Inbox._on_tank: if abs(port_m - starboard_m) <= 2 * self._most_level_m and "
         "abs(port_m + starboard_m) <= self._most_sum_m and (self._gates is None or "
         "self._gates.levels_pass(port_m, starboard_m, now_ns)): -> if abs(port_m - "
@@ -267,6 +267,17 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "self._sum_rad = keep * (self._sum_rad - left_rad)": "the same sum with the other sign",
         "RollAgainstRate.update: if abs(summed_rad) < 0.5 * limit_rad: -> "
         "if abs(summed_rad) <= 0.5 * limit_rad:": _NEVER_THERE,
+    },
+    "utank_hil/runtime/monitors/repetition.py": {
+        ": MIXED: Final = 7.0 -> MIXED: Final = 8.75": "any mixture is as good",
+        "Repetition.take: sample = roll_rad + MIXED * rate_rad_s -> "
+        "sample = roll_rad - MIXED * rate_rad_s": "any mixture is as good",
+        "Repetition.take: if before is not None or self._lag: -> if True:": _SHORTCUT,
+        "Repetition._follow: if self._lag and kept[place - self._lag] == sample: -> "
+        "if kept[place - self._lag] == sample:": "without a lag it is the oldest sample's place",
+        "Repetition._follow: self._lag = 0 if before is None else (place - before) % len(kept) or "
+        "len(kept) -> self._lag = 1 if before is None else (place - before) % len(kept) or "
+        "len(kept)": "no sample counts that is the last",
     },
     "utank_hil/runtime/monitors/motion_watch.py": {
         "MotionWatch.__init__: self._last_rate_rad_s = 0.0 -> self._last_rate_rad_s = 1.0": (
@@ -435,6 +446,7 @@ TARGETS = (
         ("tests/runtime/monitors/test_motion_sums.py",),
         ("tests/runtime/monitors/test_roll_against_rate.py",),
     ),
+    Target(f"{_MONITORS}/repetition.py", ("tests/runtime/monitors/test_repetition.py",)),
     Target(f"{_MONITORS}/motion_watch.py", ("tests/runtime/monitors/test_motion_watch.py",)),
     Target(f"{_MONITORS}/motion_pair.py", ("tests/runtime/monitors/test_motion_pair.py",)),
     Target(f"{_MONITORS}/thresholds.py", ("tests/runtime/monitors/test_thresholds.py",)),

@@ -115,6 +115,8 @@ def _write(
 def _vessel_content(vessel: Vessel) -> dict[str, Any]:
     """What a vessel's file holds; values at their defaults are left out."""
     content: dict[str, Any] = {"name": f"{vessel.name.removesuffix(', identified')}, identified"}
+    if vessel.least_gm_m is not None:
+        content["least_gm_m"] = vessel.least_gm_m
     for key in ("ship", "tank", "pump", "valve", "redundancy"):
         part = getattr(vessel, key)
         if part is None or part == NO_REDUNDANCY:

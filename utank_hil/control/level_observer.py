@@ -19,6 +19,9 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 LONGEST_GAP_S: Final = 1.0
 """After a longer one the model says nothing any more: a fresh start at the measured level."""
 
+BANDWIDTH_RAD_S: Final = 6.0
+"""Poles of the observer in continuous time; the level itself moves below 1 rad/s."""
+
 
 class LevelObserver:
     """Observer of the level with both poles at the same place (critically damped).
@@ -27,8 +30,6 @@ class LevelObserver:
     ----------
     period_s : float
         Time between two measurements.
-    bandwidth_rad_s : float
-        Poles of the observer in continuous time; the level itself moves below 1 rad/s.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class LevelObserver:
     Raises
     ------
     ValueError
-        If the period or the bandwidth is not positive.
+        If the period is not positive.
 
     References
     ----------
@@ -46,12 +47,10 @@ class LevelObserver:
     2001, section 6.5.
     """
 
-    def __init__(self, tank: Tank, period_s: float, bandwidth_rad_s: float = 6.0) -> None:
-        if not (period_s > 0 and bandwidth_rad_s > 0):
-            raise ValueError(
-                f"period_s and bandwidth_rad_s must be positive, got {period_s}, {bandwidth_rad_s}"
-            )
-        pole = math.exp(-bandwidth_rad_s * period_s)
+    def __init__(self, tank: Tank, period_s: float) -> None:
+        if not period_s > 0:
+            raise ValueError(f"period_s must be positive, got {period_s}")
+        pole = math.exp(-BANDWIDTH_RAD_S * period_s)
         self._period_s = period_s
         self._pole = pole
         self._alpha = 1.0 - pole**2

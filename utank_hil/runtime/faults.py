@@ -421,13 +421,18 @@ FAULTS: Final = (
     ),
     _row(
         Fault.STUCK_SIGNAL,
-        "Roll, roll rate or level stands still although the ship moves.",
-        "Check the motion sensor and the level gauges.",
+        "Roll, roll rate or level stands still although the ship moves, or roll and rate repeat.",
+        "Check the motion sensor, the level gauges and whatever passes their messages on.",
         _found(
             Reaction.RAMP,
             "roll or rate still while the other one moves, both while the water does, or level "
             "still while it is pushed",
             Finding.ROLL_STUCK | Finding.RATE_STUCK | Finding.LEVEL_STUCK,
+        ),
+        _found(
+            Reaction.RAMP,
+            "32 samples of roll and rate in a row equal to those of an earlier time",
+            Finding.MOTION_REPEATS,
         ),
     ),
     _row(

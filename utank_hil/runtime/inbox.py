@@ -252,7 +252,7 @@ class Inbox:
         # one test for both: the sum is NaN if either is not available
         if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
             self._gates is None
-            or self._gates.motion.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
+            or self._gates.motions[0].passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
         ):
             self.roll_rad, self.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
             self.motion_ns = now_ns

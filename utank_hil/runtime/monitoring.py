@@ -123,13 +123,12 @@ class Monitors:
         self._water_free = plant.valve is None
         self._told_by_water = ~0 if self._water_free else _WATER_SIGN
         self._compares = compares
-        gates = self.gates.motions if second_motion else (None, None)
         first, second = [
             SensorEvidence(
                 MotionWatch(thresholds, gate),
                 TankEquation(ship, tank, thresholds, LONG_S, valve=not self._water_free),
             )
-            for gate in gates
+            for gate in self.gates.motions
         ]
         self._of_first = self._used = first
         self._spare = second if second_motion else None
@@ -268,7 +267,7 @@ class Monitors:
             self._of_saturation = self._saturation.update(
                 seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
             )
-            noisy = (self._used.watch.found | self._of_volume) & _NOISE
+            noisy = self._of_volume & _NOISE
             if self._spikes.update(self.gates.discarded, LONG_S) and not noisy:
                 self._of_saturation |= _SPIKES
         used = self._used

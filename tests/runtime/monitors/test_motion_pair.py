@@ -9,6 +9,7 @@ from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.motion_pair import MotionPair, SensorEvidence
 from utank_hil.runtime.monitors.motion_watch import MotionWatch
+from utank_hil.runtime.monitors.spikes import MotionGate
 from utank_hil.runtime.monitors.tank_equation import TankEquation
 
 PERIOD_S = 10.0
@@ -34,7 +35,9 @@ class Pair:
         self.pair = MotionPair(BOUNDS, step_s)
         assert self.pair.unclear is False
         self.used, self.spare = (
-            SensorEvidence(MotionWatch(BOUNDS), TankEquation(SHIP, TANK, BOUNDS, 0.1))
+            SensorEvidence(
+                MotionWatch(BOUNDS, MotionGate(BOUNDS)), TankEquation(SHIP, TANK, BOUNDS, 0.1)
+            )
             for _ in range(2)
         )
 
@@ -162,7 +165,7 @@ def test_what_is_evidence_against_a_motion_sensor(finding: Finding) -> None:
     pair = Pair()
     speaks = finding.name in {
         "MOTION_SIGN", "ROLL_STUCK", "RATE_STUCK", "DRIFT", "DRIFT_LASTS", "NOISE", "SPIKES",
-        "WATER_SIGN", "MOTION_LATE",
+        "WATER_SIGN", "MOTION_LATE", "MOTION_REPEATS",
     }  # fmt: skip
     for said in ((int(finding), 0), (0, int(finding))):
         pair.used.watch.found, pair.used.water = said

@@ -27,7 +27,7 @@ def turn(watch: MotionWatch, t: float, jerk: float = 0.0) -> float:
 
 
 def test_rates_held_for_a_tick_each_make_the_trapezoid_of_a_rate_that_grows_evenly() -> None:
-    watch, last_rad = MotionWatch(LOOSE), 0.0
+    watch, last_rad = MotionWatch(LOOSE, MotionGate(THRESHOLDS)), 0.0
     assert (watch.turned_rad, watch.found) == (0.0, 0)
     watch.update(0.0, 0.1, STEP_S, stale=False)
     for k in range(40):
@@ -47,7 +47,7 @@ def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(
     share: float, found: int
 ) -> None:
     """Of a rate that goes to and fro by a it is 4 a."""
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1))
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1), MotionGate(THRESHOLDS))
     a = share * math.sqrt(6) * 0.1 / 4
     for k in range(10):
         watch.update(0.0, a * (-1) ** k, 0.7, stale=False)
@@ -61,9 +61,9 @@ def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(
         assert watch.rate_noise.power == 0.0
 
 
-def spiked(spikes: int, rate_noise_rad_s: float, *, gated: bool = True) -> int:
+def spiked(spikes: int, rate_noise_rad_s: float) -> int:
     gate = MotionGate(THRESHOLDS)
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=rate_noise_rad_s), gate if gated else None)
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=rate_noise_rad_s), gate)
     gate.passes(0.0, 0.0, 0)
     for k in range(spikes):
         gate.passes(0.0, 9.0, k)
@@ -76,12 +76,25 @@ def spiked(spikes: int, rate_noise_rad_s: float, *, gated: bool = True) -> int:
 def test_spikes_of_its_gate_are_found_unless_they_are_noise() -> None:
     assert spiked(4, 100.0) == 0
     assert spiked(5, 100.0) == Finding.SPIKES
-    assert spiked(5, 100.0, gated=False) == 0
     assert spiked(4, 1e-3) == spiked(5, 1e-3) == Finding.NOISE
 
 
+def test_samples_that_repeat_are_found_beside_the_noise() -> None:
+    gate = MotionGate(THRESHOLDS)
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1), gate)
+    for k in range(60):
+        gate.passes(1e-3 * (k % 16), 0.0, 0)
+        watch.update(0.0, (-1) ** k, 0.7, stale=False)
+        assert watch.found & ~Finding.NOISE == (Finding.MOTION_REPEATS if k >= 16 + 32 else 0)
+    assert watch.found & Finding.NOISE
+    watch.update(0.0, 0.0, 0.7, stale=True)
+    assert watch.found == 0
+
+
 def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None:
-    watch = MotionWatch(replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1))
+    watch = MotionWatch(
+        replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1), MotionGate(THRESHOLDS)
+    )
     for k in range(10):
         watch.update(0.1 * k, (-1) ** k, 0.7, stale=False)
     assert watch.found & Finding.DRIFT

@@ -86,8 +86,8 @@ def test_the_level_has_a_gain_where_only_both_pushes_together_are_large_enough(
 
 @pytest.mark.parametrize(
     ("valve", "held", "share", "pumps"),
-    [(False, 0.0, 0.06, 0.06), (True, 1.0, 0.306, 0.3), (True, 0.5, 0.162, 0.3),
-     (True, 0.0, 0.06, 0.3)],
+    [(False, 0.0, 0.06, 0.06), (True, 1.0, 0.306, 0.2), (True, 0.5, 0.162, 0.2),
+     (True, 0.0, 0.06, 0.2)],
 )  # fmt: skip
 def test_a_push_that_is_small_in_itself_or_beside_the_other_tells_nothing(
     valve: bool, held: float, share: float, pumps: float

@@ -15,6 +15,7 @@ class Finding(IntFlag):
     WATER_SIGN = auto()
     PUMP_SIGN = auto()
     MOTION_LATE = auto()
+    MOTION_REPEATS = auto()
     NOISE = auto()
     SPIKES = auto()
     VOLUME = auto()

@@ -1,8 +1,8 @@
 """Which of two motion sensors is used, and what is found of the pair.
 
 They are compared by the low-passed differences of roll and rate. Which of the two is wrong says
-each one's own evidence: its roll against its rate, its noise and spikes, and the tank's equation
-with its roll. What once spoke against a sensor counts until both agree again.
+each one's own evidence: its roll against its rate, its noise, spikes and repetition, and the tank's
+equation with its roll. What once spoke against a sensor counts until both agree again.
 
     in use             the other          then
     silent             heard, none        the other is used, and half the pressure (the inbox)
@@ -45,6 +45,7 @@ EVIDENCE: Final = int(
     | Finding.SPIKES
     | Finding.WATER_SIGN
     | Finding.MOTION_LATE
+    | Finding.MOTION_REPEATS
 )
 _DISAGREE: Final = int(Finding.SENSORS_DISAGREE)
 _UNCLEAR: Final = int(Finding.SENSORS_UNCLEAR)

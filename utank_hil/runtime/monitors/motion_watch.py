@@ -10,6 +10,7 @@ from utank_hil.runtime.monitors.spikes import MotionGate, SpikeCount
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 from utank_hil.tick import TICK_S
 
+_REPEATS: Final = int(Finding.MOTION_REPEATS)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 
@@ -20,8 +21,8 @@ class MotionWatch:
     Parameters
     ----------
     thresholds : MonitorThresholds
-    gate : MotionGate, optional
-        Whose discarded samples count here.
+    gate : MotionGate
+        Through which its samples pass.
 
     Attributes
     ----------
@@ -33,7 +34,7 @@ class MotionWatch:
         Bits of `Finding`.
     """
 
-    def __init__(self, thresholds: MonitorThresholds, gate: MotionGate | None = None) -> None:
+    def __init__(self, thresholds: MonitorThresholds, gate: MotionGate) -> None:
         self.motion = RollAgainstRate(thresholds)
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
@@ -57,10 +58,10 @@ class MotionWatch:
         found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
         if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
             found |= _NOISE
-        if (
-            self._gate is not None
-            and self._spikes.update(self._gate.discarded, elapsed_s)
-            and not found & _NOISE  # whose largest samples are discarded, too
-        ):
+        gate = self._gate
+        # the largest samples of noise are discarded, too
+        if self._spikes.update(gate.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
+        if gate.repetition.found:
+            found |= _REPEATS
         self.found = found

@@ -2,10 +2,14 @@
 
 from typing import Final
 
+from utank_hil.runtime.monitors.repetition import Repetition
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
+from utank_hil.tick import TICK_S
 
 STEP_SAMPLES: Final = 5
 """So many in a row are no spike but a step, which is taken."""
+REPEATS_WITHIN_PERIODS: Final = 1 / 3
+"""Of the roll's. No motion of a ship worth mentioning comes again so soon, even without noise."""
 
 
 class SpikeGate:
@@ -47,14 +51,22 @@ class SpikeGate:
 
 
 class MotionGate:
-    """The gates of one motion sensor."""
+    """The gates of one motion sensor, where each of its samples is seen.
+
+    Attributes
+    ----------
+    repetition : Repetition
+    """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
+        remembered_s = REPEATS_WITHIN_PERIODS * thresholds.roll_period_s
+        self.repetition = Repetition(round(remembered_s / TICK_S))
         self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
         self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
 
     def passes(self, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
         """Whether a sample may be used."""
+        self.repetition.take(roll_rad, rate_rad_s)
         # both see every sample
         return self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
 
@@ -65,18 +77,15 @@ class MotionGate:
 
 
 class SpikeGates:
-    """The gates of the motion sensor and of the level gauges.
+    """The gates of the motion sensors and of the level gauges.
 
     Attributes
     ----------
-    motion : MotionGate
-        Of the only motion sensor.
     motions : tuple of MotionGate
-        Of both where there are two, of which the first is not `motion`.
+        Of the first sensor, and of the second where there is one.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
-        self.motion = MotionGate(thresholds)
         self.motions = MotionGate(thresholds), MotionGate(thresholds)
         self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
         self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
@@ -87,8 +96,8 @@ class SpikeGates:
 
     @property
     def discarded(self) -> int:
-        """Samples of the only motion sensor and of the gauges so far that did not pass."""
-        return self.motion.discarded + self._port.discarded + self._starboard.discarded
+        """Samples of the gauges so far that did not pass."""
+        return self._port.discarded + self._starboard.discarded
 
 
 class SpikeCount:

@@ -49,8 +49,11 @@ LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
 """Of the least push: with less, noise looked like a delay in healthy hours of calm sea."""
 LEAST_SHARE: Final = 0.06
-VALVE_SHARE: Final = 0.3
-"""Of the roll's push beside what a valve holds back, of the pump's beside the roll's then."""
+"""Of one push beside the other one."""
+VALVE_SHARE: Final = 0.2
+"""Of the pump's push beside the roll's, where there is a valve."""
+HELD_SHARE: Final = 0.3
+"""Of the roll's push beside what a valve holds back."""
 FULL_SHARE: Final = 0.9
 """Of the tank's height: beyond, roof and bottom push too."""
 
@@ -283,7 +286,7 @@ class TankEquation:
         self.obeyed = False
         zero = self._zero
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
-        if xx > self._least_xx and xx > LEAST_SHARE**2 * pp + VALVE_SHARE**2 * self._vv:
+        if xx > self._least_xx and xx > LEAST_SHARE**2 * pp + HELD_SHARE**2 * self._vv:
             feigned = zero * abs(self._x)
             self.roll_gain = gain = (self._rest_x + feigned) / xx
             self.obeyed = self._rest_x - feigned > STUCK_GAIN * xx
