@@ -16,6 +16,8 @@ from utank_hil.canbus import (
     PumpCommand,
     Quality,
     SensorMotion,
+    ValveCommand,
+    ValveControl,
     load_catalogue,
 )
 from utank_hil.canbus.enumerations import Address
@@ -102,6 +104,14 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
             {"control_word": ControlWord.ENABLE_OPERATION, "pressure_pa": 12000.0},
         ),
         (
+            "valve",
+            "VALVE_CMD",
+            3,
+            {"control": 1, "opening": 0.4, "timeout_s": 0.05},
+            ValveCommand,
+            {"control": ValveControl.FOLLOW, "opening": pytest.approx(0.4)},
+        ),
+        (
             "panel",
             "OPERATOR_CMD",
             9,
@@ -139,9 +149,9 @@ def test_frames_of_the_other_pages_are_right(
 
 def test_cycles_of_the_pages_are_the_catalogues() -> None:
     found = []
-    for page in ("sensor", "drive", "panel"):
+    for page in ("sensor", "drive", "valve", "panel"):
         found += re.findall(r"^\| ([A-Z_0-9]+)(?:, \w+)? \| (\d+) ms", text(page), re.M)
-    assert len(found) == 12
+    assert len(found) == 14
     for name, cycle in found:
         assert DATABASE.get_message_by_name(name).cycle_time == int(cycle), name
 
@@ -156,6 +166,10 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
         ("drive", "DRIVE_STATUS_1 silent | 60 ms", LIMITS.drive_age_ms),
         ("drive", "the echo stands still | 100 ms", LIMITS.echo_age_ms),
         ("drive", "out of OPERATION_ENABLED while active | 40 ms", LIMITS.drive_enabled_within_ms),
+        ("valve", "VALVE_STATUS silent | 60 ms", LIMITS.valve_age_ms),
+        ("valve", "the echo stands still | 100 ms", LIMITS.valve_echo_age_ms),
+        ("valve", "not FOLLOWING while active | 100 ms", LIMITS.valve_follows_within_ms),
+        ("valve", "by `opening_time_s` | 300 ms", LIMITS.valve_off_within_ms),
         ("panel", "silent, before arming | 600 ms", LIMITS.panel_age_to_arm_ms),
         ("panel", "silent, while armed | 5 s", LIMITS.panel_age_armed_ms),
         ("panel", "No CTRL_STATUS for 300 ms", SILENT_NS / 1e6),

@@ -618,7 +618,7 @@ def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
         for _ in range(times):
             say(SPIKE)
     assert [gate.discarded for gate in gates.motions] == [1, 3]
-    assert gates.discarded == 0
+    assert gates.levels_discarded == 0
 
 
 def test_the_stream_of_the_motion_sensor_in_use_counts_for_the_protection() -> None:

@@ -268,7 +268,7 @@ class Monitors:
                 seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
             )
             noisy = self._of_volume & _NOISE
-            if self._spikes.update(self.gates.discarded, LONG_S) and not noisy:
+            if self._spikes.update(self.gates.levels_discarded, LONG_S) and not noisy:
                 self._of_saturation |= _SPIKES
         used = self._used
         self.found = found = (

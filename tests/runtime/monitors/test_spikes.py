@@ -76,8 +76,9 @@ def test_levels_each_have_a_gate_and_what_they_discard_is_counted() -> None:
         assert gates.levels_pass(port_m, starboard_m, after_ns) is (discarded == 0)
         for gate in gates.motions:
             gate.passes(0.0, 0.0, 0)
-            assert not gate.passes(9.0, 9.0, 0)  # counted by the sensor's watch
-        assert gates.discarded == discarded
+            assert not gate.passes(9.0, 9.0, 0)
+        assert gates.levels_discarded == discarded
+        assert gates.discarded == discarded + 4
 
 
 @pytest.mark.parametrize(("new", "found"), [(4, [False]), (5, [True, False]),

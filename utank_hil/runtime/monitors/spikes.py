@@ -96,7 +96,12 @@ class SpikeGates:
 
     @property
     def discarded(self) -> int:
-        """Samples of the gauges so far that did not pass."""
+        """Samples of all of them so far that did not pass."""
+        return self.levels_discarded + sum(gate.discarded for gate in self.motions)
+
+    @property
+    def levels_discarded(self) -> int:
+        """Those of the gauges."""
         return self._port.discarded + self._starboard.discarded
 
 
