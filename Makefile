@@ -4,8 +4,6 @@ PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 # a worker on each core; a file's tests stay together, for their fixtures; the longest files first
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile --no-loadscope-reorder
-# half of what the tests on vcan0 take: two emulated kernels side by side
-LONG_ON_VCAN := $(addprefix tests/socketcan/test_,retuning.py real_time_bench.py refused_retuning.py)
 PEERS := .cache/peers
 PEERS_READY := $(PEERS)/.ready
 # extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it
@@ -17,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test tests-on-host tests-on-vcan-long tests-on-vcan test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
+.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -67,18 +65,9 @@ check: setup
 
 test: setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
-	$(MAKE) --no-print-directory --jobs=3 --output-sync=target tests-on-host tests-on-vcan-long tests-on-vcan
+	$(PARALLEL) -m "not socketcan and not evidence"
+	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan
 	$(PYTHON) -m tools.mutation.run --not-judged --within 60
-
-# those on a bus keep real time, and mostly wait: beside them the others have what is left
-tests-on-host: setup
-	nice -n 19 $(PARALLEL) -m "not socketcan and not evidence"
-
-tests-on-vcan-long: setup
-	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" $(LONG_ON_VCAN)
-
-tests-on-vcan: setup
-	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan $(addprefix --ignore=,$(LONG_ON_VCAN))
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few
