@@ -11,11 +11,13 @@ from cantools.database.can import Database
 from utank_hil.canbus import (
     ControlWord,
     Frame,
+    HardwiredInputs,
     Mode,
     OperatorCommand,
     PumpCommand,
     Quality,
     SensorMotion,
+    Switch,
     ValveCommand,
     ValveControl,
     load_catalogue,
@@ -112,6 +114,14 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
             {"control": ValveControl.FOLLOW, "opening": pytest.approx(0.4)},
         ),
         (
+            "hardwired",
+            "HARDWIRED_INPUTS",
+            4,
+            {"port_high": 0, "starboard_high": 0, "stop_loop": 1, "quality": 0},
+            HardwiredInputs,
+            {"port_high": Switch.OFF, "starboard_high": Switch.OFF, "stop_loop": Switch.ON},
+        ),
+        (
             "panel",
             "OPERATOR_CMD",
             9,
@@ -149,7 +159,7 @@ def test_frames_of_the_other_pages_are_right(
 
 def test_cycles_of_the_pages_are_the_catalogues() -> None:
     found = []
-    for page in ("sensor", "drive", "valve", "panel"):
+    for page in ("sensor", "drive", "valve", "hardwired", "panel"):
         found += re.findall(r"^\| ([A-Z_0-9]+)(?:, \w+)? \| (\d+) ms", text(page), re.M)
     assert len(found) == 14
     for name, cycle in found:
@@ -162,7 +172,7 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
         ("sensor", "no good SENSOR_MOTION | 40 ms", LIMITS.motion_age_ms),
         ("sensor", "no good SENSOR_TANK | 100 ms; 1 s", LIMITS.tank_degraded_age_ms),
         ("sensor", "no good SENSOR_PUMP | 200 ms; 1 s", LIMITS.pump_degraded_age_ms),
-        ("sensor", "no HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
+        ("hardwired", "no good HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
         ("drive", "DRIVE_STATUS_1 silent | 60 ms", LIMITS.drive_age_ms),
         ("drive", "the echo stands still | 100 ms", LIMITS.echo_age_ms),
         ("drive", "out of OPERATION_ENABLED while active | 40 ms", LIMITS.drive_enabled_within_ms),
