@@ -616,6 +616,33 @@ def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before(
     assert Fault.MOTION_SILENT in bench.node.alarms.codes
 
 
+def test_a_high_level_switch_is_an_alarm_from_the_start_however_short() -> None:
+    bench = ControllerBench(START_NS)
+    bench.silent.add(SensorMotion)
+    bench.run(1000)
+    bench.tank = bench.tank._replace(port_high=Switch.ON)
+    bench.run(200)
+    assert bench.node.mode is Mode.INIT
+    assert bench.node.alarms.codes == {Fault.LEVEL_LIMIT}
+    bench.tank = bench.tank._replace(port_high=Switch.OFF)
+    bench.run(3000)
+    assert bench.node.alarms.codes == {Fault.LEVEL_LIMIT}  # nobody has accepted it
+
+
+@pytest.mark.parametrize("phase", range(10))
+def test_what_halves_the_pressure_for_a_single_tick_is_an_alarm(phase: int) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(20e3)
+    bench.run(10 * phase)
+    bench.silent.add(SensorTank)
+    while not bench.node.supervisor.degraded:
+        bench.tick()
+    bench.silent.clear()
+    bench.run(300)
+    assert not bench.node.supervisor.degraded
+    assert bench.node.alarms.codes == {Fault.TANK_SILENT}
+
+
 def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     refused: list[Fault] = []
     bench = ControllerBench(START_NS)

@@ -164,6 +164,49 @@ def gap(length_s: float, every_s: float = 4.0) -> Callable[[float], float]:
     return lambda time_s: max(1000 * (length_s - (-time_s) % every_s), 0.0)
 
 
+class Reversed(MovingShip):
+    """Whose motion sensor has both signs, or that of the rate, wrong."""
+
+    def __init__(self, roll: float, rate: float) -> None:
+        super().__init__(math.radians(2.0), 5e3, noise=False)
+        self._signs = roll, rate
+
+    def roll_rad(self, t: float) -> float:
+        return self._signs[0] * super().roll_rad(t)
+
+    def rate_rad_s(self, t: float) -> float:
+        return self._signs[1] * super().rate_rad_s(t)
+
+
+@pytest.mark.parametrize(
+    ("signs", "found"),
+    [((-1, -1), Finding.WATER_SIGN), ((1, -1), Finding.MOTION_SIGN)],
+)
+def test_water_that_was_seen_to_disobey_has_to_obey_anew(
+    signs: tuple[int, int], found: Finding
+) -> None:
+    table = Table()
+    moved(table, ROLLING, 30.0)
+    assert table.monitors.confirmed
+    assert found in moved(table, Reversed(*signs), 60.0)
+    assert not table.monitors.confirmed
+    moved(table, MovingShip(0.0, 0.0, noise=False), 300.0)
+    assert not table.monitors.confirmed
+    moved(table, ROLLING, 60.0)
+    assert table.monitors.confirmed
+
+
+class Fading(MovingShip):
+    """Comes to rest slowly."""
+
+    def __init__(self, since_s: float) -> None:
+        super().__init__(math.radians(2.0), 5e3, noise=False)
+        self._since_s = since_s
+
+    def _at(self, phasor: complex, time_s: float, noise: float) -> float:
+        return super()._at(phasor, time_s, noise) * math.exp((self._since_s - time_s) / 40.0)
+
+
 def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
     table = Table()
     moved(table, ROLLING, 5.0)
@@ -173,9 +216,9 @@ def test_the_water_has_to_obey_before_it_counts_as_watched() -> None:
     still = Table()
     moved(still, MovingShip(0.0, 0.0, noise=False), 100.0)
     assert not still.monitors.confirmed
-    moved(still, ROLLING, 10.0)
+    moved(still, ROLLING, 40.0)  # so sudden a motion looks late at first
     assert still.monitors.confirmed
-    moved(still, MovingShip(0.0, 0.0, noise=False), 100.0)
+    moved(still, Fading(still.now_ns * 1e-9), 300.0)
     assert still.monitors.confirmed  # water at rest is watched, too
 
 
@@ -306,6 +349,32 @@ def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
     twin = table.monitors.twin
     assert twin.rms_rad == pytest.approx(twin.ship_rms_rad, rel=1e-9)
     assert table.monitors.twin_message().twin_rms_rad == twin.rms_rad
+
+
+@pytest.mark.parametrize("command_pa", [0.0, 5e3])
+def test_twin_of_a_pump_whose_pressure_sensor_is_silent_takes_the_command(
+    command_pa: float,
+) -> None:
+    """The last pressure measured stays in the inbox."""
+    heard, silent = Table(), Table()
+    for k in range(3000):
+        for table, last_pa, age_ms in ((heard, command_pa, 0.0), (silent, -10e3, 101.0)):
+            table.inbox.roll_rad = 0.05 * np.sin(0.6 * TICK_S * k)
+            table.inbox.pressure_pa = last_pa
+            table.tick(pump_age_ms=age_ms, command_pa=command_pa)
+    assert silent.monitors.twin.roll_rad == heard.monitors.twin.roll_rad
+    assert silent.monitors.twin.rms_rad == heard.monitors.twin.rms_rad
+
+
+def test_a_roll_that_is_not_measured_any_more_is_not_compared() -> None:
+    table = Table()
+    table.inbox.roll_rad = 0.05
+    table.tick(120.0)
+    assert math.isfinite(table.monitors.twin.share)
+    table.tick(0.05, motion_age_ms=100.0)
+    assert math.isfinite(table.monitors.twin.share)
+    table.tick(0.05, motion_age_ms=101.0)
+    assert math.isnan(table.monitors.twin.share)
 
 
 def found_of(**changes: float) -> ModelSummary:

@@ -23,16 +23,18 @@ class Table:
         self.now_ns += (1 + late_ticks) * TICK_NS
         self.observer.observe(self.now_ns, 0)
 
+    def measure(self, roll_rad: float, seconds: float = TICK_S) -> None:
+        self.inbox.roll_rad = roll_rad
+        for _ in range(round(seconds / TICK_S)):
+            self.inbox.motion_ns = self.now_ns
+            self.tick()
+
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: float) -> None:
     table = Table()
-    table.inbox.motion_ns = 0
-    for _ in range(round(60.0 / TICK_S)):
-        table.tick()
-    table.inbox.roll_rad = sign * 0.1
-    for _ in range(round(60.0 / TICK_S)):
-        table.tick()
+    table.measure(0.0, 60.0)
+    table.measure(sign * 0.1, 60.0)
     assert HEEL_TIME_CONSTANT_S == 60.0
     assert table.seen.heel_rad == pytest.approx(sign * 0.1 * (1 - math.exp(-1)), rel=1e-3)
 
@@ -42,17 +44,29 @@ def test_in_the_first_minute_heel_is_the_mean_of_what_was_measured_and_of_ten_se
     table.inbox.roll_rad = 0.3  # nobody measured it
     table.tick()
     assert table.seen.heel_rad == 0.0
-    table.inbox.motion_ns = table.now_ns
     rolls = [0.3 + 0.2 * math.sin(0.005 * k) for k in range(round(50.0 / TICK_S) + 1)]
     for count, roll_rad in enumerate(rolls, 1):
-        table.inbox.roll_rad = roll_rad
-        table.tick()
+        table.measure(roll_rad)
         mean_rad = sum(rolls[:count]) / (count + 10.0 / TICK_S - 1)
         assert table.seen.heel_rad == pytest.approx(mean_rad, rel=1e-9)
     # and from then on each sample has the same share
-    table.inbox.roll_rad = table.seen.heel_rad + 1.0
-    table.tick()
+    table.measure(table.seen.heel_rad + 1.0)
     assert table.inbox.roll_rad - table.seen.heel_rad == pytest.approx(1.0 - TICK_S / 60.0)
+
+
+def test_a_roll_that_is_not_measured_any_more_is_no_heel() -> None:
+    table = Table()
+    table.measure(0.0, 60.0)
+    table.measure(0.2)
+    for _ in range(9):
+        table.tick()
+    counted_rad = table.seen.heel_rad
+    assert table.seen.motion_age_ms == 100.0
+    for _ in range(12_000):
+        table.tick()
+    assert table.seen.heel_rad == counted_rad
+    table.measure(0.0)
+    assert table.seen.heel_rad < counted_rad
 
 
 def test_link_is_lost_for_a_command_cycle_after_an_error() -> None:

@@ -203,3 +203,12 @@ def test_disarming_out_of_sequence_ramps_down_and_the_old_arm_bit_does_not_arm_a
     bench.run(1000)  # the arm bit is set in all that follows
     assert bench.node.mode is Mode.PASSIVE
     assert bench.pressure_pa == 0.0
+
+
+def test_accepted_frames_that_say_something_new_are_counted() -> None:
+    line = Line()
+    for said, changes in (({}, 0), ({}, 0), ({"reset": True}, 1), ({"reset": True}, 1), ({}, 2)):
+        line.say(**said)  # type: ignore[arg-type]
+        assert line.orders.receiver.changes == changes
+    line.say(stop=True, corrupt=True)
+    assert line.orders.receiver.changes == 2

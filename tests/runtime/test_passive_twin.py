@@ -128,6 +128,37 @@ def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
     assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
 
 
+def gz_table(points: int) -> RollShip:
+    """Patti-B with her softening curve as a table of righting levers."""
+    step_rad, displacement_n = math.radians(10.0), 2.366e6
+    angle_rad = step_rad * np.arange(points)
+    gz_m = 0.2138 * angle_rad - 0.6713 * angle_rad**3
+    return replace(
+        PATTI.ship, restoring_odd_nm=(), displacement_n=displacement_n,
+        gz_step_rad=step_rad, gz_m=tuple(gz_m.tolist()),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("ship", [PATTI.ship, gz_table(5), gz_table(8)], ids=["odd", "5", "8"])
+@pytest.mark.parametrize("pressure_pa", [3.3e3, -10e3, 20e3])
+def test_twin_that_capsizes_by_a_pressure_that_is_not_hers_begins_anew(
+    ship: RollShip, pressure_pa: float
+) -> None:
+    twin = PassiveTwin(ship, PATTI.tank, STEP_S, LEAST_RAD)
+    period_s = 2 * math.pi / PATTI.tank.natural_frequency_rad_s
+    capsized = 0
+    for k in range(round(600.0 / STEP_S)):
+        twin.update(0.05 * math.sin(0.5 * k * STEP_S), 0.0, 0.0, pressure_pa)
+        capsized += twin._losing_s <= 0.051 - 6.0 * period_s
+        assert abs(twin.roll_rad) < 1.1
+        assert not twin.amplified
+    assert capsized >= 1
+    # and it judges again once the pressure is right
+    for k in range(round(60 * period_s / STEP_S)):
+        twin.update(0.05 * math.sin(0.5 * k * STEP_S), 0.0, 0.0, 0.0)
+    assert twin.share == pytest.approx(1 / AMPLIFIED, rel=0.05)
+
+
 def made_by_pump(t: np.ndarray, phasor_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pressure whose steady roll at 0.6 rad/s is `phasor_rad`, and the roll that it makes."""
     ship, tank, w = FIRST.ship, FIRST.tank, 0.6

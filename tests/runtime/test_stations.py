@@ -164,6 +164,18 @@ def test_a_station_that_takes_the_command_without_the_arm_bit_disarms() -> None:
     assert bench.node.mode is Mode.PASSIVE
 
 
+def test_what_the_one_in_command_disarms_stays_so_when_the_other_takes_it_in_that_tick() -> None:
+    bench = active_bench()
+    bench.order_is(arm=False, mode_request=Mode.STANDBY)
+    # it could not know of it
+    bench.second_is(arm=True, mode_request=Mode.ACTIVE, take_command=True)
+    bench.run(100)
+    assert bench.node.mode is Mode.PASSIVE
+    assert bench.station is Station.OPERATOR_2
+    bench.run(1000)
+    assert bench.node.mode is Mode.PASSIVE
+
+
 def test_a_take_that_was_held_since_before_its_first_frame_is_none() -> None:
     bench = Bench()
     bench.second = IDLE._replace(take_command=True)

@@ -33,7 +33,7 @@ from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.judging import first_stopping
+from utank_hil.runtime.judging import all_halving, first_stopping
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
@@ -399,9 +399,11 @@ class ControllerNode:
     def _note_causes(self, now_ns: int) -> None:
         """Keep what may be gone before alarms are looked at, ten times a second."""
         supervisor, seen = self.supervisor, self.seen
-        # in ACTIVE it is latched
-        if supervisor.mode is not _ACTIVE and first_stopping(seen, supervisor.limits):
-            self._passing |= all_stopping(supervisor, seen)
+        if supervisor.mode is not _ACTIVE:
+            if first_stopping(seen, supervisor.limits):
+                self._passing |= all_stopping(supervisor, seen)
+        elif supervisor.degraded:  # what stops it is latched
+            self._passing |= all_halving(seen, supervisor.limits)
         if supervisor.raised is not _NO_FAULT:
             self.alarms.raise_anew(supervisor.raised, supervisor.mode, now_ns)
 
@@ -535,9 +537,10 @@ class ControllerNode:
         )
         for code in self.inbox.stations.take_accepted():
             alarms.accept(code, mode, now_ns)
+        active = self._passing
         if self._alarming:
-            active = active_faults(supervisor, self.seen, self._law_fault) | self._passing
-            alarms.update(active, mode, now_ns)
+            active = active | active_faults(supervisor, self.seen, self._law_fault)
+        alarms.update(active, mode, now_ns)
         self._passing.clear()
         refused_by = supervisor.reset_refused_by
         if refused_by is not self._refused_by:

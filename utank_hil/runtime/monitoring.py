@@ -61,6 +61,7 @@ _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
 _WATER_SIGN: Final = int(Finding.WATER_SIGN)
+_MOTION_SIGN: Final = int(Finding.MOTION_SIGN)
 _VOLUME: Final = int(Finding.VOLUME)
 _UNWATCHED: Final = int(Finding.UNWATCHED)
 _UNWATCHED_LONG: Final = int(Finding.UNWATCHED | Finding.UNWATCHED_LONG)
@@ -250,7 +251,7 @@ class Monitors:
                 limited=inbox.drive_held_back,
             )
         elif phase == 2 or phase == 7:
-            self._look_at_twin(inbox, level_rate_m_s, excused=excused)
+            self._look_at_twin(inbox, seen, level_rate_m_s, excused=excused)
         elif phase == 3:
             self._look_at_water(now_ns, inbox, seen, held_pa)
         elif phase == 4 or phase == 9:
@@ -336,11 +337,15 @@ class Monitors:
         self._used, self._spare = spare, used
         return used
 
-    def _look_at_twin(self, inbox: Inbox, level_rate_m_s: float, *, excused: bool) -> None:
+    def _look_at_twin(
+        self, inbox: Inbox, seen: Observations, level_rate_m_s: float, *, excused: bool
+    ) -> None:
         twin = self.twin
-        if excused or self._pair.unclear:
+        if excused or self._pair.unclear or seen.motion_age_ms > STALE_MS:
             twin.excuse()
-        twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, inbox.pressure_pa)
+        # the last pressure that was measured may have ended long ago
+        pressure_pa = inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else seen.command_pa
+        twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
 
     def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations, held_pa: float) -> None:
@@ -365,7 +370,8 @@ class Monitors:
         told, equation = self._told_by_water, self._used.equation
         water = equation.update(roll_rad, level_m, pressure_pa, steps, held_pa) & told
         self._used.water = water
-        self._note_watch(equation, elapsed_s, sound=not water)
+        wrong = water or self._used.watch.found & _MOTION_SIGN
+        self._note_watch(equation, elapsed_s, sound=not wrong)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
             return
@@ -389,7 +395,7 @@ class Monitors:
         if unwatched:
             self._of_watch = _UNWATCHED_LONG if self._unwatched_s > longest_s else _UNWATCHED
         known = self.confirmed and not unwatched and elapsed_s <= shortest_s
-        self.confirmed = known or (sound and equation.obeyed)
+        self.confirmed = sound and (known or equation.obeyed)
 
 
 def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:

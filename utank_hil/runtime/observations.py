@@ -6,7 +6,6 @@ from typing import Final
 
 from utank_hil.canbus.enumerations import DriveFault, DriveState, Mode
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.tick import TICK_NS, TICK_S
 
@@ -19,6 +18,8 @@ HEEL_TIME_CONSTANT_S: Final = 60.0
 HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
 FIRST_HEEL_S: Final = 10.0
 """At the start the heel is zero as if it had been measured for so long: no first roll is a heel."""
+HEEL_AGE_MS: Final = 100.0
+"""An older roll says nothing of the heel."""
 CONFLICT_NS: Final = 10_000_000_000
 """A second sender of the controller's address is gone when it has been silent for so long."""
 _ALL_LATE: Final = 0x3FF
@@ -237,7 +238,7 @@ class Observer:
             hardwired.stop_heard = False
             seen.hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
         seen.roll_rad = inbox.roll_rad
-        if inbox.motion_ns > NEVER_HEARD_NS:
+        if seen.motion_age_ms <= HEEL_AGE_MS:
             # at first the mean of all that was measured, and of zeros: a heel is soon known
             seen.heel_rad += self._heel_share * (inbox.roll_rad - seen.heel_rad)
             self._heel_share = max(self._heel_share / (1.0 + self._heel_share), HEEL_SHARE)

@@ -103,6 +103,7 @@ class Orders:
             undo or (order.undo and not before.undo),
             forbidden or order.forbid_retuning,
         )
+        self.receiver.changes += order != before
         self.last, self.heard_ns = order, now_ns
         asked = order.mode_request
         self.requested_mode = Mode.STANDBY if asked is None else asked

@@ -47,6 +47,8 @@ RECORD_PERIODS: Final = 12.0
 RECORD: Final = 1.1
 """Own roll over the twin's that a law has lost by over so many roll periods, too. In the lull after
 a group of waves, two laws came to 1.34 and 1.28 over six periods, to 1.05 over twelve at most."""
+MOST_MADE_RAD: Final = 1.0
+"""Roll that no pump makes: a pressure was wrong, and the comparison begins anew."""
 LASTS_PERIODS: Final = 0.25
 """The memory of the mean squares is the patience: longer, and a bad law only rolls her longer."""
 
@@ -154,6 +156,9 @@ class PassiveTwin:
             other = level_rate_m_s - float(made[3])
             effort[2] = -self._loss * (abs(level_rate_m_s) * level_rate_m_s - abs(other) * other)
         made[:4] = self._step @ made
+        if not abs(float(made[0])) < MOST_MADE_RAD:
+            made[:4] = 0.0
+            self.excuse()
         self.roll_rad = twin_rad = roll_rad - float(made[0])
         self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
         self._twin_mean_rad += self._mean_share * (twin_rad - self._twin_mean_rad)

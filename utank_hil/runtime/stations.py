@@ -65,7 +65,9 @@ class Stations:
             station for station, orders in self.orders.items() if orders is self._leads
         )
         self._leads.take_retuning()  # what was pressed without the command was no order
-        return Wishes(other.armed, stop, arm_edge=False, reset_edge=False)
+        # what either has disarmed since the last call stays disarmed
+        armed = wishes.armed and other.armed
+        return Wishes(armed, stop, arm_edge=False, reset_edge=False)
 
     def take_retuning(self) -> RetuningOrder:
         """Return what the station in command ordered of the retuning since the last call."""

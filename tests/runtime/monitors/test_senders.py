@@ -15,6 +15,7 @@ class Counted:
     cycle_ns: int = 10_000_000
     heard: int = 0
     lost: int = 0
+    changes: int = 0
     can_id: int = 1
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
 
@@ -151,6 +152,35 @@ def test_second_sender_doubles_the_pace(cycle_ms: int, within_s: float) -> None:
     found_s = first_found(20, 0, cycle_ms)
     assert found_s is not None
     assert found_s <= within_s
+
+
+def panel(frames_per_s: float, changes_per_s: float, rejected_per_s: float = 0.0) -> float | None:
+    """When a panel's stream is found, that sends on changes of its levers beside its cycle."""
+    counted = Counted(200_000_000)
+    senders = Senders([Stream(counted)], 1700.0)
+    for k in range(1, 600):
+        counted.heard = int(frames_per_s * k * STEP_S)
+        counted.changes = int(changes_per_s * k * STEP_S)
+        counted.rejected[Rejection.REPEATED] = int(rejected_per_s * k * STEP_S)
+        if senders.update(0, STEP_S) & Finding.SECOND_SENDER:
+            return k * STEP_S
+    return None
+
+
+@pytest.mark.parametrize("changes_per_s", [2, 5, 20])
+def test_frames_on_a_change_may_come_beside_the_cycle(changes_per_s: int) -> None:
+    assert panel(5 + changes_per_s, changes_per_s) is None
+    assert panel(5 + changes_per_s, 0) is not None
+
+
+def test_changes_are_no_excuse_for_a_flood_nor_for_a_second_sender() -> None:
+    flood_s = panel(100, 95)
+    assert flood_s is not None
+    assert flood_s < 0.5
+    # two panels that contradict each other: of each pair one frame is rejected
+    second_s = panel(10, 5, rejected_per_s=5)
+    assert second_s is not None
+    assert second_s < 3.0
 
 
 def test_counter_that_skips_runs_ahead_of_the_cycle() -> None:

@@ -6,7 +6,9 @@ comes from a node that is broken, or is none of the sender's.
 A message's counter and its cycle tell the same time. Frames that were heard, good or bad, and
 frames that its counter says were lost add up to one a cycle. With a second sender of the same
 identifier it is twice as many, with a counter that skips more. What is above 1.25 a cycle is
-summed; eight frames are too many.
+summed; eight frames are too many. A panel sends one more frame on each change of its levers. Up to
+twenty a second of these are not counted. Of two senders with one identifier, frames are rejected:
+so many of the changes are counted all the same.
 
 CAN loses no frame: what disturbs it, it sends again. A gateway, or a slow receiver, may. Single
 frames do no harm, but two pump commands in succession let the drive's timeout of 50 ms go: once in
@@ -25,6 +27,8 @@ from utank_hil.runtime.monitors.finding import Finding
 
 MOST_PER_CYCLE: Final = 1.25
 MOST_FRAMES: Final = 8.0
+MOST_CHANGES_PER_S: Final = 20.0
+"""A panel looks at its levers every 50 ms."""
 LEAST_PER_CYCLE: Final = 0.75
 SLOW_S: Final = 2.0
 BURST_CYCLES: Final = 8.0
@@ -53,6 +57,7 @@ class Heard(Protocol):
     cycle_ns: int
     heard: int
     lost: int
+    changes: int
     rejected: dict[Rejection, int]
 
 
@@ -87,6 +92,7 @@ class Stream:
         receiver = self._receiver
         self._heard, self._lost = receiver.heard, receiver.lost
         self._damaged = receiver.rejected[_CRC]
+        self._changes, self._rejected = receiver.changes, sum(receiver.rejected.values())
 
     def update(self, elapsed_s: float) -> int:
         """Judge what came since the last call; return what was found."""
@@ -101,6 +107,8 @@ class Stream:
         self._damaged = damaged
         cycles = self._cycles_per_s * elapsed_s
         excess = self.excess + came - MOST_PER_CYCLE * cycles
+        if receiver.changes:
+            excess -= self._on_change(elapsed_s)
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
         self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
@@ -119,6 +127,14 @@ class Stream:
         if missing > MOST_LOST or self._slow_s > SLOW_S:
             found |= _LOST
         return found | _SILENT if self._silent_s > self._silent_limit_s else found
+
+    def _on_change(self, elapsed_s: float) -> float:
+        """Frames since the last call that may come on top of the cycle's."""
+        receiver = self._receiver
+        rejected = sum(receiver.rejected.values())
+        extra = (receiver.changes - self._changes) - (rejected - self._rejected)
+        self._changes, self._rejected = receiver.changes, rejected
+        return min(max(extra, 0), MOST_CHANGES_PER_S * elapsed_s)
 
 
 class Senders:

@@ -21,11 +21,6 @@ class SpikeGate:
         Distance from the last sample, noise included, that is always near enough.
     most_per_s : float
         So much more for each second since then.
-
-    Attributes
-    ----------
-    discarded : int
-        Samples so far that did not pass.
     """
 
     def __init__(self, spike: float, most_per_s: float) -> None:
@@ -34,7 +29,6 @@ class SpikeGate:
         self._value = 0.0
         self._value_ns = -(1 << 62)
         self._in_a_row = 0
-        self.discarded = 0
 
     def passes(self, value: float, now_ns: int) -> bool:
         """Take a sample; return whether it may be used."""
@@ -46,7 +40,6 @@ class SpikeGate:
             self._in_a_row = 0
             return True
         self._in_a_row += 1
-        self.discarded += 1
         return False
 
 
@@ -56,6 +49,8 @@ class MotionGate:
     Attributes
     ----------
     repetition : Repetition
+    discarded : int
+        Samples so far that did not pass, by their roll or by their rate.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
@@ -63,17 +58,15 @@ class MotionGate:
         self.repetition = Repetition(round(remembered_s / TICK_S))
         self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
         self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
+        self.discarded = 0
 
     def passes(self, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
         """Whether a sample may be used."""
         self.repetition.take(roll_rad, rate_rad_s)
         # both see every sample
-        return self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
-
-    @property
-    def discarded(self) -> int:
-        """Samples so far that did not pass."""
-        return self._roll.discarded + self._rate.discarded
+        passes = self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
+        self.discarded += not passes
+        return passes
 
 
 class SpikeGates:
@@ -83,26 +76,26 @@ class SpikeGates:
     ----------
     motions : tuple of MotionGate
         Of the first sensor, and of the second where there is one.
+    levels_discarded : int
+        Samples of the gauges so far that did not pass, by either level.
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self.motions = MotionGate(thresholds), MotionGate(thresholds)
         self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
         self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self.levels_discarded = 0
 
     def levels_pass(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
         """Whether a sample of the level gauges may be used."""
-        return self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
+        passes = self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
+        self.levels_discarded += not passes
+        return passes
 
     @property
     def discarded(self) -> int:
         """Samples of all of them so far that did not pass."""
         return self.levels_discarded + sum(gate.discarded for gate in self.motions)
-
-    @property
-    def levels_discarded(self) -> int:
-        """Those of the gauges."""
-        return self._port.discarded + self._starboard.discarded
 
 
 class SpikeCount:
