@@ -272,6 +272,22 @@ def test_stopped_by_the_operator_it_is_not_passed(
     assert "was not passed" in reason(file)
 
 
+def test_who_arms_before_the_stage_asks_for_it_is_told_to_wait(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    class Early(AtTheQuay):
+        script = (
+            TimedAction(1.0, Action.ARM),
+            TimedAction(2.0, Action.DISARM),
+            *AtTheQuay.script,
+        )
+
+    assert commission(monkeypatch, Early, file).exit_code == ExitCode.OK
+    said = capfd.readouterr().err
+    assert said.count("not armed: wait until this asks for it") == 1
+    assert "NOT_COMMISSIONED" not in said
+
+
 def test_a_place_that_is_not_writable_is_named_before_the_ship_is_moved(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -234,6 +234,24 @@ def test_what_can_not_be_done_is_said_with_its_reason(
     assert said in result.stderr
 
 
+@pytest.mark.parametrize("name", ["a.log", "a.csv"])
+@pytest.mark.parametrize("damage", ["cut at byte", "damaged at byte"])
+def test_a_log_that_is_not_whole_is_exported_up_to_there_and_that_is_said(
+    tmp_path: Path, name: str, damage: str
+) -> None:
+    content = bytearray(LOG.read_bytes())
+    content[-20] ^= 1
+    broken = tmp_path / "broken.frames"
+    broken.write_bytes(content[:-20] if "cut" in damage else content)
+    result = invoke(export, broken, "--to", tmp_path / name, "--json")
+    assert result.exit_code == 0
+    assert f"broken.frames is {damage}" in json.loads(result.stdout)["cut"]
+    assert f"broken.frames is {damage}" in result.stderr
+    assert "left out" in result.stderr
+    whole = invoke(export, LOG, "--to", tmp_path / f"whole-{name}", "--json")
+    assert json.loads(whole.stdout)["cut"] == whole.stderr == ""
+
+
 def test_a_recording_without_frames_names_the_log_beside_it(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
     write_recording(file, ("time_s", "roll_rad"), {"dpc": np.zeros((3, 2))})

@@ -1,6 +1,7 @@
 """The keyboard of the panel: obeys at once, on a pipe too, and shows the controller in words."""
 
 import contextlib
+import errno
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -97,7 +98,51 @@ def test_a_line_is_obeyed_when_it_is_whole_or_the_pipe_is_closed(table: Table) -
     for _ in range(3):
         assert not table.look()  # a closed pipe only ends the typing
     assert table.order.stop
-    assert table.said == ["stop"]
+    assert table.said == ["stop", "the input has ended; what was asked for stays, Ctrl-C leaves"]
+
+
+@pytest.mark.parametrize("gone", [False, True])
+def test_end_of_a_terminal_stops_and_leaves(gone: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-D, or a connection that was lost: a panel that hears nobody must not stay armed."""
+    table = Table(terminal=True)
+    table.hear(Mode.STANDBY)
+    table.type("arm\n")
+    table.look()
+    table.hear(Mode.ACTIVE)
+    table.look()
+    assert table.order.arm
+    if gone:
+
+        def fail(*_: object) -> bytes:
+            raise OSError(errno.EIO, "Input/output error")
+
+        monkeypatch.setattr(os, "read", fail)
+    os.close(table.writing)
+    assert not table.look()
+    assert table.order.stop
+    assert not table.order.arm
+    assert table.said[-1] == "stop"
+    for _ in range(10):
+        table.hear(Mode.STANDBY)
+        if table.look():
+            break
+    else:
+        raise AssertionError("it stays")
+
+
+def test_a_reset_that_is_refused_is_said_with_what_lasts(table: Table) -> None:
+    for refused in (True, False):
+        table.hear(Mode.FAULT, Fault.MOTION_SILENT)
+        table.hear_alarm(Fault.MOTION_SILENT, AlarmState.ACTIVE_ACKNOWLEDGED)
+        table.look()
+        table.said.clear()
+        table.type("reset\n")
+        for _ in range(15):
+            table.hear(Mode.FAULT if refused else Mode.STANDBY, Fault.MOTION_SILENT)
+            table.hear_alarm(Fault.MOTION_SILENT, AlarmState.ACTIVE_ACKNOWLEDGED)
+            table.look()
+        said = [line for line in table.said if "REFUSED" in line]
+        assert said == ["reset REFUSED while this lasts: MOTION_SILENT"] * refused
 
 
 @pytest.mark.parametrize(

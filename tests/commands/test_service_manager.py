@@ -116,3 +116,34 @@ def test_run_tells_that_it_is_ready_alive_and_stopping_in_this_order(
     assert len(alive) >= 2
     assert set(alive) == {"WATCHDOG=1"}
     assert last == "STOPPING=1"
+
+
+@pytest.mark.slow
+def test_an_error_in_the_loop_ends_the_watchdog_before_its_traceback(
+    manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is closed before it is printed takes longer than the watchdog waits."""
+
+    class Broken(QuietBus):
+        ticks = 0
+
+        def receive(self):
+            self.ticks += 1
+            if self.ticks > 20:
+                raise RuntimeError("a defect")
+            return super().receive()
+
+    told: list[list[str]] = []
+    close = module.AlarmLines.close
+
+    def closing(lines: module.AlarmLines) -> None:
+        told.append(messages(manager))
+        close(lines)
+
+    monkeypatch.setattr(module.AlarmLines, "close", closing)
+    monkeypatch.setattr(module, "SocketCanPort", Broken)
+    for name, value in environment(manager).items():
+        monkeypatch.setenv(name, value)
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0", "--duration", "5"])
+    assert "a defect" in str(result.exception)
+    assert [each[-1] for each in told] == ["STOPPING=1"]

@@ -261,6 +261,19 @@ def test_signal_ends_the_loop_and_the_handlers_are_put_back(number):
     assert signal.getsignal(number) is found
 
 
+def test_a_sighup_that_is_ignored_stays_so_for_nohup() -> None:
+    found = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stop_on_signals() as stop:
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert not stop()
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert stop()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, found)
+
+
 def test_clock_never_returns_early_even_if_the_system_does(monkeypatch):
     sleep = time.sleep
     monkeypatch.setattr(time, "sleep", lambda seconds: sleep(seconds / 2))

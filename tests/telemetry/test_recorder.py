@@ -23,6 +23,7 @@ from utank_hil.telemetry.event_ring import EventWriter
 from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation
 
 pytestmark = pytest.mark.slow
 
@@ -218,6 +219,7 @@ from utank_hil.canbus import RetuningState
 from utank_hil.retuning import RetuningEvent
 from utank_hil.telemetry.event_ring import EventWriter
 from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation
 ring, events = RingWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)
 sys.stdin.readline()
@@ -265,6 +267,7 @@ def test_recorder_ends_when_the_writer_is_killed(tmp_path: Path) -> None:
     code = f"""
 import sys, numpy as np
 from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import Rotation
 ring = RingWriter({SIGNALS!r})
 ring.write(np.zeros({len(SIGNALS)}))
 print(ring.name, flush=True)
@@ -356,6 +359,39 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
     if rows == 300:
         assert "its 300 rows are written" in str(caught.value)
         assert len(recorded(file)) == 300
+
+
+@pytest.mark.slow
+def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "run-a.rrd"
+
+    def limit(words: str) -> None:
+        subprocess.run(["prlimit", f"--pid={recorder.pid}", f"--fsize={words}"], check=True)
+
+    def failed() -> bool:
+        complaint.append(capfd.readouterr().err)
+        return "tried again every 10 s" in "".join(complaint)
+
+    complaint: list[str] = []
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, file, rotation=Rotation(3600.0))
+        feed(ring, table(100))
+        wait_for(lambda: any_recorded(file))
+        limit("400000:unlimited")
+        feed(ring, table(700)[100:])
+        wait_for(failed)
+        limit("unlimited")
+        wait_for(lambda: any_recorded(tmp_path / "run-a-part002.rrd"))
+        feed(ring, table(750)[700:])
+    report = recorder.stop()
+    assert (report.rows, report.lost, report.parts) == (750, 0, 2)
+    assert "".join(complaint).count("failed") == 1
+    np.testing.assert_allclose(recorded(file)[:100], table(100), rtol=4e-16)
+    later = recorded(tmp_path / "run-a-part002.rrd")
+    np.testing.assert_allclose(later, table(750)[-len(later) :], rtol=4e-16)
+    assert len(later) >= 600
 
 
 def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
-from utank_hil.canbus import PortError, SocketCanPort
+from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
 from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.commissioning_record import make_record, record_path, write_record
 from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
@@ -70,8 +70,12 @@ def commission(
         stack.callback(lines.close)
 
         def tell(event: RetuningEvent | AlarmEvent, start_ns: int) -> None:
-            if isinstance(event, AlarmEvent):
+            if not isinstance(event, AlarmEvent):
+                return
+            if event.code is not Fault.NOT_COMMISSIONED:
                 lines.tell(event, start_ns)
+            elif event.state is AlarmState.ACTIVE_UNACKNOWLEDGED:  # of here and now it says nothing
+                lines.say("  not armed: wait until this asks for it")
 
         try:
             node = build_commissioning_node(loaded, statistics=statistics, event_sink=tell)

@@ -18,7 +18,7 @@ _WORDS: Final = {row.code: (row.happened, row.remedy) for row in FAULTS}
 
 
 class EventLog:
-    """Appends events to a file, each one at once.
+    """Appends events to a file, each one at once, and brings it to the disk.
 
     Raises
     ------
@@ -50,6 +50,7 @@ class EventLog:
         try:
             while left:  # what fits is written; what is left tells why it does not
                 left = left[self._file.write(left) :]
+            os.fsync(self._file.fileno())
         except OSError:
             with contextlib.suppress(OSError):
                 self._file.truncate(begin)

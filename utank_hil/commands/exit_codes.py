@@ -69,6 +69,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = (
         130,
         "all but `panel`, `monitor`",
-        "Ctrl-C or SIGTERM before the end; of `run`, before the loop; of `firmware-sim`, before "
-        "the first sample. `bench`, `campaign` and `faults` keep what there is.",
+        "Ctrl-C or SIGTERM before the end; of `run`, before it has opened the bus; of "
+        "`firmware-sim`, before the first sample. `bench`, `campaign` and `faults` keep what "
+        "there is.",
     )

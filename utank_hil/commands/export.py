@@ -1,14 +1,14 @@
 """``utank-hil export``: frames or signals of a recording for other programs."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from utank_hil.commands.common import Json, fail, print_json
-from utank_hil.commands.terminal import notes, shown
+from utank_hil.commands.terminal import notes, say_cut, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of
@@ -50,11 +50,12 @@ def export(
         fail(f"--to {to} is what is read: name another file")
     if run is not None and recording.suffix.lower() != ".rrd":
         fail("--run is for recordings (.rrd), which hold several: leave it out")
+    cuts: list[str] = []
     try:
         if kind in BUS_SUFFIXES:
-            count, unit = write_bus_log(to, _entries(recording)), "frames"
+            count, unit = write_bus_log(to, _entries(recording, cuts.append)), "frames"
         else:
-            runs = read_signals(recording)
+            runs = read_signals(recording, cuts.append)
             name = list(runs)[-1] if run is None else run
             if name not in runs:
                 fail(f"{recording} has no run {name!r}; it has {', '.join(runs)}")
@@ -62,17 +63,19 @@ def export(
             count, unit = len(runs[name]["time_s"]), "rows"
     except (OSError, ValueError) as error:
         fail(error)
+    for cut in cuts:
+        say_cut(cut)
     if json_:
-        print_json({"file": str(to), unit: count})
+        print_json({"file": str(to), unit: count, "cut": "; ".join(cuts)})
     else:
         notes.say(f"{shown(to)}: {count} {unit}")
 
 
-def _entries(recording: Path) -> Iterable[Entry]:
-    """Frames of a recording."""
+def _entries(recording: Path, note: Callable[[str], None]) -> Iterable[Entry]:
+    """Frames of a recording; `note` is told where a log is cut."""
     suffix = recording.suffix.lower()
     if suffix == SUFFIX:
-        return entries_of(FrameLog(recording).blocks())
+        return entries_of(FrameLog(recording).blocks(note))
     if suffix in BUS_SUFFIXES:
         return read_bus_log(recording)
     beside = recording.with_suffix(SUFFIX)

@@ -16,7 +16,7 @@ from utank_hil.commands.identified import (
     write_identified,
 )
 from utank_hil.commands.identify_report import figures, print_report
-from utank_hil.commands.terminal import Terminal, notes
+from utank_hil.commands.terminal import Terminal, notes, say_cut
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
@@ -79,7 +79,7 @@ def identify_log(
     prepare_out(out, (PICTURE, VESSEL, CONTROLLER))
     measured = task.design.predictor.measured
     try:
-        runs = read_signals(log)
+        runs = read_signals(log, say_cut)
         name = list(runs)[-1] if run is None else run
         if name not in runs:
             fail(f"{log} has no run {name!r}; it has {', '.join(runs)}")

@@ -5,10 +5,12 @@ import select
 from collections.abc import Callable
 from typing import Final
 
-from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Station
+from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Mode, Station
 from utank_hil.runtime.faults import fault_text
 from utank_hil.runtime.panel import SILENT_NS, Action, OperatorPanel
 
+ANSWER_NS: Final = 1_000_000_000
+"""So long after a reset its answer has come: 500 ms for the button, 100 ms for the status."""
 LEAVE_NS: Final = 3_000_000_000
 """So long a panel that is left waits for the answer to a stop."""
 HELP: Final = """\
@@ -24,6 +26,7 @@ HELP: Final = """\
 _READ_BYTES: Final = 4096
 _LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
+_LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
 
@@ -34,7 +37,7 @@ class Keyboard:
     ----------
     node : OperatorPanel
     descriptor : int
-        To read from. A pipe that is closed only ends the typing.
+        To read from. The end of a pipe only ends the typing; that of a terminal stops and leaves.
     say : callable
         Shows a line.
     terminal : bool
@@ -54,15 +57,21 @@ class Keyboard:
         self._silent = True
         self._began_ns: int | None = None
         self._leave_ns: int | None = None
+        self._now_ns = 0
+        self._reset_ns: int | None = None
         self._alarms: dict[Fault | None, AlarmState | None] = {}
 
     def look(self, now_ns: int) -> bool:
         """Obey every line that has come and show what is new; whether to leave."""
+        was_open, self._now_ns = self._open, now_ns
         lines = self._lines()
         self._show(now_ns)
         for line in lines:
             if self._obey(line) and self._leave_ns is None:
                 self._leave_ns = now_ns + LEAVE_NS
+        if was_open and not self._open:
+            self._end(now_ns)
+        self._tell_of_reset(now_ns)
         # what was pressed last is to be heard: a stop until it is answered
         return self._leave_ns is not None and (not self._node.busy or now_ns >= self._leave_ns)
 
@@ -73,7 +82,10 @@ class Keyboard:
         one read a look: a pipe that is never empty is not to hold the panel up.
         """
         if self._open and select.select([self._descriptor], [], [], 0)[0]:
-            data = os.read(self._descriptor, _READ_BYTES)
+            try:
+                data = os.read(self._descriptor, _READ_BYTES)
+            except OSError:  # a terminal that is gone
+                data = b""
             self._open = bool(data)
             self._typed += data
         *lines, begun = self._typed.split(b"\n")
@@ -82,6 +94,28 @@ class Keyboard:
         if begun and not self._open:
             lines.append(begun)
         return [line.decode(errors="replace").strip().lower() for line in lines]
+
+    def _end(self, now_ns: int) -> None:
+        """React to the end of what is read."""
+        if self._terminal:  # Ctrl-D, or it is gone: a panel that is deaf must not stay armed
+            self._press(Action.STOP)
+            self._leave_ns = self._leave_ns or now_ns + LEAVE_NS
+        elif self._leave_ns is None:
+            self._say("the input has ended; what was asked for stays, Ctrl-C leaves")
+
+    def _tell_of_reset(self, now_ns: int) -> None:
+        """Say that a reset was refused: the controller is still in FAULT."""
+        if self._reset_ns is None or now_ns - self._reset_ns < ANSWER_NS:
+            return
+        self._reset_ns = None
+        status = self._node.status
+        if status is not None and status.mode is Mode.FAULT and not self._silent:
+            lasting = [
+                alarm.code.name
+                for alarm in self._node.alarms
+                if alarm.code is not None and alarm.state in _LASTING
+            ]
+            self._say(f"reset REFUSED while this lasts: {', '.join(lasting)}")
 
     def _obey(self, word: str) -> bool:
         """Do what a line says; whether that is to leave."""
@@ -111,6 +145,8 @@ class Keyboard:
         else:
             node.press(action)
             self._say(action.value)
+            if action is Action.RESET:
+                self._reset_ns = self._now_ns
 
     @property
     def _elsewhere(self) -> bool:

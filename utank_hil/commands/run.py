@@ -69,6 +69,7 @@ def run(
         typer.Option(
             metavar="MB",
             min=0,
+            max=1e9,  # a float without a limit may be infinite
             help="Remove the folder's oldest recordings beyond so much; without it none are.",
         ),
     ] = None,
@@ -160,10 +161,12 @@ def run(
                 fail(f"NOTIFY_SOCKET: the manager does not answer: {error}", ExitCode.SYSTEM)
             with suppress(PortError):  # the loop meets it too, and its node reacts
                 port.receive()  # what came before is old, and must not look fresh
-            RealTimeLoop([on_bus], port, statistics=statistics).run(
-                ended, None if duration is None else round(duration * 1e9)
-            )
-        manager.stopping()
+            try:
+                RealTimeLoop([on_bus], port, statistics=statistics).run(
+                    ended, None if duration is None else round(duration * 1e9)
+                )
+            finally:
+                manager.stopping()  # the watchdog must not cut short what an error has to say
     kept = None if out is None else recording.summary
     # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
     with suppress(OSError, SystemExit):

@@ -107,3 +107,8 @@ class _Notes(Terminal):
 
 # progress, notes and errors; standard output is for results
 notes: Final = _Notes(stderr=True)
+
+
+def say_cut(cut: str) -> None:
+    """Say where a file that was read is not whole."""
+    notes.say(f"{cut}; what follows in it is left out", yellow="not whole:")

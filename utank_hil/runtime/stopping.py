@@ -13,7 +13,8 @@ SIGNALS: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 def stop_on_signals() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns whether SIGINT, SIGTERM or SIGHUP (a closed terminal) arrived.
 
-    The former handlers are restored at the end. Main thread only, as Python requires.
+    A SIGHUP that is ignored stays so: ``nohup`` asks for it. The former handlers are restored at
+    the end. Main thread only, as Python requires.
     """
     stopped = False
 
@@ -21,7 +22,9 @@ def stop_on_signals() -> Iterator[Callable[[], bool]]:
         nonlocal stopped
         stopped = True
 
-    found = {number: signal.signal(number, note) for number in SIGNALS}
+    ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    numbers = [number for number in SIGNALS if not (ignored and number is signal.SIGHUP)]
+    found = {number: signal.signal(number, note) for number in numbers}
     try:
         yield lambda: stopped
     finally:

@@ -151,13 +151,15 @@ class FrameLog:
             raise FrameLogError(f"{path}: {self.cut or 'its head is missing'}")
         self.head: dict[str, Any] = json.loads(zlib.decompress(payload))
 
-    def blocks(self) -> Iterator[Records]:
-        """Records of one block after another."""
+    def blocks(self, note: Callable[[str], None] | None = None) -> Iterator[Records]:
+        """Records of one block after another; `note` is called with `cut`, if there is one."""
         self.cut = ""
         for path in self._paths:
             for kind, payload in self._read(path):
                 if kind in _DECOMPRESS:
                     yield unpack(_DECOMPRESS[kind](payload))
+        if self.cut and note is not None:
+            note(self.cut)
 
     def _read(self, path: Path) -> Iterator[tuple[bytes, bytes]]:
         with path.open("rb") as content:

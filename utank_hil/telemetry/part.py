@@ -81,9 +81,11 @@ class RecordingPart(Closing):
             self._lost[what] = lost
 
     def flush(self) -> None:
-        """Bring it to the disk, so that a kill does not lose it."""
+        """Bring it to the disk, so that neither a kill nor a power cut loses it."""
         # without a timeout it would wait forever on a full disk
         self._recording.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+        with self._file.open("rb") as written:
+            os.fsync(written.fileno())
 
     def close(self) -> None:
         """Finish the file; idempotent."""

@@ -9,7 +9,8 @@ is closed, when the ring's writer dies, or on SIGINT, SIGTERM or SIGHUP, with al
 controller never waits for it: rows that it reads too late are overwritten and counted as lost.
 
 Each file of a long recording is written by the process anew (`execv`): Rerun keeps memory and
-threads of the files that are finished.
+threads of the files that are finished. So it goes on in another file where one fails, on a full
+disk for example, as soon as there is room; the rows of 80 s wait in their ring.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import contextlib
 import json
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -34,7 +36,7 @@ from utank_hil.telemetry.bus_records import RECORD, Kind, records_of
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLogWriter
 from utank_hil.telemetry.ring import RingReader, held_ring
-from utank_hil.telemetry.rotation import Rotation, make_room, part_of
+from utank_hil.telemetry.rotation import SUFFIXES, Rotation, make_room, part_of
 from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5  # a batch costs 1 kB of file; a kill loses up to two
@@ -42,6 +44,9 @@ NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
 _NICENESS: Final = 5
+_RETRY_S: Final = 10.0
+_FULL_BYTES: Final = 1 << 20
+"""A disk with less room counts as full."""
 _CONTENT: Final = "--content"
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -87,6 +92,22 @@ class Places:
     frames: int | None = None
 
 
+@dataclass(slots=True)
+class Progress:
+    """How far a recording has come.
+
+    Attributes
+    ----------
+    report : RecorderReport
+        What the parts so far hold.
+    places : Places
+        Where they end.
+    """
+
+    report: RecorderReport
+    places: Places
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """What is recorded, and where.
@@ -115,26 +136,20 @@ class Source:
     head: Mapping[str, Any]
 
 
-def record_part(
-    source: Source, before: RecorderReport, places: Places
-) -> tuple[RecorderReport, Places | None]:
+def record_part(source: Source, progress: Progress) -> bool:
     """Record into one file until the ring ends, a signal comes or it is time for the next file.
 
     The signals have to be blocked.
 
     Parameters
     ----------
-    before : RecorderReport
-        What the parts before hold.
-    places : Places
-        Where they ended.
+    progress : Progress
+        That of the parts before; kept up to date with what has reached the file.
 
     Returns
     -------
-    RecorderReport
-        What all parts hold.
-    Places or None
-        Where the next part begins; None if there is none.
+    bool
+        Whether there is a next part.
 
     Raises
     ------
@@ -145,6 +160,7 @@ def record_part(
     RuntimeError
         If the file can't be finished.
     """
+    before, places = progress.report, progress.places
     number = before.parts + 1
     file, rotation = part_of(source.file, number), source.rotation
     make_room(source.file, number, rotation)
@@ -187,21 +203,20 @@ def record_part(
                     part.note_lost("events", event_reader.lost)
                 if len(rows) or new_events:
                     part.flush()
+            progress.report = RecorderReport(
+                before.rows + recorded,
+                before.lost + reader.lost,
+                number,
+                before.records_lost + (0 if log is None else log.lost),
+            )
+            progress.places = Places(
+                reader.place,
+                None if event_reader is None else event_reader.place,
+                None if log is None else log.place,
+            )
         if part is not None:
             part.close()
-        whole = RecorderReport(
-            before.rows + recorded,
-            before.lost + reader.lost,
-            number,
-            before.records_lost + (0 if log is None else log.lost),
-        )
-        if last:
-            return whole, None
-        return whole, Places(
-            reader.place,
-            None if event_reader is None else event_reader.place,
-            None if log is None else log.place,
-        )
+        return not last
 
 
 class FrameRecording(Closing):
@@ -375,25 +390,45 @@ def _main() -> None:
         rotation = Rotation(arguments.part_s, arguments.keep_bytes)
     os.environ.update(rerun_environment())
     signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # first: Rerun's threads inherit it
+    progress = Progress(
+        RecorderReport(**content.pop("report", {"rows": 0, "lost": 0, "parts": 0})),
+        Places(**content.pop("places", {})),
+    )
+    failing = content.pop("failing", "")
     try:
         if "rings" not in content:
             os.nice(_NICENESS)
             names = (arguments.ring, arguments.events, arguments.frames)
             content["rings"] = [None if name is None else held_ring(name) for name in names]
         ring, events, frames = content["rings"]
-        report, places = record_part(
-            Source(ring, arguments.file, events, rotation, frames, content.get("head", {})),
-            RecorderReport(**content.get("before", {"rows": 0, "lost": 0, "parts": 0})),
-            Places(**content.get("places", {})),
-        )
-        if places is not None:
-            _go_on(content | {"before": asdict(report), "places": asdict(places)})
-        _print_json(asdict(report))
+        source = Source(ring, arguments.file, events, rotation, frames, content.get("head", {}))
+        if record_part(source, progress):
+            _go_on(content | asdict(progress))
+        _print_json(asdict(progress.report))
     except (OSError, RuntimeError) as error:
-        with contextlib.suppress(OSError):  # a terminal that is gone
-            print(f"recording {arguments.file} failed: {error}", file=sys.stderr, flush=True)
-        _print_json({"error": str(error)})
+        reason = _reason(error, arguments.file)
+        again = rotation is not None and progress.report.parts > 0
+        if again:
+            begun = part_of(arguments.file, progress.report.parts + 1)
+            for suffix in SUFFIXES:  # of a part that has nothing yet
+                begun.with_suffix(suffix).unlink(missing_ok=True)
+        if reason != failing:
+            with contextlib.suppress(OSError):  # a terminal that is gone
+                then = f"; tried again every {_RETRY_S:g} s" if again else ""
+                print(f"recording {arguments.file} failed: {reason}{then}", file=sys.stderr)
+                sys.stderr.flush()
+        if again and signal.sigtimedwait(_ENDING, _RETRY_S) is None:
+            _go_on(content | asdict(progress) | {"failing": reason})
+        _print_json({"error": reason})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
+
+
+def _reason(error: Exception, file: Path) -> str:
+    """Why a recording failed: Rerun says nothing of a full disk."""
+    with contextlib.suppress(OSError):
+        if shutil.disk_usage(file.parent).free < _FULL_BYTES:
+            return f"the disk of {file.parent} is full ({error})"
+    return str(error)
 
 
 def _go_on(content: Mapping[str, Any]) -> NoReturn:

@@ -7,7 +7,7 @@ which its name says (``roll_deg``, ``pressure_command_kpa``), and its times are 
 
 import csv
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any, Final
@@ -47,13 +47,15 @@ class SignalFileError(ValueError):
     """The file lacks what is needed, or can't be read; the message names file, line and remedy."""
 
 
-def read_signals(path: Path) -> dict[str, Columns]:
+def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[str, Columns]:
     """Read the runs of a file, by name; a file that knows no runs has one, named by its stem.
 
     Parameters
     ----------
     path : Path
         One of `SUFFIXES`.
+    note : callable, optional
+        Is told where a frame log is cut or damaged; what follows in that file is left out.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def read_signals(path: Path) -> dict[str, Columns]:
 
         return read_recording(path)
     if suffix == SUFFIX:
-        return {path.stem: signal_table(entries_of(FrameLog(path).blocks()))}
+        return {path.stem: signal_table(entries_of(FrameLog(path).blocks(note)))}
     if suffix in BUS_SUFFIXES:
         return {path.stem: signal_table(read_bus_log(path))}
     if suffix == ".csv":
