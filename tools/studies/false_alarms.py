@@ -86,6 +86,14 @@ def hours(name: str) -> Iterator[tuple[str, Scenario]]:
         yield VOYAGE, voyage.model_copy(update={"controllers": {name: config}})
 
 
+def ordered(scenario: Scenario, name: str, seed: int) -> Scenario:
+    """The scenario of an hour: in every second one a law that can be retuned is."""
+    if seed % 2 or scenario.controllers[name].retuning is None:
+        return scenario
+    order = TimedAction(ORDER_RETUNING_S, Action.RETUNE)
+    return scenario.model_copy(update={"operator": (*scenario.operator, order)})
+
+
 @cache
 def code() -> str:
     """Digest of what an hour is made from."""
@@ -128,12 +136,9 @@ def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, 
     """The hours of one law in one sea, those that are kept and those that are missing."""
     file = CACHE / code() / f"{name}-{sea}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
-    retunes = scenario.controllers[name].retuning is not None
-    order = (TimedAction(ORDER_RETUNING_S, Action.RETUNE),)
 
     def sailed(seed: int) -> dict[str, Any]:
-        ordered = scenario.operator + (order if retunes and seed % 2 == 0 else ())
-        return margins(scenario.model_copy(update={"operator": ordered}), name, seed, HOUR_S)
+        return margins(ordered(scenario, name, seed), name, seed, HOUR_S)
 
     if not file.exists():
         before = "".join(f"{json.dumps(run)}\n" for run in recorded(name, sea, sailed))

@@ -72,16 +72,22 @@ class Onlooker:
         return ()
 
 
-def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
-    """Margins of one run."""
+def controller_of(scenario: Scenario, name: str) -> ControllerNode:
+    """A commissioned controller of a scenario, with what retunes it and estimates for it."""
     config = scenario.controllers[name]
     retuner, estimating = (
         work and SimulatedRetuner(work[0], scenario.retuner_latency_s) for work in works_of(config)
     )
-    node = build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
+    return build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
+
+
+def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
+    """Margins of one run."""
+    node = controller_of(scenario, name)
     onlooker = Onlooker(node)
     ship = build_ship_side(scenario, seed, scenario.operator)
-    lockstep = Lockstep([*ship.nodes, node, onlooker], SimulatedBus(bit_rate=config.bit_rate))
+    bus = SimulatedBus(bit_rate=scenario.controllers[name].bit_rate)
+    lockstep = Lockstep([*ship.nodes, node, onlooker], bus)
     lockstep.run_until(round(seconds * SECOND_NS))
     return {
         "scenario": scenario.name,
