@@ -12,6 +12,8 @@ from utank_hil.assembly import build_law
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import PredictiveDesign
+from utank_hil.dynamics.restoring import restoring
+from utank_hil.parameters import ParameterError
 from utank_hil.retuning import ModelSummary
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")
@@ -52,6 +54,37 @@ def test_the_least_gm_of_a_ship_that_was_found_is_still_watched(tmp_path: Path) 
     watched = vessel.model_copy(update={"ship": ship, "least_gm_m": 0.7})
     files = IdentifiedShips(tmp_path, watched, read_controller(CONFIG)).write(FOUND)
     assert load_config(files["vessel"], Vessel).least_gm_m == 0.7
+
+
+@pytest.mark.parametrize("share", [0.7, 1.5])
+def test_righting_levers_of_a_ship_that_was_found_scale_with_her_stiffness(
+    share: float, tmp_path: Path
+) -> None:
+    vessel = load_config(CONFIG, ControllerConfig).vessel
+    stiffness_nm_rad, displacement_n = vessel.ship.stiffness_nm_rad, 4.0e8
+    heel_rad = np.radians(10.0) * np.arange(6)
+    levers_m = stiffness_nm_rad / displacement_n * np.sin(heel_rad)
+    ship = dataclasses.replace(
+        vessel.ship, displacement_n=displacement_n, gz_step_rad=float(heel_rad[1]),
+        gz_m=tuple(levers_m.tolist()),
+    )  # fmt: skip
+    found = dataclasses.replace(FOUND, stiffness_nm_rad=share * stiffness_nm_rad)
+    with_levers = vessel.model_copy(update={"ship": ship})
+    files = IdentifiedShips(tmp_path, with_levers, read_controller(CONFIG)).write(found)
+    written = load_config(files["vessel"], Vessel).ship
+    assert written.displacement_n == displacement_n
+    np.testing.assert_allclose(
+        restoring(written).moment_nm(heel_rad), share * restoring(ship).moment_nm(heel_rad)
+    )
+    # as the law in charge, and the twin, have her
+    assert written == found.ship(ship)
+
+
+def test_a_ship_that_a_file_may_not_hold_is_not_written(tmp_path: Path) -> None:
+    found = dataclasses.replace(FOUND, stiffness_nm_rad=1e7)
+    with pytest.raises(ParameterError, match="takes all of the ship's stability"):
+        ships(tmp_path).write(found)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_ship_found_later_is_written_beside_the_earlier(tmp_path: Path) -> None:

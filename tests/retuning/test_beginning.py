@@ -18,7 +18,7 @@ from retuning_toys import (
 from utank_hil.canbus import RetuningState
 from utank_hil.retuning import Refusal
 from utank_hil.retuning.adaptive import MOST_TRIES
-from utank_hil.retuning.law_exchange import RETRY_NS
+from utank_hil.retuning.law_exchange import BUSY_NS, RETRY_NS
 
 CHANGE = replace(SETTINGS, change_factor=1.05)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = RetuningState
@@ -72,8 +72,29 @@ def test_a_dead_retuner_is_looked_at_every_ten_minutes_however_short_the_schedul
     rig.run(round(3600 / SAMPLE_TIME_S))
     assert len(states(rig)) == 6
     assert set(states(rig)) == {REFUSED}
-    rig.press(retune=True)  # an order is answered at once all the same
+    rig.press(retune=True)  # an order is answered soon all the same
+    rig.run(round(BUSY_NS * 1e-9 / SAMPLE_TIME_S))
     assert len(states(rig)) == 7
+
+
+@pytest.mark.parametrize("busy_s", [20.0, 29.0])
+def test_a_retuner_that_is_busy_is_waited_for(busy_s: float) -> None:
+    """Its heart does not beat while it works on an estimate."""
+    retuner = ToyRetuner(None)
+    rig = Rig(retuner)
+    rig.run(1000)
+    for _ in range(2):  # each time anew
+        retuner.alive = False
+        rig.press(retune=True)
+        rig.run(round(busy_s / SAMPLE_TIME_S) - 2)
+        assert REFUSED not in states(rig)
+        assert rig.controller.state is not IDENTIFY
+        retuner.alive = True
+        rig.run_until(IDENTIFY)
+        rig.order = QUIET._replace(forbid_retuning=True)
+        rig.run(3)
+        rig.order = QUIET
+        rig.run(1000)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.25])
@@ -229,6 +250,7 @@ def test_dead_retuner_gets_no_pulses_until_it_lives_again() -> None:
     assert set(states(rig)) == {REFUSED}
     assert "no sign of life" in rig.reasons
     rig.press(retune=True)
+    rig.run(round(BUSY_NS * 1e-9 / SAMPLE_TIME_S))
     assert "ordered by the operator, but" in rig.reasons
     assert rig.commands == rig.answers_of_the_first_law()
     retuner.alive = True

@@ -375,6 +375,20 @@ def test_a_resting_pump_is_woken_by_the_next_law() -> None:
     assert not rig.controller.excused
 
 
+def test_undoing_the_law_that_lost_wakes_the_pump() -> None:
+    rig = Rig(renewed())
+    rig.renew_until(RETUNED)
+    rig.passive = lambda k: 0.2
+    while not rig.controller.excused:
+        rig.run(1)
+    rig.run(5)
+    assert rig.commands[-1] == 0.0
+    rig.run(1, RetuningOrder(undo=True))
+    assert rig.controller.state is UNDONE
+    assert not rig.controller.excused
+    assert rig.commands[-1] != 0.0
+
+
 def test_a_pump_that_rests_is_not_in_charge_any_more_after_disarming() -> None:
     rig = Rig(renewed())
     rig.passive = lambda k: 0.2

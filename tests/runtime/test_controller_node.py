@@ -448,6 +448,26 @@ def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
     assert not noted.engaged[-1]
 
 
+@pytest.mark.parametrize("phase_ms", range(0, 200, 10))
+def test_whoever_disarms_and_arms_between_two_answers_is_out_of_charge_for_one(
+    phase_ms: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A retuning under way has to end, whenever that was."""
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    bench.drive_at(0.0)
+    bench.run(400 + phase_ms)
+    noted.engaged.clear()
+    bench.order_is(arm=False)
+    bench.run(20)
+    assert bench.node.mode is Mode.PASSIVE
+    bench.order_is(arm=True)
+    bench.run(600)
+    assert bench.node.mode is Mode.ACTIVE
+    assert noted.engaged.count(False) in (1, 2)
+    assert noted.engaged[-1]
+
+
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degraded(
     sign: int,

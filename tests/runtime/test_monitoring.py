@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from controller_bench import CATALOGUE, VERSION, VESSEL
 from monitors.moving_ship import MovingShip
 
 from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
+from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
-from utank_hil.retuning import ModelSummary
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.retuning import ModelSummary, ShipFigures
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.monitoring import ROUND_TICKS, Monitors
 from utank_hil.runtime.monitors.finding import Finding
@@ -349,6 +352,25 @@ def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
     twin = table.monitors.twin
     assert twin.rms_rad == pytest.approx(twin.ship_rms_rad, rel=1e-9)
     assert table.monitors.twin_message().twin_rms_rad == twin.rms_rad
+
+
+@pytest.mark.parametrize(("share", "taken"), [(0.7, True), (0.6, False)])
+def test_a_ship_that_her_tank_would_capsize_leaves_the_configured_twin(
+    share: float, taken: bool
+) -> None:
+    """Patti-B's free surface takes 0.64 of her stiffness."""
+    patti = load_config(Path("configs/ships/patti_b.yaml"), Vessel)
+    plant = DesignPlant(patti.ship, patti.tank)
+    monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
+    given: list[RollShip] = []
+    monitors.twin.take = lambda ship, tank: given.append(ship)  # type: ignore[method-assign]
+    ship = patti.ship.with_figures(
+        patti.ship.inertia_kg_m2,
+        share * patti.ship.stiffness_nm_rad,
+        patti.ship.damping_nms_rad,
+    )
+    monitors.follow(ShipFigures.of(ship))
+    assert given == [ship if taken else patti.ship]
 
 
 @pytest.mark.parametrize("command_pa", [0.0, 5e3])

@@ -3,6 +3,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from itertools import pairwise
 
 import pytest
@@ -259,6 +260,16 @@ def test_signal_ends_the_loop_and_the_handlers_are_put_back(number):
         assert stop()
     assert len(node.ticked) == 3
     assert signal.getsignal(number) is found
+
+
+def test_a_warning_in_the_loop_is_printed_nowhere(capfd: pytest.CaptureFixture[str]) -> None:
+    """A terminal that nobody reads would hold up the tick."""
+    node = ToyNode("a")
+    node.says = lambda now: warnings.warn("of the loop", stacklevel=1) or ()
+    RealTimeLoop([node], clock=FakeClock()).run(duration_ns=50 * MS)
+    assert "of the loop" not in capfd.readouterr().err
+    with pytest.warns(UserWarning, match="outside"):
+        warnings.warn("outside", stacklevel=1)
 
 
 def test_a_sighup_that_is_ignored_stays_so_for_nohup() -> None:

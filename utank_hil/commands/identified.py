@@ -7,9 +7,11 @@ from typing import Any, Final
 import yaml
 
 from utank_hil.commands.stamps import claimed_files
+from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.parameters import refuse
 from utank_hil.provenance import headline
 from utank_hil.retuning import ModelSummary
 from utank_hil.runtime.redundancy import NO_REDUNDANCY
@@ -82,13 +84,8 @@ class IdentifiedShips:
         ParameterError
             If she is no ship that a file may hold.
         """
-        ship = dataclasses.replace(
-            self.vessel.ship,
-            inertia_kg_m2=found.inertia_kg_m2,
-            stiffness_nm_rad=found.stiffness_nm_rad,
-            damping_nms_rad=found.damping_nms_rad,
-        )
-        tank = dataclasses.replace(self.vessel.tank, damping_ratio=found.tank_damping_ratio)
+        ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
+        refuse("vessel", tank_problems(ship, tank))
         self.folder.mkdir(parents=True, exist_ok=True)
         names = [f"{Path(name).stem}-{{}}.yaml" for name in (VESSEL, CONTROLLER)]
         vessel_file, controller_file = claimed_files(self.folder, *names)

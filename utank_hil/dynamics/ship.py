@@ -90,6 +90,19 @@ class RollShip:
         damping = self.damping_nms_rad + self.lift_damping_ns2_rad * speed_m_s
         return replace(self, damping_nms_rad=damping, lift_damping_ns2_rad=0.0)
 
+    def with_figures(
+        self, inertia_kg_m2: float, stiffness_nm_rad: float, damping_nms_rad: float
+    ) -> "RollShip":
+        """The ship with other figures of small roll; righting levers scale with the stiffness."""
+        share = stiffness_nm_rad / self.stiffness_nm_rad
+        return replace(
+            self,
+            inertia_kg_m2=inertia_kg_m2,
+            stiffness_nm_rad=stiffness_nm_rad,
+            damping_nms_rad=damping_nms_rad,
+            gz_m=tuple(share * lever_m for lever_m in self.gz_m),
+        )
+
     @property
     def heeling_moment_nm(self) -> float:
         """Steady moment on the upright ship in N m, for the linear models."""

@@ -126,11 +126,10 @@ def fit_ship(
         factor = np.exp(theta[:_PRESSURE]).tolist()
         return dataclasses.replace(
             plant,
-            ship=dataclasses.replace(
-                ship,
-                inertia_kg_m2=ship.inertia_kg_m2 * factor[0],
-                stiffness_nm_rad=ship.stiffness_nm_rad * factor[1],
-                damping_nms_rad=ship.damping_nms_rad * factor[2],
+            ship=ship.with_figures(
+                ship.inertia_kg_m2 * factor[0],
+                ship.stiffness_nm_rad * factor[1],
+                ship.damping_nms_rad * factor[2],
             ),
             tank=dataclasses.replace(tank, damping_ratio=tank.damping_ratio * factor[3]),
         )

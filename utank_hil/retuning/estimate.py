@@ -4,7 +4,7 @@ Passes between processes as plain numbers.
 """
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Annotated, Final
 
 import numpy as np
@@ -55,13 +55,8 @@ class ShipFigures:
 
     def ship(self, configured: RollShip) -> RollShip:
         """The configured ship with these figures; righting levers scale with the stiffness."""
-        share = self.stiffness_nm_rad / configured.stiffness_nm_rad
-        return replace(
-            configured,
-            inertia_kg_m2=self.inertia_kg_m2,
-            stiffness_nm_rad=self.stiffness_nm_rad,
-            damping_nms_rad=self.damping_nms_rad,
-            displacement_n=share * configured.displacement_n,
+        return configured.with_figures(
+            self.inertia_kg_m2, self.stiffness_nm_rad, self.damping_nms_rad
         )
 
 

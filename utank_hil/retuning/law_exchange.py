@@ -50,6 +50,8 @@ TRIAL_PATIENCE: Final = 1.5
 MOST_EVENTS: Final = 1000
 """That are kept: two days of a retuning every three minutes."""
 RETRY_NS: Final = 600_000_000_000
+BUSY_NS: Final = 30_000_000_000
+"""A retuner without a sign of life may be busy with an estimate for so long."""
 """Least time to the next exchange without an order after one that failed, or was undone."""
 
 _REQUESTED: Final = "ordered by the operator"
@@ -159,6 +161,7 @@ class LawExchange(ABC):
         self._requested = False
         self._now_ns = self._submitted_ns = self._trial_since_ns = self._not_before_ns = 0
         self._idle_since_ns: int | None = None
+        self._silent_since_ns = 0
         self._applied_pa = 0.0
         self._roll_rad = self._passive_roll_rad = 0.0
         self._fresh = self._engaged = False
@@ -273,14 +276,20 @@ class LawExchange(ABC):
             if ordered:
                 self._log_event((f"{reason}: begins when {_COMPARABLE}",))
             return
-        self._requested = False
         if not self._retuner.alive:
+            self._silent_since_ns = self._silent_since_ns or self._now_ns
+            if self._now_ns - self._silent_since_ns < BUSY_NS:
+                return
+            self._silent_since_ns = 0
+            self._requested = False
             self._not_before_ns = self._now_ns + RETRY_NS
             self._finish(
                 RetuningState.REFUSED,
                 f"{reason}, but the retuner shows no sign of life: try again later",
             )
             return
+        self._silent_since_ns = 0
+        self._requested = False
         self._baseline = self._accepted_window.statistics
         self._heel_rad = self._accepted_window.heel_rad
         self._accepted_window.clear()

@@ -257,6 +257,11 @@ class RenewingController(LawExchange):
     def _accept(self) -> None:
         self._finish(RetuningState.RETUNED, self._on_trial())
 
+    def _undo(self) -> None:
+        self._rests_until_ns = 0  # the law that lost is gone
+        self._forget()
+        super()._undo()
+
     def _finish(self, state: RetuningState, *reasons: str) -> None:
         if state in _AT_REST_AFTER:
             self._not_before_ns = self._now_ns + RETRY_NS

@@ -241,6 +241,7 @@ class ControllerNode:
         self._estimate_schedule = Schedule(round(SAMPLE_TIME_S / TICK_S) * TICK_NS)
         self._figures_schedule = Schedule(self._sea.cycle_ns)
         self._started = self._answered = False
+        self._engaged = self._interrupted = False
         self.start_ns = self.last_ns = 0
         self._observed_cycles = 0
         self._frames_sent = 0
@@ -397,8 +398,9 @@ class ControllerNode:
             self._event_sink(RetuningEvent(now_ns, self.retuning_state, news), self.start_ns)
 
     def _note_causes(self, now_ns: int) -> None:
-        """Keep what may be gone before alarms are looked at, ten times a second."""
+        """Keep what may be gone before alarms, ten times a second, or the law are looked at."""
         supervisor, seen = self.supervisor, self.seen
+        self._interrupted |= supervisor.demand is not _CONTROL
         if supervisor.mode is not _ACTIVE:
             if first_stopping(seen, supervisor.limits):
                 self._passing |= all_stopping(supervisor, seen)
@@ -463,10 +465,15 @@ class ControllerNode:
             self._controller.applied(self._applied.copy())  # a law may keep it
         if self._retuning is not None:
             seen = self.seen
+            # what was in charge at the last answer and not since is for one answer out of charge
+            self._engaged = self.supervisor.demand is _CONTROL and not (
+                self._engaged and self._interrupted
+            )
+            self._interrupted = False
             self._retuning.update(
                 now_ns,
                 self.inbox.stations.take_retuning(),
-                engaged=self.supervisor.demand is Demand.CONTROL,
+                engaged=self._engaged,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
                 passive_roll_rad=self.twin_roll_rad,
             )

@@ -8,9 +8,12 @@ import math
 from collections.abc import Collection, Iterable
 from typing import Final
 
+import numpy as np
+
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.estimate import ShipFigures
@@ -161,9 +164,11 @@ class Monitors:
         self._followed = found
         ship, tank = self._ship, self._tank
         if found is not None and _may_be(found, ship):
-            ship = found.ship(ship)
-            if isinstance(found, ModelSummary):
-                tank = found.tank(tank)
+            hers = found.ship(ship)
+            if np.linalg.det(coupled_matrices(hers, tank)[2]) > 0:  # stable with the tank's water
+                ship = hers
+                if isinstance(found, ModelSummary):
+                    tank = found.tank(tank)
         self.twin.take(ship, tank)
 
     @property

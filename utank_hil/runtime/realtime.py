@@ -5,6 +5,7 @@ is fixed at the start of the run: a late tick does not shift it, and skipped tic
 """
 
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Final
 
@@ -86,25 +87,30 @@ class RealTimeLoop:
         deadline_ns = clock.now_ns()
         end_ns = _NEVER_NS if duration_ns is None else deadline_ns + duration_ns
         self._group.start(deadline_ns)
-        try:
-            while deadline_ns < end_ns:
-                clock.sleep_until(deadline_ns)
-                if stop():
-                    break
-                woken_ns = clock.now_ns()
-                late_ns = woken_ns - deadline_ns
-                # If further points have passed, this tick is that of the latest one.
-                deadline_ns += self._skip((min(woken_ns, end_ns - 1) - deadline_ns) // period_ns)
-                self._tick(deadline_ns)
-                done_ns = clock.now_ns()
-                statistics.ticks += 1
-                statistics.lateness.add(late_ns)
-                statistics.duration.add(done_ns - woken_ns)
-                deadline_ns += period_ns
-                # Points that passed during the tick are skipped.
-                deadline_ns += self._skip(-((deadline_ns - min(done_ns, end_ns)) // period_ns))
-        finally:
-            self._group.stop(clock.now_ns(), self._send)
+        with warnings.catch_warnings():
+            # one that is printed where nobody reads would hold up the tick
+            warnings.simplefilter("ignore")
+            try:
+                while deadline_ns < end_ns:
+                    clock.sleep_until(deadline_ns)
+                    if stop():
+                        break
+                    woken_ns = clock.now_ns()
+                    late_ns = woken_ns - deadline_ns
+                    # If further points have passed, this tick is that of the latest one.
+                    deadline_ns += self._skip(
+                        (min(woken_ns, end_ns - 1) - deadline_ns) // period_ns
+                    )
+                    self._tick(deadline_ns)
+                    done_ns = clock.now_ns()
+                    statistics.ticks += 1
+                    statistics.lateness.add(late_ns)
+                    statistics.duration.add(done_ns - woken_ns)
+                    deadline_ns += period_ns
+                    # Points that passed during the tick are skipped.
+                    deadline_ns += self._skip(-((deadline_ns - min(done_ns, end_ns)) // period_ns))
+            finally:
+                self._group.stop(clock.now_ns(), self._send)
 
     def _skip(self, points: int) -> int:
         """Count skipped grid points; return their duration in ns, 0 if there are none."""
