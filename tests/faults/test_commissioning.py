@@ -3,17 +3,28 @@
 import tracemalloc
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
-from fault_bench import SECOND, altered
+from fault_bench import SECOND, altered, dropped
 from quay import ARM_S, another_ship, commissioned, controller, still_water
 
 from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_commissioning_node, build_controller_node, build_law
-from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, SensorTank, Switch
+from utank_hil.canbus import (
+    DriveFault,
+    DriveState,
+    Fault,
+    Frame,
+    Mode,
+    PumpCommand,
+    SensorMotion,
+    SensorTank,
+    Switch,
+)
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
@@ -21,6 +32,7 @@ from utank_hil.runtime.commissioning.node import REST_S, ROW_S, CommissioningNod
 from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.runtime.commissioning.pulses import plan_pulses
 from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.telemetry.bus_records import RECORD
 from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.node_tap import NodeTap
@@ -289,6 +301,41 @@ def test_a_fault_ends_it_with_its_words() -> None:
     node = commissioned(NAVAL, spoil={"sensors": altered(SensorTank, high)}, begin_ns=begin_ns)
     assert node.ended.startswith("LEVEL_LIMIT: The water in a reservoir is too high")
     assert node.node.command_pa == 0.0
+
+
+def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved() -> None:
+    """Not one row of what moved is recorded then."""
+    scenario = still_water(NAVAL)
+    ship = build_ship_side(scenario, 1, scenario.operator)
+    drive = ship.drive
+    assert drive is not None
+    tick, enabled = drive.tick, count()
+
+    def tripping(now_ns: int) -> Iterable[Frame]:
+        # as soon as the controller has heard that it is enabled
+        if drive._states.state is DriveState.OPERATION_ENABLED and next(enabled) == 2:
+            drive.fail(DriveFault.STALL)
+        return tick(now_ns)
+
+    drive.tick = tripping  # type: ignore[method-assign]
+    node = commissioned(NAVAL, nodes=tuple(ship.nodes))
+    assert node.stage is Stage.DONE
+    assert node.ended.startswith("DRIVE_FAULT")
+
+
+@pytest.mark.parametrize("silent", ["sensors", "sensors_2"])
+def test_a_second_motion_sensor_that_is_not_heard_is_waited_for(silent: str) -> None:
+    """The controller could do without; its zeros and signs would be those of nothing."""
+    config = controller("valve_on_off")
+    vessel = config.vessel.model_copy(
+        update={"pump": None, "redundancy": Redundancy(second_motion_sensor=True)}
+    )
+    config = config.model_copy(update={"vessel": vessel})
+    gone = dropped(SensorMotion) if silent == "sensors" else dropped()
+    node = commissioned(config, spoil={silent: gone})
+    assert node.stage is Stage.WAITING
+    assert "motion sensor is silent" in node.missing
+    assert node.checks() == []
 
 
 def test_without_a_signs_meaning_two_faults_at_a_time_are_both_named() -> None:

@@ -121,6 +121,20 @@ def test_a_drive_that_stays_in_operation_on_quick_stop_is_switched_off_when_it_h
     assert not sequence.ignored
 
 
+def test_a_drive_that_stayed_on_is_not_obedient_because_it_is_to_be_on_again() -> None:
+    """Else PASSIVE, in which it is enabled, would let the next arming pass."""
+    sequence = DriveSequence()
+    for _ in range(QUICK_STOPS + DISABLES + 1):
+        sequence.next_word(S.OPERATION_ENABLED, wanted=False)
+    for _ in range(100):
+        sequence.next_word(S.OPERATION_ENABLED, wanted=True)
+        assert sequence.ignored
+    for _ in range(AT_REST):
+        assert sequence.ignored
+        sequence.next_word(S.SWITCH_ON_DISABLED, wanted=True)
+    assert not sequence.ignored
+
+
 @pytest.mark.parametrize("every", [2, 3, AT_REST])
 def test_a_drive_that_is_off_only_now_and_then_does_not_obey(every: int) -> None:
     sequence = DriveSequence()

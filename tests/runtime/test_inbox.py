@@ -4,7 +4,7 @@ from operator import attrgetter
 from pathlib import Path
 
 import pytest
-from controller_bench import CATALOGUE, VERSION, VESSEL
+from controller_bench import CATALOGUE, MS, VERSION, VESSEL
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,6 +42,7 @@ from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.monitors.spikes import SpikeGates
 from utank_hil.runtime.monitors.thresholds import SensorFigures, thresholds_of
 from utank_hil.runtime.motion_sensors import MotionSensors
+from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.tick import TICK_NS
@@ -658,9 +659,16 @@ def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing() ->
         NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, CATALOGUE.version, VERSION + 1, NAN, NAN
     )
     line.hear(beats.frame(beat))
-    assert not line.inbox.versions_match
+    strange_ns = line.inbox.second_strange_ns
+    assert strange_ns == line.now_ns
+    observer = Observer(line.inbox, 250_000, 20 * MS)
+    for after_ns, match in ((0, False), (10**9, False), (10**9 + 1, True)):  # silent since
+        observer.observe(strange_ns + after_ns, 0)
+        assert observer.seen.versions_match is match
+    line.hear(beats.frame(beat))
     line.hear(beats.frame(beat._replace(configuration_version=VERSION)))
-    assert line.inbox.versions_match
+    observer.observe(line.now_ns, 0)
+    assert observer.seen.versions_match
     expected = {CATALOGUE.receiver(Heartbeat, address).can_id
                 for address in (Address.HARDWIRED, Address.SENSORS_2)}  # fmt: skip
     assert expected <= line.inbox.expected

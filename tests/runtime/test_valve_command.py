@@ -367,6 +367,18 @@ def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.Mon
     assert held[0] > 0.0
 
 
+def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
+    """Where it is by then nobody knows."""
+    bench = ValveBench()
+    bench.run(1000)
+    bench.node._valve._told = 0.0  # as if it had been commanded to shut
+    seen, inbox = bench.node.seen, bench.node.inbox
+    for late_ms in range(10, 2000, 10):
+        bench.node._valve.observe(inbox, seen, inbox.valve_ns + late_ms * 1_000_000)
+    assert seen.valve_age_ms > 1900
+    assert seen.valve_off_ms == 0.0
+
+
 @pytest.mark.parametrize("opening", [0.3, 0.6, 1.0])
 def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
     opening: float,

@@ -133,7 +133,8 @@ class Guide:
             if self._ticks == 0:
                 self._lines.say(node.stage.value)
             elif node.stage is Stage.WAITING:
-                self._lines.say(f"  still {node.node.mode.name}: {fault_text(node.node.fault)}")
+                why = node.missing or fault_text(node.node.fault)
+                self._lines.say(f"  still {node.node.mode.name}: {why}")
             elif node.stage is Stage.ARM:
                 self._lines.say("  waiting for the operator to arm")
             else:

@@ -34,12 +34,12 @@ class DriveSequence:
     Attributes
     ----------
     ignored : bool
-        Whether the drive has been told to be off in vain.
+        Whether the drive has been told to be off in vain, and was not seen off since.
     """
 
     def __init__(self) -> None:
         self._resets_left = 0
-        self._stops = self._rests = 0
+        self._stops = self._rests = self._out = 0
         self.ignored = False
 
     def request_reset(self) -> None:
@@ -72,5 +72,9 @@ class DriveSequence:
             self._rests += 1
             if wanted or self._rests >= AT_REST:
                 self._stops = 0
-        self.ignored = self._stops > QUICK_STOPS + DISABLES
+        self._out = 0 if state in _STOPPING else self._out + 1
+        if self._stops > QUICK_STOPS + DISABLES:
+            self.ignored = True
+        elif self._out >= AT_REST:  # not because it is to be on again
+            self.ignored = False
         return ControlWord.DISABLE_VOLTAGE if self._stops > QUICK_STOPS else word

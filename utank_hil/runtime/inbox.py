@@ -104,6 +104,8 @@ class Inbox:
         State the valve last reported; the echo of a new command came at `valve_echo_ns`.
     stations : Stations
         What the operators want.
+    second_strange_ns : int
+        When a second motion sensor of another version was last heard.
     versions_match : bool
         Drive, sensors and valve run the controller's catalogue and configuration.
     conflict_ns : int
@@ -171,10 +173,14 @@ class Inbox:
         if self.motions is not None:
             matched.append(Address.SENSORS_2)
         self._matching: dict[int, bool] = {}
+        self._second_beat = 0
+        self.second_strange_ns = NEVER_HEARD_NS
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
-            # silent, the second motion sensor is missed but not waited for
-            self._matching[heartbeat.can_id] = address is Address.SENSORS_2
+            self._matching[heartbeat.can_id] = False
+            if address is Address.SENSORS_2:  # silent, it is missed but not waited for
+                self._second_beat = heartbeat.can_id
+                self._matching[heartbeat.can_id] = True
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
         self.expected = frozenset((catalogue.codec(DriveStatus2).can_id, *self._matching))
         self._panels_match = dict.fromkeys(ADDRESSES, False)
@@ -350,9 +356,13 @@ class Inbox:
             self._valve_echo = status.command_echo
             self.valve_echo_ns = now_ns
 
-    def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:  # noqa: ARG002
+    def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)
-        self._matching[can_id] = versions == self._versions
+        matches = versions == self._versions
+        if can_id == self._second_beat:  # silent, it is not waited for
+            self.second_strange_ns = NEVER_HEARD_NS if matches else now_ns
+            return
+        self._matching[can_id] = matches
         self.versions_match = all(self._matching.values())
 
     def _on_claim(self, can_id: int, claim: AddressClaim, now_ns: int) -> None:

@@ -22,6 +22,8 @@ HEEL_AGE_MS: Final = 100.0
 """An older roll says nothing of the heel."""
 CONFLICT_NS: Final = 10_000_000_000
 """A second sender of the controller's address is gone when it has been silent for so long."""
+STRANGE_NS: Final = 1_000_000_000
+"""A second motion sensor of another version is gone when it has been silent for so long."""
 _ALL_LATE: Final = 0x3FF
 
 VALVE_OFF: Final = 0.15
@@ -227,7 +229,7 @@ class Observer:
         )
         seen.address_conflict = now_ns - inbox.conflict_ns <= CONFLICT_NS
         seen.claimed_twice = now_ns - inbox.claimed_twice_ns <= CONFLICT_NS
-        seen.versions_match = inbox.versions_match
+        seen.versions_match = inbox.versions_match and now_ns - inbox.second_strange_ns > STRANGE_NS
         seen.panel_matches = inbox.panel_matches
         seen.protection_valid = inbox.protection_valid
         seen.high_level = inbox.high_level

@@ -21,6 +21,8 @@ from utank_hil.tick import TICK_S
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _FOLLOWING: Final = ValveState.FOLLOWING
 _FAULT: Final = ValveState.FAULT
+STALE_MS: Final = 100.0
+"""Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
 
 
 class ValveCommander:
@@ -88,7 +90,8 @@ class ValveCommander:
             self._expected = inbox.valve_opening
         step = self._told - self._expected
         self._expected += min(max(step, -self._most_step), self._most_step)
-        if abs(inbox.valve_opening - self._expected) <= VALVE_OFF:
+        unknown = seen.valve_age_ms > STALE_MS  # others judge that
+        if unknown or abs(inbox.valve_opening - self._expected) <= VALVE_OFF:
             self._at_place_ns = now_ns
         seen.valve_off_ms = (now_ns - self._at_place_ns) / MILLISECOND_NS
 

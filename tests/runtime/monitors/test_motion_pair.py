@@ -141,6 +141,14 @@ def test_what_was_known_is_kept_while_one_is_silent(which: str) -> None:
     sensor.watch.found = 0
     assert pair.found(400, math.nan) == [DISAGREE] * 400
     assert sensor.accused is True
+    # nor is it forgotten where they never were apart, as with a drift
+    pair = Pair()
+    sensor = getattr(pair, which)
+    sensor.watch.found = int(Finding.DRIFT)
+    pair(0.0)
+    sensor.watch.found = 0
+    assert pair.found(400, math.nan) == [DISAGREE] * 400
+    assert sensor.accused is True
     # of two that agree nothing is found, whichever is silent
     pair = Pair()
     assert pair.found(400, math.nan) == [0] * 400

@@ -29,6 +29,8 @@ ROW_S: Final = ROW_TICKS * TICK_S
 REST_S: Final = 20.0
 SETTLE_S: Final = 1.0
 """From ACTIVE to the first pulse."""
+STALE_MS: Final = 100.0
+"""A motion sensor that is silent for longer is not commissioned."""
 MOST_OVER_PLAN: Final = 3.0
 """A level so many times the plan's ends the pulses."""
 
@@ -180,6 +182,14 @@ class CommissioningNode:
             self._go_on(now_ns)
         return frames
 
+    @property
+    def missing(self) -> str:
+        """What is not heard that the controller could do without, in words; else empty."""
+        motions, seen = self.node.inbox.motions, self.node.seen
+        if motions is None or max(seen.motion_age_ms, seen.motion_spare_age_ms) <= STALE_MS:
+            return ""
+        return "A motion sensor is silent. Check the supply and bus connection of both."
+
     def _note(self, now_ns: int) -> None:
         self._sum += self._values(self.node)
         self._ticks += 1
@@ -198,14 +208,15 @@ class CommissioningNode:
         self._ticks = 0
 
     def _record(self) -> Record:
-        return dict(zip(self._names, np.array(self._rows).T, strict=True))
+        rows = np.array(self._rows).reshape(-1, len(self._names))
+        return dict(zip(self._names, rows.T, strict=True))
 
     def _go_on(self, now_ns: int) -> None:
         mode = self.node.mode
         passed_s = (now_ns - self._since_ns) * 1e-9
         if self.stage is Stage.MOVING:
             self._move(passed_s - SETTLE_S, now_ns)
-        elif mode in (Mode.INIT, Mode.FAULT):
+        elif mode in (Mode.INIT, Mode.FAULT) or self.missing:
             if self.stage is not Stage.WAITING:
                 self._enter(Stage.WAITING, now_ns)
         elif self.stage is Stage.WAITING:
@@ -225,6 +236,8 @@ class CommissioningNode:
             self.ended = (
                 fault_text(node.fault) if node.mode is Mode.FAULT else "Disarmed before the end."
             )
+        elif self.missing:
+            self.ended = self.missing
         elif plan is not None and self._level_m() > MOST_OVER_PLAN * plan.level_m:
             self.ended = (
                 f"The level went {MOST_OVER_PLAN:g} times as far as planned. Check the gauges' "

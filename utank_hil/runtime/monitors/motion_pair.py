@@ -132,7 +132,10 @@ class MotionPair:
         if both:
             self._compare(apart_rad, rate_apart_rad_s)
         apart = self._remembered_s > 0
-        self._quiet_s = 0.0 if used.found or spare.found else self._quiet_s + self._period_s
+        if used.found or spare.found:
+            self._quiet_s = 0.0
+        elif both:  # of one that is silent nothing new is known
+            self._quiet_s += self._period_s
         for sensor in (used, spare):
             keeps = apart or self._quiet_s <= PAUSE_S
             sensor.accused = sensor.found != 0 or (sensor.accused and keeps)
