@@ -1,7 +1,7 @@
 """Scenarios: what the ship's side needs to know, ``configs/scenarios``."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
@@ -58,6 +58,22 @@ _NO_MOMENT: Final = 1e-9
 # where the user sets none, drive and high-level switch are as the first ship's to its pump and tank
 _DRIVE_RATE_PER_PRESSURE: Final = 5.0
 _HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
+
+
+def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault]) -> list[Problem]:
+    """Faults of nodes that a ship does not have."""
+    missing = {
+        "drive": vessel.pump is None,
+        "valve": vessel.valve is None,
+        "sensors_2": not vessel.redundancy.second_motion_sensor,
+        "hardwired": not vessel.redundancy.hardwired_inputs,
+    }
+    return [
+        (f"faults.{place}", f"can't be: the vessel has no {name}")
+        for place, fault in enumerate(faults)
+        for name in fault.node_names()
+        if missing.get(name)
+    ]
 
 
 class Scenario(Section):
@@ -257,19 +273,7 @@ class Scenario(Section):
 
     def _fault_problems(self) -> list[Problem]:
         """Faults of nodes that there are not."""
-        vessel = self.vessel
-        missing = {
-            "drive": vessel.pump is None,
-            "valve": vessel.valve is None,
-            "sensors_2": not vessel.redundancy.second_motion_sensor,
-            "hardwired": not vessel.redundancy.hardwired_inputs,
-        }
-        problems = [
-            (f"faults.{place}", f"can't be: the vessel has no {name}")
-            for place, fault in enumerate(self.faults)
-            for name in fault.node_names()
-            if missing.get(name)
-        ]
+        problems = missing_nodes(self.vessel, self.faults)
         if any(controller.retuning is not None for controller in self.controllers.values()):
             problems += [
                 (f"faults.{place}", "can't be: a controller here retunes itself, its law changes")

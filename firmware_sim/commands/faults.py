@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from firmware_sim.fault_campaign.verdict import Result
 
 CAMPAIGN = CONFIGS / "faults" / "campaign.yaml"
+INTERRUPTED: Final = "interrupted"
 
 
 def faults(
@@ -68,8 +69,9 @@ def faults(
     window = Window() if full else Window(60.0, 20.0)
     too_long = [row for row in chosen if row.long and not (full or names)]
     chosen = [row for row in chosen if row not in too_long]
-    if not chosen and not live:
-        fail(f"--rows: no row or requirement begins with {' or '.join(names)}")
+    for name in names:
+        if not (any(loaded.chosen([name])) or loaded.shown_elsewhere([name])):
+            fail(f"--rows: no row or requirement begins with {name}")
     if out is not None:
         prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()
@@ -106,8 +108,9 @@ def faults(
     }
     not_run |= {row.id: f"shown by {row.elsewhere}" for row in live if row.elsewhere}
     not_run |= {row.id: "takes long: --full or --rows" for row in too_long}
-    not_run |= dict.fromkeys(partly, KILLED if killed else "interrupted")
+    not_run |= dict.fromkeys(partly, KILLED if killed else INTERRUPTED)
     on_bus, waiting, bus_error = _on_bus(loaded, live, None if partly else bus)
+    interrupted = interrupted or bus_error == INTERRUPTED
     not_run |= dict.fromkeys(waiting, bus_error or "needs a live bus: --bus")
     options = {"seeds": seeds, "full": full, "rows": names}
     about = describe("faults", loaded, out or Path(), options=options, seed=1)
@@ -115,7 +118,7 @@ def faults(
         files = write_recordings(out, outcomes, about)
         results = [replace(each, recording=shown(files[each.row.id])) for each in results]
     if junit is not None:
-        write_junit(junit, results, not_run, time.monotonic() - began)
+        write_junit(junit, results, on_bus, not_run, time.monotonic() - began)
     if json_:
         sys.stdout.write(json.dumps(as_json(results, on_bus, not_run, about)) + "\n")
     else:
@@ -155,6 +158,8 @@ def _on_bus(
             del waiting[0]
     except OSError as why_not:
         error = why(why_not)
+    except KeyboardInterrupt:  # what was done is kept
+        error = INTERRUPTED
     return results, [row.id for row in waiting], error
 
 

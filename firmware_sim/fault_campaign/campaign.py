@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from firmware_sim.fault_injection.kinds import AnyFault
-from firmware_sim.scenario import Scenario
+from firmware_sim.scenario import Scenario, missing_nodes
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
 from utank_hil.parameters import Finite, NotNegative, Positive, refuse
@@ -173,6 +173,18 @@ class Row(Section):
     followed_s: Positive = 4.0
     long: bool = False
 
+    @model_validator(mode="after")
+    def _judged_by_something(self) -> "Row":
+        problems = [
+            (f"faults.{place}.at_s", f"must be below followed_s, {self.followed_s:g}")
+            for place, fault in enumerate(self.faults)
+            if fault.at_s >= self.followed_s
+        ]
+        if self.reaction == "alarm" and not self.codes:
+            problems.append(("codes", "are needed: which alarm is it?"))
+        refuse("", problems)
+        return self
+
     @property
     def on_bus(self) -> bool:
         """Whether what it does is seen on the bus at once."""
@@ -238,6 +250,11 @@ class Campaign(Section):
         for place, row in enumerate(self.rows):
             if row.setup not in self.setups:
                 problems.append((f"rows.{place}.setup", f"must be one of {', '.join(self.setups)}"))
+                continue
+            vessel = self.setups[row.setup].equipped.vessel
+            problems += [
+                (f"rows.{place}.{key}", reason) for key, reason in missing_nodes(vessel, row.faults)
+            ]
         met = {name for _, rows in every for row in rows for name in row.meets}
         problems += [
             (f"requirements.{place}", "is shown by no row: add one, or say `elsewhere`")

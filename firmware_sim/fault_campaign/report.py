@@ -41,9 +41,13 @@ def as_json(
 
 
 def write_junit(
-    path: Path, results: Sequence[Result], not_run: Mapping[str, str], seconds: float
+    path: Path,
+    results: Sequence[Result],
+    on_bus: Sequence[Mapping[str, Any]],
+    not_run: Mapping[str, str],
+    seconds: float,
 ) -> None:
-    """Write one test case a row.
+    """Write one test case a row; those on a bus are as `run_live` tells of them.
 
     Raises
     ------
@@ -53,17 +57,27 @@ def write_junit(
     suite = ElementTree.Element(
         "testsuite",
         name="faults",
-        tests=str(len(results) + len(not_run)),
-        failures=str(sum(not result.passed for result in results)),
+        tests=str(len(results) + len(on_bus) + len(not_run)),
+        failures=str(
+            sum(not result.passed for result in results)
+            + sum(told["verdict"] != "pass" for told in on_bus)
+        ),
         skipped=str(len(not_run)),
         time=f"{seconds:.1f}",
     )
-    for result in results:
-        case = ElementTree.SubElement(suite, "testcase", classname="faults", name=result.row.id)
-        if not result.passed:
-            failure = ElementTree.SubElement(case, "failure", message=result.problems[0])
-            failure.text = "\n".join(result.problems)
-        ElementTree.SubElement(case, "system-out").text = f"{result.requirement}\n{result.wire}"
+    told_of = [
+        (each.row.id, each.passed, each.problems, f"{each.requirement}\n{each.wire}")
+        for each in results
+    ] + [
+        (told["id"], told["verdict"] == "pass", told["problems"], told["requirement"])
+        for told in on_bus
+    ]
+    for name, passed, problems, shows in told_of:
+        case = ElementTree.SubElement(suite, "testcase", classname="faults", name=name)
+        if not passed:
+            failure = ElementTree.SubElement(case, "failure", message=next(iter(problems), ""))
+            failure.text = "\n".join(problems)
+        ElementTree.SubElement(case, "system-out").text = shows
     for name, why in not_run.items():
         case = ElementTree.SubElement(suite, "testcase", classname="faults", name=name)
         ElementTree.SubElement(case, "skipped", message=why)

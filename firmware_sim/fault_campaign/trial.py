@@ -184,7 +184,7 @@ class Sea:
             estimating=work and SimulatedRetuner(work[0], scenario.retuner_latency_s),
             commissioned=self._setup.commissioned,
         )
-        recorder.bench = bench
+        recorder.bench, log.node = bench, bench.node
         return Underway(bench, log, recorder)
 
     def prepare(self, rows: list[Row]) -> None:
@@ -228,9 +228,20 @@ class Sea:
 
     def outcome(self, row: Row) -> Outcome:
         """Do a row, in a copy of this process."""
-        return in_a_copy(lambda: self._outcome(row), self._stopped)
+        reference = self._underway.reference
+        if row.operator and row.faults and row.on_bus:
+            reference = in_a_copy(lambda: self._operated(row), self._stopped)
+        return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
 
-    def _outcome(self, row: Row) -> Outcome:
+    def _operated(self, row: Row) -> list[Heard]:
+        """The bus without the row's faults, but with what the operator does."""
+        underway = self._start() if row.from_start else self._underway
+        bench = underway.bench
+        bench.join([Watch(bench, row.operator)])
+        bench.run(bench.lockstep.now_ns + round(row.followed_s * SECOND_NS))
+        return underway.log.frames
+
+    def _outcome(self, row: Row, reference: list[Heard]) -> Outcome:
         underway = self._start() if row.from_start else self._underway
         bench, log = underway.bench, underway.log
         start_ns = bench.lockstep.now_ns
@@ -259,7 +270,7 @@ class Sea:
         passive = self._passive[self._pump_enabled(bench)]
         outcome.passive_variance = float(passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS].var())
         if row.on_bus:
-            difference = first_difference(self._underway.reference, log.frames, watched_ns)
+            difference = first_difference(reference, log.frames, watched_ns)
             outcome.wire = "" if difference is None else _words(*difference, start_ns)
         if self._recorded:
             first_s = (start_ns / SECOND_NS) - RECORDED_S
@@ -275,8 +286,8 @@ class Sea:
         if row.from_start and watch.active_ns is not None:
             begin_ns = watch.active_ns
         if row.counts_from:  # what was found before is in time
-            over_ns = watch.found_ns if watch.over_ns is None else watch.over_ns
-            begin_ns = max(begin_ns, over_ns or begin_ns)
+            known = [each for each in (watch.over_ns, watch.found_ns) if each is not None]
+            begin_ns = max([begin_ns, min(known, default=begin_ns)])
 
         def after(time_ns: int | None) -> float | None:
             return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)

@@ -6,7 +6,9 @@ from typing import Any
 
 from firmware_sim.faulty_bench import FaultyBench
 from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, load_catalogue
+from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
+from utank_hil.runtime.supervisor import Demand
 from utank_hil.tick import TICK_NS
 
 Heard = tuple[int, int, bytes]
@@ -18,11 +20,22 @@ JITTER_S = 0.002
 
 
 class BusLog:
-    """Every frame on the bus, and the controller's pump commands."""
+    """Every frame on the bus, and the controller's pump commands.
+
+    Attributes
+    ----------
+    frames : list
+    commands : list of tuple of (int, float, bool)
+        Time, pressure, and whether the pressure was to be cut.
+    node : ControllerNode
+        Whose commands they are; to be set before the first frame.
+    """
+
+    node: ControllerNode
 
     def __init__(self) -> None:
         self.frames: list[Heard] = []
-        self.commands: list[tuple[int, float]] = []
+        self.commands: list[tuple[int, float, bool]] = []
 
     def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
         """Take a frame."""
@@ -30,16 +43,17 @@ class BusLog:
         if sender == "controller" and frame.can_id == _COMMANDS.can_id and len(frame.data) == 8:
             command = _COMMANDS.decode(frame.data)
             if command is not None:
-                self.commands.append((time_ns, command.pressure_pa))
+                cut = self.node.supervisor.demand is Demand.ZERO
+                self.commands.append((time_ns, command.pressure_pa, cut))
 
     def steepest_pa_s(self, since_ns: int) -> float:
-        """Greatest rate of the commands but of those that ask for nothing, rounding taken off."""
+        """Greatest rate of the commands, but of a cut, rounding taken off."""
         commands = [each for each in self.commands if each[0] >= since_ns]
         return max(
             (
                 (abs(later_pa - pressure_pa) - ROUNDING_PA) / ((later - time) * 1e-9 + JITTER_S)
-                for (time, pressure_pa), (later, later_pa) in pairwise(commands)
-                if later_pa != 0.0
+                for (time, pressure_pa, _), (later, later_pa, cut) in pairwise(commands)
+                if not cut
             ),
             default=0.0,
         )
@@ -114,7 +128,7 @@ class Watch:
         self.pressed_ns = now_ns - TICK_NS
         self.code = Fault.NONE
         self.alarms: set[Fault] = set()
-        self.armed_again = False
+        self.armed_again = self._waited = False
         self.roll_sum = self.roll_square = 0.0
         self.samples = 0
 
@@ -156,8 +170,9 @@ class Watch:
                 self.active_ns = now_ns
             if self.halved_ns is None and supervisor.degraded:
                 self.halved_ns = now_ns
-        if self.found_ns is None and node.fault is not Fault.NONE:
+        if self.found_ns is None and (node.fault is not Fault.NONE or self._waited):
             self.code = node.fault
+        self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
         if self.noted_ns is None and self._count() > self._noted:
             self.noted_ns = now_ns
         if now_ns % (10 * TICK_NS) == 0:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from firmware_sim.fault_injection.fault import (
+    NODE_OF,
     SECOND_NS,
     AnyMessageName,
     Fault,
@@ -14,7 +15,7 @@ from firmware_sim.fault_injection.fault import (
     NodeName,
 )
 from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
-from firmware_sim.fault_injection.faulty_node import Span
+from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span
 from firmware_sim.fault_injection.place import Bench
 from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.canbus import Frame, Station, load_catalogue
@@ -64,6 +65,12 @@ class Disturbed(BusFault):
             refuse("", [("by_s", "is for does: delays, which needs it")])
         return self
 
+    def node_names(self) -> tuple[str, ...]:
+        """The sender of the message, too."""
+        if self.message is None:
+            return self.needs
+        return (*self.needs, NODE_OF[load_catalogue().named(self.message).source])
+
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Disturb the bus."""
         assert bench.bus is not None
@@ -80,6 +87,10 @@ class BitErrors(BusFault):
     """Of the attempts to send, by chance."""
     node: NodeName | None = None
     """Whose transceiver is broken; without it everybody's frames."""
+
+    def node_names(self) -> tuple[str, ...]:
+        """The one with the transceiver, too."""
+        return self.needs if self.node is None else (*self.needs, self.node)
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Disturb the bus; the nodes' interfaces report what their kernel would."""
@@ -234,7 +245,7 @@ class SecondPanel(Fault):
     """What is done there."""
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Join the bus."""
+        """Join the bus, and leave it."""
         panel = OperatorPanel(
             load_catalogue(),
             configuration_version=bench.version,
@@ -242,4 +253,6 @@ class SecondPanel(Fault):
             station=Station.OPERATOR_2,
         )
         panel.name = f"second panel {len(bench.joining)}"
-        bench.joining.append(panel)
+        node = FaultyNode(panel)
+        node.hangs += [Span(-NEVER_NS, span.begin_ns), Span(span.end_ns)]
+        bench.joining.append(node)

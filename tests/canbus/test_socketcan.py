@@ -188,9 +188,27 @@ def test_a_down_interface_is_reported_until_something_works_again(buses):
     buses[0].script = [failure(errno.ENETDOWN), message()]
     with pytest.raises(PortError):
         port.receive()
+    assert list(port.receive()) == [FRAME]  # of before: the kernel reports the error first
+    with pytest.raises(PortError, match="interface down"):
+        port.receive()
+    buses[0].script = [message()]
     assert list(port.receive()) == [FRAME]
     assert list(port.receive()) == []
     assert len(buses) == 1
+
+
+@pytest.mark.parametrize("number", [errno.ENETDOWN, errno.ENODEV])
+def test_an_error_behind_an_error_frame_is_noted_too(buses, number):
+    port = SocketCanPort("can0")
+    buses[0].script = [error_frame(0x040), failure(number)]
+    with pytest.raises(PortError, match="bus-off"):
+        port.receive()
+    if number == errno.ENODEV:
+        assert not buses[0].open
+        return
+    for _ in range(3):
+        with pytest.raises(PortError, match="interface down"):
+            port.receive()
 
 
 def test_a_deleted_interface_is_reopened_when_it_is_back(buses, interfaces):

@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from utank_hil.canbus import Mode, PumpCommand, load_catalogue
 from utank_hil.commands import run as run_module
 from utank_hil.commands.common import new_app
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.replay import replay
 from utank_hil.commands.run import run
 from utank_hil.telemetry.bus_records import Kind
@@ -127,6 +128,19 @@ def test_a_cut_log_is_compared_up_to_where_it_is_whole(folder: Path, tmp_path: P
     assert found["exact"]
     assert 0 < found["ticks"] < 350
     assert "is cut at byte" in found["cut"]
+
+
+def test_a_log_without_a_tick_is_no_equal_one(tmp_path: Path) -> None:
+    content = Path("tests/replay/every-mode.frames").read_bytes()
+    size = len(content)
+    for length in range(size // 20, size, size // 20):  # the head alone, cut within the first block
+        cut = tmp_path / "cut.frames"
+        cut.write_bytes(content[:length])
+        result = invoke(replay, cut)
+        if result.exit_code == ExitCode.USAGE and "no tick" in result.stderr:
+            assert "cut.frames is cut at byte" in result.stderr
+            return
+    raise AssertionError("each has a tick")
 
 
 def test_a_log_of_another_program_state_says_what_is_not_the_same(

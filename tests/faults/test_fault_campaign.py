@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from firmware_sim.commands.faults import faults
 from firmware_sim.fault_campaign import live, runner
-from firmware_sim.fault_campaign.campaign import Campaign, Row
+from firmware_sim.fault_campaign.campaign import Campaign, LiveRow, Row
 from firmware_sim.fault_campaign.live import ACTIONS
 from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy
@@ -25,6 +25,7 @@ from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.control.limiter import CommandLimiter
 from utank_hil.runtime.faults import FAULTS
 
 CAMPAIGN = load_config(Path("configs/faults/campaign.yaml"), Campaign)
@@ -63,6 +64,8 @@ def test_every_live_row_has_what_it_does_or_what_shows_it() -> None:
         ("controller: on_off", "controller: off", "setups.valve.controller"),
         ("meets: [F17]", "meets: [F18]", "requirements"),
         ("{id: F01, ", "{id: F02, ", "requirements.0.id"),
+        ("setup: valve,", "setup: pump,", "rows"),
+        ("within_ms: 200, codes: [DRIVE_WARNING],", "within_ms: 200,", "rows"),
     ],
 )
 def test_what_is_wrong_in_a_campaign_is_named(tmp_path: Path, old: str, new: str, key: str) -> None:
@@ -201,6 +204,56 @@ def test_from_when_a_row_counts(
     assert outcome.found_ms == found_ms
 
 
+def test_what_is_found_before_it_counts_has_no_more_time_to_zero() -> None:
+    watch = SimpleNamespace(
+        active_ns=10**9, over_ns=51 * 10**9, found_ns=41 * 10**9, pressed_ns=43 * 10**9,
+        halved_ns=None, noted_ns=None, alarm_ns=None, code=Fault.NONE, alarms=(), armed_again=False,
+    )  # fmt: skip
+    sea = Sea.__new__(Sea)
+    sea._seed = 1
+    outcome = sea._measured(ROWS["rate-stuck"], cast(Any, watch), BusLog(), 40_000_000_000)
+    assert (outcome.found_ms, outcome.zero_ms) == (0.0, 2010.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ["motion-silent", "tank-silent"])
+def test_a_ramp_that_is_a_cut_is_not_passed(row: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    setup = CAMPAIGN.setups["pump"]
+    law = build_law(setup.config)
+    assert verdict(row, outcome_of(setup, law, ROWS[row])).passed
+    monkeypatch.setattr(CommandLimiter, "ramp_to_zero", CommandLimiter.cut)
+    problems = verdict(row, outcome_of(setup, law, ROWS[row])).problems
+    assert [why.partition(" at ")[0] for why in problems] == ["seed 1: commands changed"]
+
+
+@pytest.mark.slow
+def test_what_the_operator_does_is_not_taken_for_the_fault() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    law = build_law(setup.config)
+    given: dict[str, Any] = {
+        "id": "nothing", "meets": ("F01",), "reaction": "none",
+        "operator": ({"time_s": 0.1, "action": "accept"},),
+    }  # fmt: skip
+    beyond = {"kind": "lost", "message": "SENSOR_MOTION", "at_s": 3.999, "for_s": 0.0005}
+    row = Row.model_validate(given | {"faults": (beyond,)})
+    assert outcome_of(setup, law, row).wire == ""
+    assert outcome_of(setup, law, Row.model_validate(given)).wire != ""
+
+
+@pytest.mark.slow
+def test_where_nobody_arms_nothing_is_found() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    row = Row.model_validate(
+        {
+            "id": "nobody-arms", "meets": ("F01",), "reaction": "stop", "from_start": True,
+            "faults": ({"kind": "value", "message": "OPERATOR_CMD", "values": {"arm": False}},),
+        }
+    )  # fmt: skip
+    outcome = outcome_of(setup, build_law(setup.config), row)
+    assert outcome.code == "NONE"
+    assert "seed 1: was not found" in judged(row, setup, "", [outcome]).problems
+
+
 def test_first_difference_of_two_logs() -> None:
     log = [(1, 2, b"a"), (3, 2, b"b")]
     assert first_difference(log, log, 10) is None
@@ -321,6 +374,32 @@ def test_a_bus_that_cannot_be_used_loses_no_results() -> None:
     assert waiting["why"] in done.stderr
 
 
+@pytest.mark.parametrize("ended", [False, True])
+def test_results_of_live_rows_are_in_every_output(
+    ended: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def run_live(row: LiveRow, *_: str) -> dict[str, Any]:
+        if ended and row.id != "live-controller-killed":
+            raise KeyboardInterrupt
+        return {
+            "id": row.id, "verdict": "fail", "problems": ["too late"], "requirement": "F",
+            "found_ms": None, "zero_ms": 99.0, "limit_ms": 50.0,
+        }  # fmt: skip
+
+    monkeypatch.setattr(live, "run_live", run_live)
+    file = tmp_path / "junit.xml"
+    done = invoke("--rows", "live-", "--bus", "vcan0", "--json", "--junit", str(file))
+    assert done.exit_code == (ExitCode.INTERRUPTED if ended else ExitCode.REFUSED)
+    told = json.loads(done.stdout)
+    assert [row["id"] for row in told["rows"]][:1] == ["live-controller-killed"]
+    suite = ElementTree.parse(file).getroot()
+    assert suite.get("failures") == str(len(told["rows"]))
+    assert suite.get("tests") == str(len(told["rows"]) + len(told["not_run"]))
+    failure = suite.find("testcase[@name='live-controller-killed']/failure")
+    assert failure is not None
+    assert failure.get("message") == "too late"
+
+
 def test_an_ended_campaign_begins_no_live_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "run_rows", lambda _, rows, *__, **___: {r.id: [] for r in rows})
     monkeypatch.setattr(live, "run_live", lambda *_: pytest.fail("begun"))
@@ -353,6 +432,7 @@ def test_rows_that_take_long_are_left_out_unless_they_are_asked_for(
 
 
 @pytest.mark.parametrize(("arguments", "words"), [(["--rows", "no-such"], "no row"),
+                                                  (["--rows", "F12,motoin"], "motoin"),
                                                   (["none.yaml"], "none.yaml")])  # fmt: skip
 def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
     done = invoke(*arguments)

@@ -13,7 +13,7 @@ from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.scenario import Scenario
+from firmware_sim.scenario import Scenario, missing_nodes
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.canbus import (
@@ -248,6 +248,30 @@ def test_pump_drive_law_and_operator_fail() -> None:
     assert panel.bench.node.mode is Mode.STANDBY
     other = CATALOGUE.named("OPERATOR_CMD_2").codec
     assert any(other.decode(frame.data).stop for frame in panel.of(other))
+
+
+def test_a_second_panel_comes_and_goes_when_its_fault_says() -> None:
+    bus = Bus({"kind": "second_panel", "at_s": 0.1, "for_s": 0.25})
+    own = CATALOGUE.named("OPERATOR_CMD_2").codec.can_id
+    times_s = [time_ns / SECOND for time_ns, _, frame in bus.heard if frame.can_id == own]
+    assert FAULT_S + 0.1 <= min(times_s) < FAULT_S + 0.15
+    assert FAULT_S + 0.3 <= max(times_s) < FAULT_S + 0.35
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "bit_errors", "share": 1.0, "node": "valve"},
+        {"kind": "gateway", "does": "loses", "message": "VALVE_STATUS"},
+        {"kind": "gateway", "does": "loses", "message": "HARDWIRED_INPUTS"},
+    ],
+)
+def test_a_fault_of_the_bus_that_needs_a_node_the_ship_has_not_is_refused(
+    fault: dict[str, object],
+) -> None:
+    assert missing_nodes(storm().vessel, [TypeAdapter(AnyFault).validate_python(fault)])
+    fine = fault | ({"node": "sensors"} if "node" in fault else {"message": "SENSOR_TANK"})
+    assert not missing_nodes(storm().vessel, [TypeAdapter(AnyFault).validate_python(fine)])
 
 
 def placed(*faults: dict[str, object], until_s: float, arm_s: float | None = None) -> FaultyBench:

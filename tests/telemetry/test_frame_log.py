@@ -103,6 +103,19 @@ def test_parts_are_read_as_one_log_and_each_has_the_head(tmp_path: Path) -> None
     assert (middle.head, middle.first_part) == (HEAD, False)
 
 
+def test_nothing_is_read_beyond_a_damaged_part(tmp_path: Path) -> None:
+    """What follows a gap would look as if the controller had answered otherwise."""
+    names = ["run-a.frames", "run-a-part002.frames"]
+    whole, _ = [write_log(tmp_path / name, 300, seed=seed)[0] for seed, name in enumerate(names)]
+    content = bytearray((tmp_path / names[0]).read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / names[0]).write_bytes(content)
+    records, log = read(tmp_path / names[0])
+    assert 0 < len(records.tobytes()) < len(whole)
+    assert whole.startswith(records.tobytes())
+    assert log.cut.startswith("run-a.frames is damaged")
+
+
 def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
     for content in (b"", b"time_s,roll_rad\n0,1\n"):
         (tmp_path / "a.frames").write_bytes(content)

@@ -82,7 +82,7 @@ class SocketCanPort:
         self.standard_frames = 0
         self.remote_frames = 0
         self._can_ids = None if can_ids is None else tuple(can_ids)
-        self._down = False
+        self._down = self._drained = False
         self._pending: PortError | None = None
         self._closed = False
         self._bus: can.BusABC | None = None
@@ -112,9 +112,11 @@ class SocketCanPort:
                 raise error
             self._pending = error
         elif frames:
-            self._down = False
+            if self._drained:
+                self._down = False
         elif self._down:
             # the kernel reports it only once, and later reads look like a quiet bus
+            self._drained = True
             raise self._port_error("interface down", _REMEDIES[errno.ENETDOWN])
         return frames
 
@@ -133,7 +135,8 @@ class SocketCanPort:
                 # not recv(0), which uses the wall clock and blocks when that is set back
                 message, _filtered = bus._recv_internal(0)
             except (can.CanError, OSError) as error:
-                return frames, first or self._failure(error)
+                failure = self._failure(error)
+                return frames, first or failure
             if message is None:
                 break
             if message.is_error_frame:
@@ -199,7 +202,8 @@ class SocketCanPort:
         number = error.error_code if isinstance(error, can.CanError) else error.errno
         if number in _GONE:
             self._close_bus()
-        self._down = self._down or number == errno.ENETDOWN
+        if number == errno.ENETDOWN:
+            self._down, self._drained = True, False  # frames of before may still be queued
         remedy = _REMEDIES.get(number or 0, _CHECK_BUS)
         return self._port_error(str(error), remedy, number)
 

@@ -66,6 +66,8 @@ def replay(
             cut = recording.cut
     except (OSError, ValueError) as error:
         fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)
+    if not result.ticks:
+        fail(f"{log}: there is no tick in it to compare{f': {cut}' if cut else ''}")
     if result.lost_rows:
         why.insert(0, f"the recorder lost {result.lost_rows} rows of the log")
     exact = result.exact and not any(line.startswith("law, ") for line in why)

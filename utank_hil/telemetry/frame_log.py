@@ -158,6 +158,8 @@ class FrameLog:
             for kind, payload in self._read(path):
                 if kind in _DECOMPRESS:
                     yield unpack(_DECOMPRESS[kind](payload))
+            if self.cut:  # what comes after a gap is not the same run any more
+                break
         if self.cut and note is not None:
             note(self.cut)
 
