@@ -54,7 +54,7 @@ LONG_PERIODS: Final = 3.0
 """So long longer gaps may keep the tank's equation from judging, though measurements come."""
 
 ROOM_OF_VALVE: Final = 1.1
-"""On the twin's thresholds: in short seas a valve costs a sound law up to a sixth of the roll."""
+"""On the twin's thresholds: the loss of a valve is known by half."""
 MOST_CHANGE: Final = 10.0
 """Of inertia and stiffness by loading, either way: more is an error of the identification."""
 MOST_DAMPING_RATIO: Final = 1.0
@@ -120,7 +120,10 @@ class Monitors:
         self._port_stuck, self._starboard_stuck = GaugeStuck(thresholds), GaugeStuck(thresholds)
         self.volume = Volume(thresholds)
         room = ROOM_OF_VALVE if plant.valve else 1.0
-        self.twin = PassiveTwin(ship, tank, SHORT_S, thresholds.amplified_roll_rad, room=room)
+        self._open_loss = plant.valve.open_loss if plant.valve else 0.0
+        self.twin = PassiveTwin(
+            ship, tank, SHORT_S, thresholds.amplified_roll_rad, self._open_loss, room=room
+        )
         self._ship, self._tank = ship, tank
         self._followed: ModelSummary | ShipFigures | None = None
         # what a valve that is nearly shut holds back is uncertain: only a wrong sign is told then
@@ -256,7 +259,7 @@ class Monitors:
                 limited=inbox.drive_held_back,
             )
         elif phase == 2 or phase == 7:
-            self._look_at_twin(inbox, seen, level_rate_m_s, excused=excused)
+            self._look_at_twin(inbox, seen, level_rate_m_s, held_pa, excused=excused)
         elif phase == 3:
             self._look_at_water(now_ns, inbox, seen, held_pa)
         elif phase == 4 or phase == 9:
@@ -343,13 +346,21 @@ class Monitors:
         return used
 
     def _look_at_twin(
-        self, inbox: Inbox, seen: Observations, level_rate_m_s: float, *, excused: bool
+        self,
+        inbox: Inbox,
+        seen: Observations,
+        level_rate_m_s: float,
+        held_pa: float,
+        *,
+        excused: bool,
     ) -> None:
         twin = self.twin
         if excused or self._pair.unclear or seen.motion_age_ms > STALE_MS:
             twin.excuse()
         # the last pressure that was measured may have ended long ago
         pressure_pa = inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else seen.command_pa
+        # what a valve that is not open takes from the water acts like a pump
+        pressure_pa -= held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
         twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, pressure_pa)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
 

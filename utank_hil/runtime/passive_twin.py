@@ -18,8 +18,9 @@ and the tank's quadratic loss.
 The twin's model is the configuration's ship. A ship that was loaded otherwise makes d wrong by as
 much as her answer to the pump differs, and nothing where the pump does nothing.
 
-A tank's valve counts as open. Where it throttles the water, the pump does less than d, so a ship
-with a valve is compared with more room.
+The twin has her valve open. What the valve takes beyond that from the water acts on the ship as the
+pump does, with the sign turned. Its loss is known by half, so a ship with a valve is compared with
+more room.
 """
 
 import math
@@ -64,6 +65,8 @@ class PassiveTwin:
         Time between two updates.
     least_roll_rad : float
         Own root mean square below which nothing is judged.
+    open_loss : float
+        Of the tank's valve, fully open, in Pa per (m/s)^2 of the level's rate.
     room : float
         Factor on the ratios of own roll to the twin's at which a law has lost.
 
@@ -81,11 +84,13 @@ class PassiveTwin:
         tank: Tank,
         period_s: float,
         least_roll_rad: float,
+        open_loss: float = 0.0,
         *,
         room: float = 1.0,
     ) -> None:
         self._period_s = period_s
         self._amplified, self._record = room * AMPLIFIED, room * RECORD
+        self._open_loss = open_loss
         self._made = np.zeros(7)
         self._effort = self._made[4:]
         self.take(ship, tank)
@@ -109,7 +114,7 @@ class PassiveTwin:
         transition, step = transition_and_step(a, np.column_stack([b, b[:, 0]]), self._period_s)
         self._step = np.hstack([transition, step])
         self._damping = ship.quadratic_damping_nms2_rad2
-        self._loss = tank.quadratic_loss_pa_per_m2_s2
+        self._loss = tank.quadratic_loss_pa_per_m2_s2 + self._open_loss
         moment = restoring(ship)
         self._stiffness = ship.stiffness_nm_rad
         self._piece_rad = moment.piece_rad
@@ -145,7 +150,7 @@ class PassiveTwin:
         roll_rad, rate_rad_s, level_rate_m_s : float
             Of the ship and her water.
         pressure_pa : float
-            Across the pump.
+            Across the pump, less what the valve takes beyond an open one.
         """
         made, effort = self._made, self._effort
         effort[0] = 0.5 * (pressure_pa + self._pressure_pa)
