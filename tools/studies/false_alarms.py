@@ -3,7 +3,7 @@
     python -m tools.studies.false_alarms [--hours 50] [--json]
 
 Each law of configs/controllers sails for so many hours in each sea and, where its ship has one,
-half as many on the voyage; a law that can be retuned is retuned every second hour, pulses included. The unit is an
+half as many on the voyage; a law that can be retuned is so every second hour, pulses included. The unit is an
 hour of its own seed. Of each hour the largest statistic of each monitor over its threshold is kept
 (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the same command goes
 on, in a fresh clone with the hours of docs/evidence. Those of an earlier code are kept where the
@@ -209,7 +209,9 @@ def rated(case: tuple[str, str, Scenario, int]) -> dict[str, Any]:
 def main() -> int:
     """Sail what is missing, and print the rates."""
     parser = command_line(__doc__)
-    parser.add_argument("--hours", type=int, default=50, help="of each law in each sea; on the voyage half")
+    parser.add_argument(
+        "--hours", type=int, default=50, help="of each law in each sea; on the voyage half"
+    )
     parser.add_argument("--law", action="append", help="only this one; may be given again")
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     options = parser.parse_args()
