@@ -3,14 +3,14 @@
     python -m tools.studies.false_alarms [--hours 50] [--json]
 
 Each law of configs/controllers sails for so many hours in each sea and, where its ship has one,
-half as many on the voyage; a law that can be retuned is so every second hour, pulses included. The unit is an
-hour of its own seed. Of each hour the largest statistic of each monitor over its threshold is kept
-(`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the same command goes
-on, in a fresh clone with the hours of docs/evidence. Those of an earlier code are kept where the
-second of that law and sea comes out the same once more: each statistic to four digits, and what was
-found. A Gumbel distribution is fitted to the hourly maxima of each law in each sea; its tail beyond
-1 is the rate of false alarms there. Over all laws and seas it is the mean. The aim is one in 1000
-hours.
+half as many on the voyage; a law that can be retuned is so every second hour, pulses included. The
+unit is an hour of its own seed. Of each hour the largest statistic of each monitor over its
+threshold is kept (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the
+same command goes on, in a fresh clone with the hours of docs/evidence. Those of an earlier code are
+kept where the second of that law and sea comes out the same once more: each statistic to four
+digits, and what was found. A Gumbel distribution is fitted to the hourly maxima of each law in each
+sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it is the mean. The
+aim is one in 1000 hours.
 """
 
 import json
