@@ -120,9 +120,11 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
-        "ControllerNode._note_causes: if supervisor.mode is not _ACTIVE and "
-        "first_stopping(seen, supervisor.limits): -> if True:": (
-            "a shortcut: nothing stops the pump then, and in ACTIVE it is latched in the same tick"
+        "ControllerNode._note_causes: if first_stopping(seen, supervisor.limits): -> if True:": (
+            "a shortcut: nothing stops the pump then"
+        ),
+        "ControllerNode._note_causes: if supervisor.degraded: -> if True:": (
+            "a shortcut: nothing halves the pressure then"
         ),
         ": QUIET_START_NS: Final = 10000000000 -> QUIET_START_NS: Final = 10000000001": (
             _A_NANOSECOND
@@ -162,11 +164,11 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "inbox.level_m), fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS)": _AT_50_MS,
         "ControllerNode._control: self._law_pa = 0.0 -> self._law_pa = 1.0": _ROUNDED,
         "ControllerNode._answer: self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(), engaged=self.supervisor.demand is "
-        "Demand.CONTROL, fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS, "
+        "self.inbox.stations.take_retuning(), engaged=self._engaged, "
+        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS, "
         "passive_roll_rad=self.twin_roll_rad) -> self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(), engaged=self.supervisor.demand is "
-        "Demand.CONTROL, fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
+        "self.inbox.stations.take_retuning(), engaged=self._engaged, "
+        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
         "passive_roll_rad=self.twin_roll_rad)": _AT_50_MS,
         "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
         "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 1.0)), "
