@@ -448,6 +448,21 @@ def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
     assert not noted.engaged[-1]
 
 
+@pytest.mark.parametrize("phase_ms", range(0, 200, 50))
+def test_a_law_is_in_charge_from_the_first_answer_after_arming(
+    phase_ms: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    monkeypatch.setattr(bench.node, "_retuning", noted)
+    bench.run(400 + phase_ms)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    while bench.node.mode is not Mode.ACTIVE:
+        bench.tick()
+    noted.engaged.clear()
+    bench.run(600)
+    assert all(noted.engaged)
+
+
 @pytest.mark.parametrize("phase_ms", range(0, 200, 10))
 def test_whoever_disarms_and_arms_between_two_answers_is_out_of_charge_for_one(
     phase_ms: int, monkeypatch: pytest.MonkeyPatch

@@ -128,6 +128,18 @@ def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:
     assert not any(amplified for _, amplified in rolled(0.1, 0.0, 20 * PERIOD_S, excused=True))
 
 
+def test_loss_of_an_open_valve_slows_the_water_of_the_twin() -> None:
+    made = []
+    for open_loss in (0.0, 50e3):
+        twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD, open_loss)
+        rolls = []
+        for k in range(4000):
+            twin.update(0.0, 0.0, 0.0, 20e3 * math.sin(0.6 * k * STEP_S))
+            rolls.append(twin.roll_rad)
+        made.append(np.std(rolls[2000:]))
+    assert made[1] < 0.9 * made[0]
+
+
 def gz_table(points: int) -> RollShip:
     """Patti-B with her softening curve as a table of righting levers."""
     step_rad, displacement_n = math.radians(10.0), 2.366e6

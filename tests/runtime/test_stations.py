@@ -160,7 +160,7 @@ def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
 def test_a_station_that_takes_the_command_without_the_arm_bit_disarms() -> None:
     bench = active_bench()
     bench.second_is(take_command=True)
-    bench.run(100)
+    bench.tick()
     assert bench.node.mode is Mode.PASSIVE
 
 

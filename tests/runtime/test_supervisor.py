@@ -798,3 +798,10 @@ def test_each_finding_of_the_monitors_does_something(finding: Finding) -> None:
     assert (supervisor.mode is Mode.FAULT) is (finding.name not in (*DEGRADING, *WARNING))
     warned = judging.all_warning(replace(HEALTHY, found=int(finding)), SafetyLimits())
     assert bool(warned) is (finding.name in WARNING)
+
+
+def test_everything_that_halves_is_named_and_nothing_else() -> None:
+    seen = replace(HEALTHY, tank_age_ms=150.0, pump_age_ms=250.0, found=int(Finding.SATURATED))
+    halving = judging.all_halving(seen, SafetyLimits())
+    assert halving == {Fault.TANK_SILENT, Fault.PUMP_SENSOR_SILENT, Fault.SATURATION}
+    assert judging.all_halving(replace(HEALTHY, commissioned=False), SafetyLimits()) == set()

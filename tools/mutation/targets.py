@@ -90,6 +90,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "heard = self.receiver.intact(frame)": _LONGER_WAY,
     },
     "utank_hil/runtime/inbox.py": {
+        "Inbox.__init__: self._second_beat = 0 -> self._second_beat = 1": (
+            "no heartbeat has either identifier"
+        ),
         ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 2 << 62": _NEVER,
         ": _ABSENT_NS: Final = 1 << 62 -> _ABSENT_NS: Final = 1 << 63": _NEVER,
         ": _Accept = Callable[[Frame], tuple[Any, ...] | None] -> "
@@ -120,6 +123,8 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
     "utank_hil/runtime/controller_node.py": {
+        "ControllerNode.__init__: self._engaged = self._interrupted = False -> "
+        "self._engaged = self._interrupted = True": "nobody is in charge at the first answer",
         "ControllerNode._note_causes: if first_stopping(seen, supervisor.limits): -> if True:": (
             "a shortcut: nothing stops the pump then"
         ),
@@ -245,6 +250,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "SpikeGate.__init__: self._in_a_row = 0 -> self._in_a_row = 1": _SET_FIRST,
     },
     "utank_hil/runtime/monitors/senders.py": {
+        "Stream.update: if receiver.changes: -> if True:": (
+            "a shortcut: without changes nothing is taken off"
+        ),
         "Senders.__init__: self._now_s = 0.0 -> self._now_s = 1.0": _DIFFERENCES,
         "Senders.__init__: self._damaged_s = [-math.inf] * DAMAGED_FRAMES -> "
         "self._damaged_s = [-3.141592653589793] * DAMAGED_FRAMES": _LONG_AGO,
@@ -308,6 +316,13 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "math.radians(UNCONFIRMED_HEEL_DEG)": _AT_THE_BOUND,
     },
     "utank_hil/runtime/passive_twin.py": {
+        "PassiveTwin.__init__: def __init__(self, ship: RollShip, tank: Tank, period_s: float, "
+        "least_roll_rad: float, open_loss: float=0.0, *, room: float=1.0) -> None: -> def "
+        "__init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float, "
+        "open_loss: float=1.0, *, room: float=1.0) -> None:": _LOSS,
+        "PassiveTwin.update: if not abs(float(made[0])) < MOST_MADE_RAD: -> if not "
+        "abs(float(made[0])) <= MOST_MADE_RAD:": "no pump makes exactly one radian",
+        "PassiveTwin.update: made[:4] = 0.0 -> made[:5] = 0.0": _SET_FIRST,
         **dict.fromkeys(
             (
                 "PassiveTwin.take: self._straight = len(self._pieces) == 1 and "

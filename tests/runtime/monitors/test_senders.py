@@ -173,6 +173,23 @@ def test_frames_on_a_change_may_come_beside_the_cycle(changes_per_s: int) -> Non
     assert panel(5 + changes_per_s, 0) is not None
 
 
+def test_more_than_twenty_changes_a_second_are_counted() -> None:
+    assert panel(5 + 24, 24) is not None
+
+
+def test_what_was_rejected_or_changed_before_says_nothing_of_now() -> None:
+    counted = Counted(200_000_000, heard=90, changes=50)
+    counted.rejected[Rejection.REPEATED] = 7
+    senders = Senders([Stream(counted)], 1700.0)
+    found = []
+    for k in range(200):
+        counted.heard += 1  # ten a second, of which five are of the cycle
+        counted.changes += k % 2 if k < 100 else 0
+        found.append(bool(senders.update(0, STEP_S) & Finding.SECOND_SENDER))
+    assert not any(found[:100])
+    assert any(found[100:130])
+
+
 def test_changes_are_no_excuse_for_a_flood_nor_for_a_second_sender() -> None:
     flood_s = panel(100, 95)
     assert flood_s is not None
