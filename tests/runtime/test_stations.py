@@ -157,9 +157,10 @@ def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
     assert not bench.node.inbox.stations.take_retuning().retune
 
 
-def test_a_station_that_takes_the_command_without_the_arm_bit_disarms() -> None:
+@pytest.mark.parametrize("asked", [Mode.STANDBY, Mode.ACTIVE])
+def test_a_station_that_takes_the_command_without_the_arm_bit_disarms(asked: Mode) -> None:
     bench = active_bench()
-    bench.second_is(take_command=True)
+    bench.second_is(take_command=True, mode_request=asked)
     bench.tick()
     assert bench.node.mode is Mode.PASSIVE
 
