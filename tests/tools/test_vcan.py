@@ -186,6 +186,12 @@ def test_wrong_usage_is_refused(arguments: tuple[str, ...]) -> None:
     assert done.stdout == b""
 
 
+def test_no_time_limit_holds_real_time_processes_up() -> None:
+    """One of 10 ms, counted in ticks of 10 ms, held a loop for 50 ms once a second."""
+    limit = run(WAY, "cat", "/proc/sys/kernel/sched_rt_runtime_us")
+    assert limit.stdout.strip() == b"-1"
+
+
 def test_two_processes_talk_on_vcan0_and_candump_hears_every_frame() -> None:
     done = run(WAY, sys.executable, "-c", CONVERSATION, sys.executable, SENDER, ANSWERER)
     assert done.returncode == 0, done.stderr.decode()
