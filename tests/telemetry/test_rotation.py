@@ -24,6 +24,7 @@ from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rotation import Rotation, make_room, part_of, remove_oldest
 
 TIME = SIGNALS.index("time_s")
+EVENT_EVERY = 4  # rows: the ring's 64 last while a busy machine starts the recorder
 
 
 def rows(first: int, count: int) -> np.ndarray:
