@@ -14,6 +14,10 @@ from utank_hil.parameters import Finite, NotNegative, Positive, refuse
 from utank_hil.retuning import EstimateSettings
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
+from utank_hil.tick import TICK_S
+
+_PHASES: Final = 100
+_PHASE_STRIDE: Final = 37
 
 
 def _fault_name(name: str) -> str:
@@ -125,7 +129,7 @@ class Row(Section):
     Attributes
     ----------
     faults : tuple
-        Their times count from `Campaign.fault_s`.
+        Their times count from `Campaign.fault_at_s`.
     operator : tuple of TimedAction
         What the operator does besides; times after the fault began.
     within_ms, halved_within_ms, zero_within_ms : float, optional
@@ -214,7 +218,15 @@ class LiveRow(Section):
 
 
 class Campaign(Section):
-    """Requirements and rows."""
+    """Requirements and rows.
+
+    Attributes
+    ----------
+    fault_s : float
+        When the faults begin, or up to a second later: see `fault_at_s`.
+    arm_s : float
+        When the operator arms.
+    """
 
     fault_s: NotNegative
     arm_s: NotNegative
@@ -263,6 +275,14 @@ class Campaign(Section):
         ]
         refuse("", problems)
         return self
+
+    def fault_at_s(self, seed: int) -> float:
+        """When the faults begin in the sea of a seed: in each at another phase of the messages.
+
+        Any hundred seeds in a row have each of the hundred ticks of the slowest cycle, a second;
+        any five have each tick of a cycle of 50 ms.
+        """
+        return self.fault_s + TICK_S * (_PHASE_STRIDE * seed % _PHASES)
 
     def chosen(self, names: Sequence[str]) -> tuple[list[Row], list[LiveRow]]:
         """Rows whose name, or what they meet, begins with one of the names; all without any."""

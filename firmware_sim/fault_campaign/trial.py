@@ -162,14 +162,15 @@ class Sea:
         self._stopped = stopped
         self._campaign, self._setup, self._law = campaign, setup, law
         self._seed, self._window, self._recorded = seed, window, recorded
-        self._fault_ns = round(campaign.fault_s * SECOND_NS)
+        self._fault_s = campaign.fault_at_s(seed)
+        self._fault_ns = round(self._fault_s * SECOND_NS)
         self._underway = self._start()
         self._underway.bench.run(self._fault_ns)
         self._passive: dict[bool, FloatArray] = {}
 
     def _start(self) -> Underway:
         log, recorder = BusLog(), Recorder()
-        scenario = self._setup.scenario_of(self._campaign.fault_s)
+        scenario = self._setup.scenario_of(self._fault_s)
         config = self._setup.config
         work = estimator_work(config)
         bench = FaultyBench(
@@ -213,11 +214,18 @@ class Sea:
         self._underway.bench.run(end_ns)
         return self._underway.log.frames[known:]
 
-    def _passive_roll(self, seconds: float, *, enabled: bool) -> FloatArray:
-        """Of the ship that was passive all along, her pump enabled at zero pressure or off."""
-        plant = build_ship_side(
-            self._setup.scenario_of(self._campaign.fault_s), self._seed, ()
-        ).plant
+    def _passive_roll(
+        self, seconds: float, *, enabled: bool, opening: float | None = None
+    ) -> FloatArray:
+        """Of the ship that was passive all along, her pump enabled at zero pressure or off.
+
+        Her valve is where it goes without power, or where it stuck: `opening`.
+        """
+        scenario = self._setup.scenario_of(self._fault_s)
+        plant = build_ship_side(scenario, self._seed, ()).plant
+        valve = scenario.vessel.valve
+        if opening is not None and valve is not None:
+            plant.set_valve_loss(valve.loss(scenario.vessel.tank, opening))
         plant.advance(0)
         plant.drive_pump(0.0, enabled=enabled)
         rolls = []
@@ -268,6 +276,13 @@ class Sea:
         outcome.mode = bench.node.mode.name
         outcome.roll_variance, outcome.window_s = rolls.variance, window_s
         passive = self._passive[self._pump_enabled(bench)]
+        valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
+        if valve is not None and own is not None and valve.opening != own.fail_opening and stopped:
+            passive = self._passive_roll(
+                (end_ns - self._fault_ns) / SECOND_NS,
+                enabled=self._pump_enabled(bench),
+                opening=valve.opening,
+            )
         outcome.passive_variance = float(passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS].var())
         if row.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)

@@ -18,7 +18,7 @@ from utank_hil.canbus import (
     SensorMotion,
     Switch,
 )
-from utank_hil.runtime.alarms import GONE_NS, AlarmEvent, AlarmList
+from utank_hil.runtime.alarms import GONE_NS, AlarmEvent, AlarmList, Gravity
 
 SECOND_NS = 1_000_000_000
 HIGH, SILENT = Fault.LEVEL_LIMIT, Fault.TANK_SILENT
@@ -32,9 +32,9 @@ class Table:
         self.list = AlarmList()
         self.now_ns = 0
 
-    def run(self, seconds: float, *active: Fault) -> None:
+    def run(self, seconds: float, *active: Fault, gravity: Gravity = Gravity.NOTHING) -> None:
         for _ in range(round(10 * seconds)):
-            self.list.update(active, Mode.STANDBY, self.now_ns)
+            self.list.update(dict.fromkeys(active, gravity), Mode.STANDBY, self.now_ns)
             self.list.next_message(self.now_ns)
             self.now_ns += SECOND_NS // 10
 
@@ -279,7 +279,7 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
 
 def test_accepting_counts_for_what_was_sent() -> None:
     table = Table()
-    table.list.update({HIGH}, Mode.STANDBY, 0)
+    table.list.update({HIGH: Gravity.ENDS}, Mode.STANDBY, 0)
     table.accept()
     table.accept(HIGH)
     assert table.list.unaccepted
@@ -289,6 +289,22 @@ def test_accepting_counts_for_what_was_sent() -> None:
     table.list.raise_anew(HIGH, Mode.FAULT, table.now_ns)
     table.accept()
     assert table.list.unaccepted
+
+
+def test_what_is_graver_than_what_was_accepted_alarms_again_and_what_is_less_grave_does_not():
+    table = Table()
+    table.run(1, HIGH)
+    table.accept()
+    table.run(1, HIGH, gravity=Gravity.HALVES)
+    assert table.states == [ACTIVE, ACCEPTED, ACTIVE]
+    table.accept()
+    for gravity in (Gravity.ENDS, Gravity.NOTHING, Gravity.ENDS):
+        table.run(9, HIGH, gravity=gravity)
+        table.accept()
+    assert table.states == [ACCEPTED, ACTIVE, ACCEPTED]  # as of a roll: it was never gone
+    table.run(11, HIGH)
+    table.run(1, HIGH, gravity=Gravity.ENDS)
+    assert table.states == [ACTIVE]
 
 
 class Told(ControllerBench):
@@ -320,6 +336,19 @@ def test_what_is_raised_in_the_tick_of_an_acceptance_is_not_accepted() -> None:
         (HIGH, ACTIVE),
     ]
     assert bench.status.alarm
+
+
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
+def test_a_late_tick_that_was_accepted_hides_no_stall_of_the_loop(mode: Mode) -> None:
+    bench = Told()
+    bench.order_is(mode_request=mode)
+    bench.run(1000)
+    bench.tick(late_ticks=1)
+    bench.run(400)
+    bench.accept()
+    bench.tick(late_ticks=6)
+    bench.run(120)
+    assert [(event.code, event.state) for event in bench.told] == [(Fault.OVERRUN, ACTIVE)]
 
 
 def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -> None:

@@ -151,6 +151,15 @@ def test_fault_of_any_partner_ends_at_zero_and_stays_there(change, fault, within
     assert bench.status.alarm
 
 
+@pytest.mark.parametrize("state", [DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT])
+def test_drive_that_brakes_for_a_fault_or_has_it_is_found_by_its_next_status(state) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.drive_follows, bench.drive_state = False, state
+    bench.run(30)  # the cycle of DRIVE_STATUS_1, and a tick
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_FAULT)
+
+
 def test_stale_levels_halve_the_pressure_before_they_stop_it() -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LIMITS.pressure_pa)

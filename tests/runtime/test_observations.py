@@ -30,6 +30,19 @@ class Table:
             self.tick()
 
 
+@pytest.mark.parametrize("begins", range(0, 100, 7))
+def test_load_of_the_bus_is_that_of_the_last_second_whenever_a_flood_begins(begins: int) -> None:
+    table = Table()
+    for _ in range(300 + begins):
+        table.tick()
+    assert table.seen.bus_load == 0.0
+    for tick in range(1, 201):
+        table.inbox.frames += 15  # 15 x 143 bits in 10 ms at 250 kbit/s: 0.858
+        table.tick()
+        assert table.seen.bus_load <= 0.858 * min(tick + 1, 100) / 100 + 1e-9
+        assert table.seen.bus_load >= 0.858 * min(tick - 9, 100) / 100 - 1e-9
+
+
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: float) -> None:
     table = Table()

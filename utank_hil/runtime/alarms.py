@@ -5,16 +5,18 @@
     ACTIVE_UNACKNOWLEDGED      ACTIVE_ACKNOWLEDGED        accepted after it was sent
                                RECTIFIED_UNACKNOWLEDGED   the cause has been gone for `GONE_NS`
     ACTIVE_ACKNOWLEDGED        (NORMAL, out of the list)  the cause has been gone for `GONE_NS`
-                               ACTIVE_UNACKNOWLEDGED      it is latched, or refuses arming, anew
+                               ACTIVE_UNACKNOWLEDGED      it is latched, or refuses arming, anew;
+                                                          or it is graver than when accepted
     RECTIFIED_UNACKNOWLEDGED   ACTIVE_UNACKNOWLEDGED      its cause is there again
                                (NORMAL, out of the list)  accepted
 
 The terms are those of IEC 62923-1. What raises an alarm is decided elsewhere: `active_faults`.
 """
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from enum import IntEnum, auto
+from typing import Final, TypeAlias
 
 from utank_hil.canbus import Alarm, AlarmState, Fault, Mode
 from utank_hil.runtime import judging
@@ -28,6 +30,17 @@ GONE_NS: Final = 10_000_000_000
 _URGENCY: Final = {row.code: place for place, row in enumerate(FAULTS)}
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 _NOTHING: Final = Alarm(AlarmState.NORMAL, Fault.NONE, 0, 0, 0, 0.0)
+
+
+class Gravity(IntEnum):
+    """What the cause of an alarm does to the pressure, or would."""
+
+    NOTHING = auto()
+    HALVES = auto()
+    ENDS = auto()
+
+
+Active: TypeAlias = Mapping[Fault, Gravity]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +70,8 @@ class _Entry:
     state: AlarmState
     raised_ns: int
     seen_ns: int
+    gravity: Gravity = Gravity.NOTHING
+    grave_ns: int = 0
     times_raised: int = 0
     sent: bool = False
 
@@ -82,17 +97,22 @@ class AlarmList:
         """What is in the list."""
         return frozenset(self._entries)
 
-    def update(self, active: Collection[Fault], mode: Mode, now_ns: int) -> None:
+    def update(self, active: Active, mode: Mode, now_ns: int) -> None:
         """Take the faults whose cause is there."""
         entries = self._entries
         if not active and not entries:
             return
-        for code in active:
+        for code, gravity in active.items():
             entry = entries.get(code)
-            if entry is None or entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED:
-                self.raise_anew(code, mode, now_ns)
-            else:
-                entry.seen_ns = now_ns
+            if (
+                entry is None
+                or entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED
+                or (entry.state is AlarmState.ACTIVE_ACKNOWLEDGED and gravity > entry.gravity)
+            ):
+                entry = self.raise_anew(code, mode, now_ns)
+            entry.seen_ns = now_ns
+            if gravity >= entry.gravity or now_ns - entry.grave_ns >= GONE_NS:
+                entry.gravity, entry.grave_ns = gravity, now_ns
         for entry in tuple(entries.values()):
             if now_ns - entry.seen_ns >= GONE_NS:
                 if entry.state is AlarmState.ACTIVE_UNACKNOWLEDGED:
@@ -100,15 +120,17 @@ class AlarmList:
                 elif entry.state is AlarmState.ACTIVE_ACKNOWLEDGED:
                     self._enter(entry, AlarmState.NORMAL, mode, now_ns)
 
-    def raise_anew(self, code: Fault, mode: Mode, now_ns: int) -> None:
+    def raise_anew(self, code: Fault, mode: Mode, now_ns: int) -> _Entry:
         """Raise the alarm of a fault, even if it is accepted and its cause has lasted since."""
         entry = self._entries.get(code)
         if entry is None:
             entry = self._entries[code] = _Entry(code, AlarmState.NORMAL, now_ns, now_ns)
         entry.raised_ns = entry.seen_ns = now_ns
+        entry.gravity = Gravity.NOTHING
         entry.times_raised += 1
         entry.sent = False
         self._enter(entry, AlarmState.ACTIVE_UNACKNOWLEDGED, mode, now_ns)
+        return entry
 
     def accept(self, code: int | None, mode: Mode, now_ns: int) -> None:
         """Accept the alarm of this code, or all for None; of those that a panel can have shown."""
@@ -155,7 +177,9 @@ class AlarmList:
         self.unaccepted = any(each.state in _UNACCEPTED for each in self._order)
 
 
-def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) -> set[Fault]:
+def active_faults(
+    supervisor: Supervisor, seen: Observations, law_fault: Fault
+) -> dict[Fault, Gravity]:
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
@@ -163,15 +187,18 @@ def active_faults(supervisor: Supervisor, seen: Observations, law_fault: Fault) 
     arming was refused counts as long as it would be.
     """
     mode, fault, limits = supervisor.mode, supervisor.fault, supervisor.limits
-    if mode in (Mode.ACTIVE, Mode.FAULT):
-        found = judging.all_harming(seen, limits)
-    else:
-        found = all_stopping(supervisor, seen)
-    found |= judging.all_warning(seen, limits) | {law_fault}
+    found = dict.fromkeys({law_fault, *judging.all_warning(seen, limits)}, Gravity.NOTHING)
     # in STANDBY it says why arming was refused, which may be some time ago
-    if mode in (Mode.INIT, Mode.FAULT) or fault in judging.all_refusing(seen, limits):
-        found.add(fault)
-    found.discard(Fault.NONE)
+    if mode is Mode.INIT or fault in judging.all_refusing(seen, limits):
+        found[fault] = Gravity.NOTHING
+    if mode in (Mode.ACTIVE, Mode.FAULT):
+        found |= dict.fromkeys(judging.all_halving(seen, limits), Gravity.HALVES)
+        found |= dict.fromkeys(judging.all_ending(seen, limits), Gravity.ENDS)
+    else:
+        found |= dict.fromkeys(all_stopping(supervisor, seen), Gravity.ENDS)
+    if mode is Mode.FAULT:
+        found[fault] = Gravity.ENDS
+    found.pop(Fault.NONE, None)
     return found
 
 

@@ -28,7 +28,7 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent, AlarmList, active_faults, all_stopping
+from utank_hil.runtime.alarms import AlarmEvent, AlarmList, Gravity, active_faults, all_stopping
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
@@ -227,7 +227,7 @@ class ControllerNode:
         self._alarm_frames = catalogue.transmitter(Alarm)
         self.alarms = AlarmList()
         self._alarming = False
-        self._passing: set[Fault] = set()
+        self._passing: dict[Fault, Gravity] = {}
         self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
@@ -403,9 +403,9 @@ class ControllerNode:
         self._interrupted |= supervisor.demand is not _CONTROL
         if supervisor.mode is not _ACTIVE:
             if first_stopping(seen, supervisor.limits):
-                self._passing |= all_stopping(supervisor, seen)
+                self._passing |= dict.fromkeys(all_stopping(supervisor, seen), Gravity.ENDS)
         elif supervisor.degraded:  # what stops it is latched
-            self._passing |= all_halving(seen, supervisor.limits)
+            self._passing |= dict.fromkeys(all_halving(seen, supervisor.limits), Gravity.HALVES)
         if supervisor.raised is not _NO_FAULT:
             self.alarms.raise_anew(supervisor.raised, supervisor.mode, now_ns)
 
@@ -546,7 +546,8 @@ class ControllerNode:
             alarms.accept(code, mode, now_ns)
         active = self._passing
         if self._alarming:
-            active = active | active_faults(supervisor, self.seen, self._law_fault)
+            now = active_faults(supervisor, self.seen, self._law_fault)
+            active |= {code: max(each, active.get(code, each)) for code, each in now.items()}
         alarms.update(active, mode, now_ns)
         self._passing.clear()
         refused_by = supervisor.reset_refused_by

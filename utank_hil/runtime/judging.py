@@ -73,4 +73,4 @@ all_stopping_unawaited: Final = _all_of(tuple(c for c in _STOPPING if c[1].await
 all_halving: Final = _all_of(_with(Reaction.HALVE))
 all_warning: Final = _all_of(_with(Reaction.WARN))
 all_refusing: Final = _all_of(_ENDING + _with(Reaction.REFUSE))
-all_harming: Final = _all_of(_ENDING + _with(Reaction.HALVE))
+all_ending: Final = _all_of(_ENDING)

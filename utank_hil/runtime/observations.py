@@ -1,6 +1,7 @@
 """What the controller judges its faults by."""
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,7 +11,9 @@ from utank_hil.runtime.periodic import Schedule
 from utank_hil.tick import TICK_NS, TICK_S
 
 MILLISECOND_NS: Final = 1_000_000
-LOAD_WINDOW_NS: Final = 100 * TICK_NS
+LOAD_LOOK_NS: Final = 10 * TICK_NS
+LOAD_LOOKS: Final = 10
+"""The load is that of a second, known anew every tenth: a flood may begin between two seconds."""
 # an eight-byte frame with a 29-bit identifier has 131 bits with its pause; stuffing adds 10 to the
 # frames of this bus in the mean and 29 at most
 MEAN_FRAME_BITS: Final = 143
@@ -32,6 +35,7 @@ VALVE_OFF: Final = 0.15
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
 _DRIVE_FAULT: Final = DriveState.FAULT
+_DRIVE_FAULTS: Final = DriveState.FAULT_REACTION_ACTIVE
 _NO_DRIVE_FAULT: Final = DriveFault.NONE
 
 
@@ -183,9 +187,9 @@ class Observer:
         self._last_ns: int | None = None
         self._late_history = 0
         self._link_lost_ns: int | None = None
-        self._load_schedule = Schedule(LOAD_WINDOW_NS)
-        self._load_since_ns = 0
-        self._frames_counted = 0
+        self._load_schedule = Schedule(LOAD_LOOK_NS)
+        # at the first tick only a backlog was received
+        self._frames_counted: deque[tuple[int, int]] = deque(maxlen=LOAD_LOOKS + 1)
         self._heel_share = TICK_S / FIRST_HEEL_S
 
     def link_error(self, now_ns: int) -> None:
@@ -197,7 +201,7 @@ class Observer:
         inbox, seen = self._inbox, self.seen
         stations = inbox.stations
         if self._last_ns is None:
-            self._last_ns = self._load_since_ns = now_ns
+            self._last_ns = now_ns
         late_ns = max(0, now_ns - self._last_ns - TICK_NS)
         self._last_ns = now_ns
         missed = -(-late_ns // TICK_NS)  # grid points, each of which counts
@@ -221,7 +225,9 @@ class Observer:
         seen.panel_age_ms = (now_ns - stations.heard_ns) / MILLISECOND_NS
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (
-            inbox.drive_fault is not _NO_DRIVE_FAULT or inbox.drive_state is _DRIVE_FAULT
+            inbox.drive_state is _DRIVE_FAULT
+            or inbox.drive_state is _DRIVE_FAULTS
+            or inbox.drive_fault is not _NO_DRIVE_FAULT
         )
         seen.drive_warns = inbox.drive_warns
         seen.link_lost = (
@@ -248,10 +254,9 @@ class Observer:
             self._count_load(now_ns, inbox.frames + frames_sent)
 
     def _count_load(self, now_ns: int, frames: int) -> None:
-        # at the first tick only a backlog was received
-        window_s = (now_ns - self._load_since_ns) * 1e-9
-        if window_s > 0:
-            bits = (frames - self._frames_counted) * MEAN_FRAME_BITS
-            self.seen.bus_load = bits / (self._bit_rate * window_s)
-        self._load_since_ns = now_ns
-        self._frames_counted = frames
+        counted = self._frames_counted
+        counted.append((now_ns, frames))
+        if len(counted) > LOAD_LOOKS:
+            since_ns, before = counted[0]
+            bits = (frames - before) * MEAN_FRAME_BITS
+            self.seen.bus_load = bits / (self._bit_rate * (now_ns - since_ns) * 1e-9)

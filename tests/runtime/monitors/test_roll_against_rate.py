@@ -131,6 +131,43 @@ def test_what_has_gone_is_forgotten_in_half_a_minute() -> None:
     assert not any(found[round(102 / STEP_S) :])
 
 
+def drift_found(bias_rad_s, seconds: float, silent: range = range(0)) -> list[bool]:
+    """Whether DRIFT is found and lasts, each second, with a bias that is a function of time."""
+    monitor, ship = RollAgainstRate(THRESHOLDS), MovingShip()
+    found = []
+    for k in range(round(seconds / STEP_S)):
+        t = k * STEP_S
+        if round(t) not in silent:
+            rate_rad_s = ship.rate_rad_s(t) + bias_rad_s(t)
+            turned_rad = ship.turned_rad(t, STEP_S) + bias_rad_s(t) * STEP_S
+            now = monitor.update(ship.roll_rad(t), rate_rad_s, turned_rad, STEP_S)
+            if k % 20 == 0:
+                found.append(bool(now & Finding.DRIFT and now & Finding.DRIFT_LASTS))
+        elif k % 20 == 0:
+            monitor.restart()
+            found.append(found[-1])
+    return found
+
+
+@pytest.mark.parametrize("growth_rad_s2", [-5e-6, 2e-6, 5e-6])
+@pytest.mark.parametrize("silent", [range(0), range(600, 660)])
+@pytest.mark.parametrize("zero_deg_s", [0.0, 0.4 * RATE_ZERO_DEG_S])
+def test_a_slow_drift_is_not_held_against_the_sensor_once_it_is_right(
+    growth_rad_s2: float, silent: range, zero_deg_s: float
+) -> None:
+    zero_rad_s = math.radians(zero_deg_s)
+    found = drift_found(
+        lambda t: zero_rad_s + (growth_rad_s2 * t if t < 600 else 0.0), 1000, silent
+    )
+    assert all(found[400:600])
+    assert not any(found[940:])
+
+
+@pytest.mark.parametrize("growth_rad_s2", [1e-5, 2e-6])
+def test_a_slow_drift_that_goes_on_is_found_all_the_time(growth_rad_s2: float) -> None:
+    assert all(drift_found(lambda t: growth_rad_s2 * t, 1800)[400:])
+
+
 def test_restart_takes_no_gap_for_a_move() -> None:
     monitor = RollAgainstRate(THRESHOLDS)
     monitor.update(0.0, 0.0, 0.0, STEP_S)

@@ -2,7 +2,10 @@
 
 Over a step the roll moves by m, and the integrated rate says that it turned by t. What is left,
 m - t, is summed with a leak of 15 s, so that a sensor's noise stays small in it. A gyroscope's
-constant bias is learned over five minutes and taken off.
+constant bias is learned over five minutes and taken off. A slow drift is learned for a while, too:
+a sensor that is replaced, or right again, would not be believed for what was learned of it before.
+So a bias that explains nothing for a minute is forgotten, and learned as at the start. The drift
+goes on being found until the two have agreed for half a minute.
 
 The sum tells *that* the two disagree. What disagrees is found by the sums over the time in which
 one of them has not moved. A wrong sign of one, m = -t, is found against a roll that does not move,
@@ -39,6 +42,10 @@ LARGE_DRIFT: Final = 4.0
 DRIFT_LASTS_S: Final = 30.0
 MOST_DRIFT: Final = 6.0
 """The sum is kept within so many thresholds: a fault that has gone is forgotten in time."""
+FORGET_S: Final = 60.0
+"""Beyond `LEARN` thresholds for so long: by now what was learned may be what is wrong."""
+TRIAL_S: Final = 30.0
+"""So long the two agree, from no bias on, before a sensor whose bias was forgotten is right."""
 
 _DRIFT: Final = int(Finding.DRIFT)
 _DRIFT_LASTS: Final = int(Finding.DRIFT_LASTS)
@@ -104,6 +111,7 @@ class RollAgainstRate:
         self._bend = SecondDifference()
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
+        self._beyond_s = self._trial_s = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -139,6 +147,11 @@ class RollAgainstRate:
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias
             self._learned_s = min(self._learned_s + elapsed_s, BIAS_S)
             self._bias_rad_s += slow_rad / self._learned_s
+            self._beyond_s = 0.0
+        else:
+            self._beyond_s += elapsed_s
+            if self._beyond_s > FORGET_S:
+                self._forget()
         keep = max(1 - elapsed_s / LEAK_S, 0.0)  # a late tick may span more than that
         summed_rad = within(keep * (self.unexplained_rad + left_rad), MOST_DRIFT * limit_rad)
         self.unexplained_rad = summed_rad
@@ -157,9 +170,15 @@ class RollAgainstRate:
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
                 self._over_s = 0.0
+            if self._trial_s > 0.0:
+                self._trial_s -= elapsed_s
+                found |= _DRIFT | _DRIFT_LASTS
             return found
         self._over_s += elapsed_s
         found |= _DRIFT
+        if self._trial_s > 0.0:
+            self._trial_s = TRIAL_S
+            found |= _DRIFT_LASTS
         if self._over_s > DRIFT_LASTS_S or abs(self._smooth_rad) > LARGE_DRIFT * limit_rad:
             found |= _DRIFT_LASTS
         if roll_stuck:
@@ -167,6 +186,12 @@ class RollAgainstRate:
         if rate_stuck:
             found |= _RATE_STUCK
         return found
+
+    def _forget(self) -> None:
+        """Learn the bias as at the start; what was found so far stays so until that succeeds."""
+        self._bias_rad_s = self.unexplained_rad = self._smooth_rad = self._beyond_s = 0.0
+        self._learned_s = FIRST_BIAS_S
+        self._trial_s = TRIAL_S
 
     def _judge_sign(self) -> None:
         """Take a long step to the test of the sign, and begin the next."""
