@@ -35,12 +35,11 @@ LONGEST_STOP_NS = 500_000_000
 """A motor that can't take the pressure away in this time is switched off all the same."""
 WARNED_MESSAGES = 2
 """So many DRIVE_STATUS_2 tell of one command that was not taken."""
-_STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN)
+_STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN, None)
+"""None: an unknown word disables the voltage."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ENABLED = DriveState.OPERATION_ENABLED
 _NO_FAULT = DriveFault.NONE
-_FOLLOWS = (_ENABLED, DriveState.SWITCHED_ON)
-"""States in which a command's set-point may act at once."""
 # half a step of the set-point on the bus: a command at the limit may have been rounded up by it
 ROUNDING_PA = 4.0
 
@@ -125,7 +124,9 @@ class PumpDrive:
                 self._states.trip(DriveFault.COMMAND_REFUSED)
             return
         self._refused_in_a_row = 0
-        left_pa = self._reach_pa(now_ns) - self._step_away_pa(command.pressure_pa)
+        left_pa = self._reach_pa(now_ns)
+        if self._acts(command):
+            left_pa -= self._step_away_pa(command.pressure_pa)
         self._credit_pa = min(left_pa, self._grace_pa)
         self._accepted_ns = now_ns
         self._timeout_ns = round(command.timeout_s / NANOSECONDS)
@@ -141,11 +142,17 @@ class PumpDrive:
             return False
         if not 0.0 < command.timeout_s <= limits.longest_timeout_ms * 1e-3:
             return False
-        if self._states.state not in _FOLLOWS:
-            return True  # whatever it is, the set-point stays zero
+        if not self._acts(command):
+            return True
         step_pa = self._step_away_pa(pressure_pa)
         # both ends of a step may have been rounded away from where they were
         return step_pa == 0.0 or step_pa <= self._reach_pa(now_ns) + 2 * ROUNDING_PA
+
+    def _acts(self, command: PumpCommand) -> bool:
+        """Whether the set-point follows the command's; else it stays zero, whatever that is."""
+        enables = command.control_word is ControlWord.ENABLE_OPERATION
+        state = self._states.state
+        return state is _ENABLED or (enables and state is DriveState.SWITCHED_ON)
 
     def _step_away_pa(self, pressure_pa: float) -> float:
         """Step from the set-point, 0 if it is one toward zero."""
@@ -156,8 +163,10 @@ class PumpDrive:
     def _reach_pa(self, now_ns: int) -> float:
         """Farthest step that the time since the last command and the grace that is left allow.
 
-        No longer than that command was good for: a silence before it was enabled makes no room.
+        No longer than that command was good for, and none of the time before it was enabled.
         """
+        if self._states.state is not _ENABLED:
+            return self._credit_pa
         since_s = min(now_ns - self._accepted_ns, self._timeout_ns) * NANOSECONDS
         return self._limits.pressure_rate_pa_s * since_s + self._credit_pa
 

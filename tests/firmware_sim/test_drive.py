@@ -270,10 +270,42 @@ def test_a_silence_before_it_was_enabled_gives_no_room_for_a_step(silent_s: floa
         bench.command(0.0, word)
         bench.ticks(2)
     bench.ticks(round(silent_s / 0.01))  # only an enabled drive minds
-    bench.command(25e3, ENABLE[2])
+    bench.command(4e3, ENABLE[2])  # 2.5 kPa are a tick's worth
     bench.tick()
     assert bench.drive.refused == 1
     assert bench.drive.setpoint_pa == 0.0
+    bench.command(2.5e3, ENABLE[2])
+    bench.tick()
+    assert bench.drive.setpoint_pa == pytest.approx(2.5e3, abs=8.0)
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_commands_to_a_drive_that_is_off_leave_nothing_to_pay_when_it_is_on(count: int) -> None:
+    bench = DriveBench(start_ns=START_NS)
+    bench.ticks(2)
+    for word in (ENABLE[2], ENABLE[1]):
+        for _ in range(count):
+            bench.command(30e3, word)
+            bench.ticks(2)
+    for word in ENABLE[:2]:
+        bench.command(30e3, word)
+        bench.ticks(2)
+    bench.command(0.0)
+    bench.ticks(2)
+    bench.drive_at(20e3, 4e3)  # 200 kPa/s of 250
+    assert bench.drive.refused == 0
+    assert bench.told.state is DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("lost", [0, 7])
+def test_an_unknown_word_switches_it_off_whatever_pressure_came_with_it(lost: int) -> None:
+    bench = armed()
+    for _ in range(lost):
+        bench.commands.frame(PumpCommand(0.0, ENABLE[2], 0.05))
+    unknown = PumpCommand(math.nan, None, 0.05)  # type: ignore[arg-type]
+    bench.drive.receive(bench.commands.frame(unknown), bench.now_ns)
+    bench.tick()
+    assert bench.told.state is DriveState.SWITCH_ON_DISABLED
 
 
 def test_the_pressure_limit_holds_for_a_step_that_the_rate_allows() -> None:

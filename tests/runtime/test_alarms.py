@@ -346,9 +346,26 @@ def test_a_late_tick_that_was_accepted_hides_no_stall_of_the_loop(mode: Mode) ->
     bench.tick(late_ticks=1)
     bench.run(400)
     bench.accept()
-    bench.tick(late_ticks=6)
+    bench.tick(late_ticks=5)
     bench.run(120)
     assert [(event.code, event.state) for event in bench.told] == [(Fault.OVERRUN, ACTIVE)]
+
+
+@pytest.mark.parametrize("mode", [Mode.STANDBY, Mode.PASSIVE])
+@pytest.mark.parametrize("phase_ms", range(0, 100, 20))
+def test_a_bus_that_was_off_for_a_moment_alarms_and_the_drive_stays_off(
+    mode: Mode, phase_ms: int
+) -> None:
+    bench = Told()
+    bench.run(1000)
+    bench.order_is(mode_request=mode)
+    bench.run(1000 + phase_ms)
+    assert bench.node.mode is mode
+    bench.node.link_error(bench.now_ns, "bus-off")
+    bench.run(300)
+    assert [(event.code, event.state) for event in bench.told] == [(Fault.BUS_LOST, ACTIVE)]
+    assert bench.node.mode is Mode.STANDBY
+    assert not bench.node.supervisor.drive_wanted
 
 
 def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -> None:

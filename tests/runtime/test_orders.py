@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand
+from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.retuning import RetuningOrder
 from utank_hil.runtime.orders import Orders
 
@@ -56,6 +57,74 @@ def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
     assert not wishes.arm_edge
     assert not wishes.reset_edge
     assert line.orders.take_retuning() == RetuningOrder()
+
+
+@pytest.mark.parametrize("counters", range(16))
+@pytest.mark.parametrize("claims", [False, True])
+def test_a_panel_that_starts_anew_with_its_bits_set_presses_nothing(
+    counters: int, claims: bool
+) -> None:
+    """However short it was away: within 400 ms its third frame is accepted, out of sequence."""
+    line = Line()
+    line.say(arm=False, mode_request=Mode.STANDBY)
+    line.orders.take()
+    line.now_ns -= 190 * MS
+    line.sender = CATALOGUE.transmitter(OperatorCommand)
+    first = line.sender.frame(QUIET).data[1] + 1
+    for _ in range(counters):
+        line.sender.frame(QUIET)
+    if claims:
+        line.orders.begin_anew()
+    heard = line.orders.receiver.counter
+    assert heard is not None
+    in_sequence = (first + counters - heard - 1) % 16 <= MAX_LOST
+    for _ in range(6):
+        line.now_ns -= 195 * MS
+        line.say(reset=True, take_command=True, mode_request=Mode.PASSIVE)
+        if claims or not in_sequence:
+            wishes = line.orders.take()
+            assert not wishes.arm_edge
+            assert not wishes.reset_edge
+            assert not wishes.passive_edge
+            assert not line.orders.takes_command
+    line.say(arm=False)
+    line.say()
+    assert line.orders.take().arm_edge
+
+
+@pytest.mark.parametrize(
+    ("before", "bits", "armed", "edge"),
+    [
+        (False, [False, True], True, True),  # a frame of the cycle, and the press at once
+        (False, [True, False], False, True),
+        (False, [True, False, True], False, True),
+        (True, [False, True], False, True),  # disarmed and armed again: disarmed
+        (True, [True, False], False, False),
+    ],
+)
+def test_a_frame_in_which_nothing_was_released_yet_takes_no_press_back(
+    before: bool, bits: list[bool], armed: bool, edge: bool
+) -> None:
+    line = Line()
+    line.say(arm=False)
+    line.say(arm=before)
+    line.orders.take()
+    for bit in bits:
+        line.say(arm=bit)
+    wishes = line.orders.take()
+    assert (wishes.armed, wishes.arm_edge) == (armed, edge)
+
+
+@pytest.mark.parametrize("asked", [Mode.STANDBY, Mode.ACTIVE, None])
+def test_asking_for_passive_is_an_edge(asked: Mode | None) -> None:
+    line = Line()
+    line.say(mode_request=Mode.PASSIVE)
+    assert not line.orders.take().passive_edge
+    line.say(mode_request=asked)
+    line.say(mode_request=Mode.PASSIVE)
+    assert line.orders.take().passive_edge
+    line.say(mode_request=Mode.PASSIVE)
+    assert not line.orders.take().passive_edge
 
 
 def test_arm_and_stop_hold_from_frame_to_frame() -> None:

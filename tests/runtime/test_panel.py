@@ -241,3 +241,27 @@ def test_who_takes_the_command_adopts_only_a_mode_of_now(age_ms: int, arm: bool)
     table.panel.press(Action.TAKE)
     table.tick()
     assert table.last.arm is arm
+
+
+@pytest.mark.parametrize("found", [Mode.STANDBY, Mode.INIT, Mode.FAULT])
+def test_passive_is_asked_for_again_by_a_change_where_the_controller_has_left_it(found) -> None:
+    table = Table()
+    table.panel.press(Action.PASSIVE)
+    table.run(10)
+    table.hear(Mode.PASSIVE)
+    table.panel.press(Action.PASSIVE)  # it is there
+    table.run(10)
+    assert {command.mode_request for _, command in table.heard} == {Mode.PASSIVE}
+    table.hear(found)
+    table.panel.press(Action.DISARM)  # nor does that switch the drive on again
+    table.run(10)
+    assert table.last.mode_request is Mode.PASSIVE
+    pressed_ms = (table.now_ns - START_NS) / MS
+    table.panel.press(Action.PASSIVE)
+    table.run(10)
+    asked = [each for each in table.heard if each[0] >= pressed_ms]
+    assert {command.mode_request for at, command in asked if at < pressed_ms + 500} == {
+        Mode.STANDBY
+    }
+    table.run(10)
+    assert table.last.mode_request is Mode.PASSIVE

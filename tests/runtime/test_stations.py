@@ -3,7 +3,7 @@
 import pytest
 from controller_bench import CATALOGUE, ControllerBench
 
-from utank_hil.canbus import Address, Heartbeat, Mode, OperatorCommand, Station
+from utank_hil.canbus import Address, AddressClaim, Heartbeat, Mode, OperatorCommand, Station
 
 IDLE = OperatorCommand(Mode.STANDBY, False, False, False, False)
 
@@ -143,6 +143,37 @@ def test_command_is_taken_without_a_bump_and_given_back() -> None:
     assert bench.station is Station.OPERATOR
     bench.order_is(arm=True, mode_request=Mode.ACTIVE)
     bench.run(500)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_command_is_taken_without_a_bump_in_the_tick_of_a_frame_of_the_cycle() -> None:
+    bench = active_bench()
+    bench.second_is()
+    bench.second_is(take_command=True, mode_request=Mode.ACTIVE, arm=True)
+    bench.run(200)
+    assert (bench.node.mode, bench.station) == (Mode.ACTIVE, Station.OPERATOR_2)
+
+
+@pytest.mark.parametrize("second", [False, True])
+def test_a_panel_that_claims_its_address_arms_by_no_bit_of_its_first_frame(second: bool) -> None:
+    """Its counter may be the next one by chance."""
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(1000)
+    if second:
+        bench.second_is(take_command=True)
+        bench.run(400)
+    address = Address.OPERATOR_2 if second else Address.OPERATOR
+    bench.send(CATALOGUE.transmitter(AddressClaim, address).frame(AddressClaim(0x123)))
+    pressed = {"mode_request": Mode.ACTIVE, "arm": True}
+    bench.second_is(**pressed) if second else bench.order_is(**pressed)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    released = {"arm": False}
+    bench.second_is(**released) if second else bench.order_is(**released)
+    bench.run(300)
+    bench.second_is(**pressed) if second else bench.order_is(**pressed)
+    bench.run(1000)
     assert bench.node.mode is Mode.ACTIVE
 
 

@@ -1,6 +1,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import pytest
 from hypothesis import example, given
@@ -299,7 +300,7 @@ def test_a_drive_that_was_out_is_no_reason_to_refuse_the_reset() -> None:
 def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> None:
     bench = Bench()
     bench.tick(motion_age_ms=50)  # INIT
-    bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
+    bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True, panel_age_ms=age_ms)
     bench.tick(requested_mode=Mode.PASSIVE, panel_age_ms=age_ms)
     assert bench.supervisor.mode is mode
 
@@ -307,8 +308,42 @@ def test_passive_is_not_entered_on_an_old_order(age_ms: float, mode: Mode) -> No
 def passive_bench() -> Bench:
     bench = Bench()
     bench.tick()
-    assert bench.tick(requested_mode=Mode.PASSIVE).mode is Mode.PASSIVE
+    assert bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True).mode is Mode.PASSIVE
     return bench
+
+
+def test_passive_is_entered_once_for_each_time_that_it_was_asked_for() -> None:
+    bench = Bench()
+    for _ in range(5):
+        bench.tick(requested_mode=Mode.PASSIVE)
+    assert bench.supervisor.mode is Mode.STANDBY  # the lever was there before anybody looked
+    for edge, end in product((True, False), ({"stop": True}, {"link_lost": True})):
+        bench.tick(requested_mode=Mode.PASSIVE, passive_edge=True)
+        assert bench.supervisor.mode is Mode.PASSIVE
+        bench.tick(requested_mode=Mode.PASSIVE, **end)
+        assert not bench.supervisor.drive_wanted
+        for _ in range(5):
+            bench.tick(requested_mode=Mode.PASSIVE)
+        assert bench.supervisor.mode is Mode.STANDBY
+        bench.tick(requested_mode=Mode.STANDBY, passive_edge=edge)
+        bench.tick(requested_mode=Mode.STANDBY)
+        assert bench.supervisor.mode is Mode.STANDBY
+
+
+def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be() -> None:
+    bench = Bench()
+    bench.tick(motion_age_ms=50, requested_mode=Mode.PASSIVE, passive_edge=True)
+    assert bench.supervisor.mode is Mode.INIT
+    for _ in range(2):
+        bench.tick(requested_mode=Mode.PASSIVE)
+    assert bench.supervisor.mode is Mode.PASSIVE
+    # one that was taken back is not, nor one that a stop came after
+    for last in ({"requested_mode": Mode.STANDBY}, {"requested_mode": Mode.PASSIVE, "stop": True}):
+        bench.tick(motion_age_ms=50, requested_mode=Mode.PASSIVE, passive_edge=True)
+        bench.tick(motion_age_ms=50, **last)
+        for _ in range(3):
+            bench.tick(requested_mode=Mode.PASSIVE)
+        assert bench.supervisor.mode is Mode.STANDBY
 
 
 @pytest.mark.parametrize(("fault", "reaction", "sign"), SIGNS)
@@ -736,13 +771,14 @@ observations = st.builds(
     roll_rad=st.floats(-1, 1),
     requested_mode=st.sampled_from([Mode.STANDBY, Mode.PASSIVE, Mode.ACTIVE]),
     arm_edge=st.booleans(),
+    passive_edge=st.booleans(),
     armed=st.booleans(),
     stop=st.booleans(),
     reset_edge=st.booleans(),
 )
 WISHES: list[dict[str, object]] = [
     ACTIVE, {**ACTIVE, "arm_edge": True}, ARMING, {"requested_mode": Mode.PASSIVE}, {},
-    {"reset_edge": True},
+    {"reset_edge": True}, {"requested_mode": Mode.PASSIVE, "passive_edge": True},
 ]  # fmt: skip
 signs = st.sampled_from(SIGNS).map(lambda row: row[2])
 mostly_healthy = st.one_of(

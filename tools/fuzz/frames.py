@@ -31,12 +31,13 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, build_law
-from utank_hil.canbus import Frame, Mode, PumpCommand, load_catalogue
+from utank_hil.canbus import Address, Frame, Mode, PumpCommand, load_catalogue
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import profile2_crc
 from utank_hil.configuration import load_config
 from utank_hil.control import BuiltLaw
 from utank_hil.runtime import Lockstep
+from utank_hil.runtime.inbox import SOURCE_ADDRESS
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.tick import TICK_NS
 
@@ -197,7 +198,6 @@ class Session:
         )
         self._lockstep = Lockstep([*side.nodes, self.node], trace=self._hear)
         inbox = self.node.inbox
-        self._own = inbox._own_ids
         hidden = {"frames", "foreign", "watched", "expected", "stations"}
         self._shown = [name for name in vars(inbox) if name[0] != "_" and name not in hidden]
 
@@ -240,12 +240,12 @@ class Session:
 
     def _disturb(self) -> None:
         kind, frame = self._noise.frame()
-        while self._burst < MOST_BURST and frame.can_id in self._own:
+        while self._burst < MOST_BURST and _is_own(frame):
             kind, frame = self._noise.frame()
         node, now_ns = self.node, self._lockstep.now_ns
         inbox = node.inbox
         whole = is_whole(frame)
-        before = None if whole or frame.can_id in self._own else self._content()
+        before = None if whole or _is_own(frame) else self._content()
         counted = inbox.frames, inbox.foreign, inbox.conflict_ns, inbox.claimed_twice_ns
         node.receive(frame, now_ns)
         self.drive.receive(frame, now_ns)
@@ -256,6 +256,11 @@ class Session:
         self._counts[kind] += 1
         self._counts["whole" if whole else "not whole"] += 1
         self._counts[f"in {node.mode.name}"] += 1
+
+
+def _is_own(frame: Frame) -> bool:
+    """Whether it comes from the controller's address, which stops it whatever it says."""
+    return frame.can_id & SOURCE_ADDRESS == Address.CONTROLLER
 
 
 def _next_counter(receiver: Any) -> int:

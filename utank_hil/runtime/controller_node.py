@@ -51,6 +51,7 @@ FRESH_MS: Final = 50.0
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
+_INIT: Final = Mode.INIT
 _FAULT: Final = Mode.FAULT
 _CONTROL: Final = Demand.CONTROL
 _NO_FAULT: Final = Fault.NONE
@@ -228,6 +229,7 @@ class ControllerNode:
         self.alarms = AlarmList()
         self._alarming = False
         self._passing: dict[Fault, Gravity] = {}
+        self._mode_before = _INIT
         self._refused_by = _NO_FAULT
         self._observer = Observer(self.inbox, settings.bit_rate, self._commands.cycle_ns)
         self.seen = self._observer.seen
@@ -400,6 +402,10 @@ class ControllerNode:
     def _note_causes(self, now_ns: int) -> None:
         """Keep what may be gone before alarms, ten times a second, or the law are looked at."""
         supervisor, seen = self.supervisor, self.seen
+        if supervisor.mode is _INIT and self._mode_before is not _INIT:
+            # what it waits for from now on may be back before alarms are looked at
+            self._passing[supervisor.fault] = Gravity.ENDS
+        self._mode_before = supervisor.mode
         self._interrupted |= supervisor.demand is not _CONTROL
         if supervisor.mode is not _ACTIVE:
             if first_stopping(seen, supervisor.limits):

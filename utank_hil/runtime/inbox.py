@@ -44,6 +44,9 @@ MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
 _ENABLED = DriveState.OPERATION_ENABLED
+_OWN_ADDRESS: Final = int(Address.CONTROLLER)
+SOURCE_ADDRESS: Final = 0xFF
+"""Of an identifier, by SAE J1939-21."""
 
 LEVEL_MARGIN: Final = 1.1
 """A level farther beyond full or empty than that, for gauges and sloshing, is no measurement."""
@@ -190,9 +193,8 @@ class Inbox:
         self._names: dict[int, int | None] = {}
         for address in (*matched, *ADDRESSES.values()):
             claims = catalogue.receiver(AddressClaim, address)
-            on_claim = partial(self._on_claim, claims.can_id)
+            on_claim = partial(self._on_claim, address, claims.can_id)
             self._subscriptions[claims.can_id] = claims.accept, on_claim
-        self._own_ids = catalogue.ids_sent_by(Address.CONTROLLER)
         self.roll_rad = self.roll_rate_rad_s = 0.0
         self.port_level_m = self.starboard_level_m = 0.0
         self.pressure_pa = self.power_w = 0.0
@@ -247,7 +249,7 @@ class Inbox:
             message = accept(frame)
             if message is not None:
                 handle(message, now_ns)
-        elif frame.can_id in self._own_ids:
+        elif frame.can_id & SOURCE_ADDRESS == _OWN_ADDRESS:
             self.conflict_ns = now_ns
         elif frame.can_id not in self._known:
             self.foreign += 1
@@ -365,7 +367,8 @@ class Inbox:
         self._matching[can_id] = matches
         self.versions_match = all(self._matching.values())
 
-    def _on_claim(self, can_id: int, claim: AddressClaim, now_ns: int) -> None:
+    def _on_claim(self, address: int, can_id: int, claim: AddressClaim, now_ns: int) -> None:
+        self.stations.started(address)
         if self._names.setdefault(can_id, claim.name) != claim.name:
             self.claimed_twice_ns = now_ns
             self._names[can_id] = claim.name  # of a device that was replaced

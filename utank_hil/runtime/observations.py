@@ -155,6 +155,7 @@ class Observations:
     gm_low: bool = False
     command_pa: float = 0.0
     requested_mode: Mode = Mode.STANDBY
+    passive_edge: bool = False
     arm_edge: bool = False
     armed: bool = False
     stop: bool = False
@@ -210,7 +211,13 @@ class Observer:
         seen.tick_late_ms = late_ns / MILLISECOND_NS
         seen.overruns_in_ten = self._late_history.bit_count()
         # first of all: who is in command may change
-        seen.armed, seen.stop, seen.arm_edge, seen.reset_edge = stations.take(now_ns)
+        (
+            seen.armed,
+            seen.stop,
+            seen.arm_edge,
+            seen.reset_edge,
+            seen.passive_edge,
+        ) = stations.take(now_ns)
         seen.requested_mode = stations.requested_mode
         motions = inbox.motions
         if motions is not None:

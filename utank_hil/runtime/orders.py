@@ -8,7 +8,7 @@ wait for them, nor to be lost with them. What a frame says between two looks is 
 from typing import Final, NamedTuple
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver
-from utank_hil.canbus.endpoints import MAX_LOST
+from utank_hil.canbus.endpoints import MAX_LOST, Rejection
 from utank_hil.retuning.law_exchange import RetuningOrder
 
 NEVER_HEARD_NS: Final = -(1 << 62)
@@ -25,15 +25,19 @@ class Wishes(NamedTuple):
         The stop bit is set, or was in a frame since the last look.
     arm_edge, reset_edge : bool
         Rising edges since the last look.
+    passive_edge : bool
+        The mode asked for has changed to PASSIVE since the last look.
     """
 
     armed: bool
     stop: bool
     arm_edge: bool
     reset_edge: bool
+    passive_edge: bool
 
 
 _NOTHING: Final = RetuningOrder()
+_PASSIVE: Final = Mode.PASSIVE
 # a NamedTuple's own constructor takes twice the time
 _new: Final = tuple.__new__
 
@@ -41,8 +45,9 @@ _new: Final = tuple.__new__
 class Orders:
     """The orders of one panel.
 
-    A bit that is set in the first frame, or in the first after a gap longer than the counter
-    bridges, is no edge: nobody knows when it was pressed.
+    A bit that is set in the first frame is no edge: nobody knows when it was pressed. Nor is one in
+    the first frame after a gap longer than the counter bridges, or of a panel that has started
+    anew: it has claimed its address, or frames before it were out of sequence.
 
     Parameters
     ----------
@@ -72,7 +77,9 @@ class Orders:
         self.last: OperatorCommand | None = None
         self.heard_ns = NEVER_HEARD_NS
         self._stop_heard = self._disarm_heard = False
-        self._arm_edge = self._reset_edge = False
+        self._arm_edge = self._reset_edge = self._passive_edge = False
+        self._anew = True
+        self._out_of_sequence = 0
         self._retuning = _NOTHING
         self._accepted: list[int | None] = []
         self.news = self.takes_command = False
@@ -84,14 +91,27 @@ class Orders:
         if heard is not None:
             self.news = True
             self._stop_heard |= heard.stop
-            self._disarm_heard |= not heard.arm
+            # of an accepted frame it is known that it came before what is pressed later
+            released = order is None or self.last is None or self.last.arm
+            self._disarm_heard |= released and not heard.arm
         return order
+
+    def begin_anew(self) -> None:
+        """Take no bit of the next frame for an edge: the panel has started."""
+        self._anew = True
 
     def obey(self, order: OperatorCommand, now_ns: int) -> None:
         """Take an accepted message."""
+        rejected = self.receiver.rejected
+        out_of_sequence = rejected[Rejection.SEQUENCE] + rejected[Rejection.REPEATED]
+        self._anew |= out_of_sequence != self._out_of_sequence
+        self._out_of_sequence = out_of_sequence
         before = self.last
-        if before is None or now_ns - self.heard_ns > self._gap_ns:
+        if before is None or self._anew or now_ns - self.heard_ns > self._gap_ns:
             before = order
+        self._anew = False
+        asked = order.mode_request
+        self._passive_edge |= asked is _PASSIVE and before.mode_request is not _PASSIVE
         self._arm_edge |= order.arm and not before.arm
         self._reset_edge |= order.reset and not before.reset
         self.takes_command |= order.take_command and not before.take_command
@@ -105,7 +125,6 @@ class Orders:
         )
         self.receiver.changes += order != before
         self.last, self.heard_ns = order, now_ns
-        asked = order.mode_request
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
     def holds_stop(self, now_ns: int) -> bool:
@@ -121,8 +140,10 @@ class Orders:
             self._stop_heard or (last is not None and last.stop),
             self._arm_edge,
             self._reset_edge,
+            self._passive_edge,
         )
-        self._stop_heard = self._disarm_heard = self._arm_edge = self._reset_edge = False
+        self._stop_heard = self._disarm_heard = False
+        self._arm_edge = self._reset_edge = self._passive_edge = False
         self.news = self.takes_command = False
         return _new(Wishes, wishes)
 

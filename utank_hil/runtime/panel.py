@@ -128,7 +128,7 @@ class OperatorPanel:
         self._armed = False
         self._forbidden = False
         self._pressed_until_ns = dict.fromkeys(_EDGES, 0)
-        self._stopped_ns = self._arms_ns = 0
+        self._stopped_ns = self._arms_ns = self._asks_ns = 0
         self.stopping = False
         self._pressed: list[Action] = []
         self._sent: OperatorCommand | None = None
@@ -189,7 +189,7 @@ class OperatorPanel:
             self._take(action, now_ns)
         self._pressed.clear()
         command = OperatorCommand(
-            mode_request=self._mode,
+            mode_request=self._mode if now_ns >= self._asks_ns else Mode.STANDBY,
             arm=self._armed and now_ns >= self._arms_ns,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
@@ -236,6 +236,11 @@ class OperatorPanel:
         elif action in (Action.FORBID, Action.PERMIT):
             self._forbidden = action is Action.FORBID
         elif action in (Action.PASSIVE, Action.DISARM):
+            # nor does a wish that is not new bring it back to where it was
+            found = None if self.status is None else self.status.mode
+            again = action is Action.PASSIVE and self._mode is Mode.PASSIVE
+            if again and found not in _UNDER_POWER:
+                self._asks_ns = now_ns + EDGE_NS
             self._mode, self._armed = Mode.PASSIVE, False
         elif action in (Action.STANDBY, Action.STOP):
             self._mode, self._armed = Mode.STANDBY, False

@@ -50,6 +50,12 @@ class Stations:
         """When the last accepted frame of the station in command came."""
         return self._leads.heard_ns
 
+    def started(self, address: int) -> None:
+        """Note that the panel with an address has claimed it."""
+        for station, orders in self.orders.items():
+            if ADDRESSES[station] == address:
+                orders.begin_anew()
+
     def take(self, now_ns: int) -> Wishes:
         """Return what was ordered since the last call; a stop of any station counts."""
         wishes = self._leads.take()
@@ -67,7 +73,7 @@ class Stations:
         self._leads.take_retuning()  # what was pressed without the command was no order
         # what either has disarmed since the last call stays disarmed
         armed = wishes.armed and other.armed
-        return Wishes(armed, stop, arm_edge=False, reset_edge=False)
+        return Wishes(armed, stop, arm_edge=False, reset_edge=False, passive_edge=False)
 
     def take_retuning(self) -> RetuningOrder:
         """Return what the station in command ordered of the retuning since the last call."""

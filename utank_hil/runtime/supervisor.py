@@ -69,6 +69,7 @@ class Supervisor:
         self.raised = self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
+        self._passive_due = False
         self._begin_noting(0)
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
@@ -82,7 +83,11 @@ class Supervisor:
         self.raised = _NO_FAULT
         if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
-        elif self.mode is Mode.FAULT:
+            return
+        # asked for once, it is due until it is there or something else is asked for
+        asked = (seen.passive_edge or self._passive_due) and self.mode is not Mode.PASSIVE
+        self._passive_due = asked and seen.requested_mode is Mode.PASSIVE and not seen.stop
+        if self.mode is Mode.FAULT:
             self._while_faulted(seen, now_ns)
         else:
             self._while_disarmed(seen, now_ns)
@@ -156,7 +161,7 @@ class Supervisor:
             if not ramping:
                 self._disarm(Mode.STANDBY)
         elif (
-            seen.requested_mode is Mode.PASSIVE
+            self._passive_due
             and self.mode is Mode.STANDBY
             # an old order says nothing of now
             and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms
