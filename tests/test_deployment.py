@@ -121,6 +121,22 @@ def test_unit_is_in_step_with_the_program() -> None:
     assert not keys & {"CPUQuota", "BindsTo", "CPUSchedulingPolicy", "RestrictRealtime"}
 
 
+def test_unit_does_what_the_page_says_of_it() -> None:
+    words = shlex.split(value("ExecStart"))
+    assert words[words.index("--out") + 1] == f"/var/log/{value('LogsDirectory')}"
+    page = " ".join(Path("docs/deployment.md").read_text(encoding="utf-8").split())
+    megabytes = int(words[words.index("--keep") + 1])
+    assert f"{megabytes // 1000} GB" in page
+    # again and again, a second later
+    assert (value("StartLimitIntervalSec"), value("RestartSec")) == ("0", "1")
+    # the controller alone is asked to end, and ends the others in order; a loop that hangs is not
+    assert (value("KillMode"), value("WatchdogSignal")) == ("mixed", "SIGKILL")
+    # imports on a slow machine; recordings that are brought to their end
+    assert int(value("TimeoutStartSec")) >= 120
+    assert int(value("TimeoutStopSec")) >= 30
+    assert int(value("OOMScoreAdjust")) <= -900
+
+
 def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows() -> None:
     network, link = DEPLOY / "80-can0.network", DEPLOY / "80-can0.link"
     rate = value("BitRate", network)
@@ -143,6 +159,7 @@ def test_group_of_the_device_is_that_of_the_service() -> None:
     assert f'GROUP="{value("SupplementaryGroups")}"' in rules
     assert value("SupplementaryGroups") != UNIT.stem  # else DynamicUser could not make its user
     assert 'KERNEL=="cpu_dma_latency"' in rules
+    assert 'MODE="0660"' in rules
     assert value("DeviceAllow") == "/dev/cpu_dma_latency rw"
 
 

@@ -68,6 +68,16 @@ def test_events_are_told_as_they_happen_and_the_ship_is_kept_when_she_is_retuned
     assert load_config(config, ControllerConfig).vessel.ship.inertia_kg_m2 == 1.8e9
 
 
+def test_events_that_were_too_many_are_counted(capfd: pytest.CaptureFixture[str]) -> None:
+    announcer = Announcer()
+    for _ in range(500):
+        announcer.write(REFUSED, 0)
+    announcer.stop()
+    said = capfd.readouterr().err
+    assert said.count("retuning REFUSED") < 500
+    assert f"{500 - said.count('retuning REFUSED')} events were lost" in said
+
+
 def test_without_a_folder_it_tells_and_writes_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

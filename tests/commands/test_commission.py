@@ -99,6 +99,14 @@ def test_what_a_commissioning_stands_for_makes_it_void_when_it_changes(file: Pat
     (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
     file.write_text(yaml.safe_dump(content | {"vessel": "ship.yaml"}))
     assert "these changed: tank.width_m; run utank-hil commission" in reason(file)
+    vessel["tank"]["width_m"] = yaml.safe_load((SHIPS / "naval_vessel.yaml").read_text())["tank"][
+        "width_m"
+    ]
+    both = {"second_motion_sensor": True, "hardwired_inputs": True}
+    (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel | {"redundancy": both}))
+    changed = "redundancy.hardwired_inputs, redundancy.second_motion_sensor"
+    assert f"these changed: {changed}" in reason(file)
+    (file.parent / "ship.yaml").write_text(yaml.safe_dump(vessel))
     file.write_text(yaml.safe_dump(content | {"sensors": {"level_noise_m": 0.006}}))
     assert "these changed: sensors.level_noise_m" in reason(file)
     # the law and its limits are judged by other means

@@ -1,6 +1,7 @@
 """The log of a run: JSON lines with both clocks, in plain words."""
 
 import json
+import os
 import resource
 import time
 from datetime import UTC, datetime, timedelta
@@ -40,6 +41,20 @@ def test_events_are_lines_with_both_clocks_and_words(tmp_path: Path) -> None:
     assert (lines[0]["happened"], lines[0]["remedy"]) == (row.happened, row.remedy)
     assert lines[2]["reasons"] == ["größer"]
     assert lines[2]["state"] == "REFUSED"
+
+
+def test_each_line_is_on_the_disk_before_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda _: synced.append(file.stat().st_size))
+    file = tmp_path / "log.jsonl"
+    log = EventLog(file)
+    for _ in range(3):
+        log.write(AlarmEvent(0, Fault.DRIFT, AlarmState.NORMAL, Mode.STANDBY), 0)
+    log.close()
+    size = file.stat().st_size // 3
+    assert synced[-3:] == [size, 2 * size, 3 * size]
 
 
 def test_a_code_without_a_row_is_logged_by_its_name(tmp_path: Path) -> None:

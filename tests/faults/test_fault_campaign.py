@@ -116,6 +116,22 @@ def test_one_seed_of_two_fails_the_row(change: dict[str, object], words: str) ->
     assert any(words in problem for problem in result.problems)
 
 
+def test_commands_that_change_faster_than_the_limit_fail_a_ramp() -> None:
+    limit_pa_s = CAMPAIGN.setups["pump"].config.limits.rate_pa_s
+    ramp = replace(GOOD, row="motion-silent", found_ms=50.0, zero_ms=240.0, code="MOTION_SILENT")
+    assert verdict("motion-silent", replace(ramp, steepest_pa_s=limit_pa_s)).passed
+    fast = verdict("motion-silent", replace(ramp, steepest_pa_s=1.01 * limit_pa_s))
+    assert [why.partition(" at ")[0] for why in fast.problems] == ["seed 1: commands changed"]
+
+
+def test_any_hundred_seas_have_each_phase_of_a_second_and_any_five_each_of_50_ms() -> None:
+    ticks = [round(100 * CAMPAIGN.fault_at_s(seed)) for seed in range(1, 301)]
+    for first in range(200):
+        assert len({tick % 100 for tick in ticks[first : first + 100]}) == 100
+        assert len({tick % 5 for tick in ticks[first : first + 5]}) == 5
+    assert all(0 <= tick - round(100 * CAMPAIGN.fault_s) < 100 for tick in ticks)
+
+
 def test_each_reaction_asks_for_its_own() -> None:
     calm = replace(GOOD, mode="ACTIVE", found_ms=None, code="NONE")
     assert verdict("roll-spike", replace(calm, noted_ms=10.0)).passed
@@ -241,6 +257,35 @@ def test_what_the_operator_does_is_not_taken_for_the_fault() -> None:
 
 
 @pytest.mark.slow
+def test_what_the_drive_refuses_is_counted() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    beyond = {
+        "kind": "value",
+        "message": "PUMP_CMD",
+        "values": {"pressure_pa": 60e3},
+        "for_s": 0.05,
+    }
+    given = {"id": "beyond", "meets": ("F01",), "reaction": "none", "faults": (beyond,)}
+    outcome = outcome_of(setup, build_law(setup.config), Row.model_validate(given))
+    assert 2 <= outcome.refused <= 3
+
+
+@pytest.mark.slow
+def test_who_arms_by_himself_once_the_bus_is_no_longer_followed_is_found_all_the_same() -> None:
+    setup = CAMPAIGN.setups["pump"]
+    given: dict[str, Any] = {
+        "id": "later", "meets": ("F02",), "reaction": "ramp", "followed_s": 0.2,
+        "faults": ({"kind": "lost", "message": "SENSOR_TANK", "for_s": 1.5},),
+        "operator": tuple(
+            {"time_s": time_s, "action": action}
+            for time_s, action in ((3.0, "disarm"), (4.0, "reset"), (6.0, "arm"))
+        ),
+    }  # fmt: skip
+    outcome = outcome_of(setup, build_law(setup.config), Row.model_validate(given))
+    assert (outcome.mode, outcome.armed_again) == ("ACTIVE", True)
+
+
+@pytest.mark.slow
 def test_where_nobody_arms_nothing_is_found() -> None:
     setup = CAMPAIGN.setups["pump"]
     row = Row.model_validate(
@@ -306,8 +351,7 @@ def test_every_row_is_passed_in_one_sea_and_its_fault_was_on_the_bus(
 ) -> None:
     failed = {name: each.problems for name, each in results.items() if not each.passed}
     # the mean of several seas is asked for, and one of them need not be
-    for name in ("both-signs-from-start", "valve-stuck"):
-        assert all(why.startswith("rolls 1.") for why in failed.pop(name, ()))
+    assert all(why.startswith("rolls 1.") for why in failed.pop("both-signs-from-start", ()))
     assert not failed
     for each in results.values():
         assert math.isfinite(each.roll_ratio)

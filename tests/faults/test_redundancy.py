@@ -1,12 +1,13 @@
 """A ship with a second motion sensor and hard-wired inputs: no broken node alone goes unseen."""
 
+import math
 import random
 from collections.abc import Callable
 from functools import cache
 
 import pytest
 from fault_bench import ARMED, MS, SECOND, Failing, altered, dropped, storm
-from quay import commissioned, controller
+from quay import ARM_S, commissioned, controller
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
@@ -341,6 +342,47 @@ def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
     wrong = motion(lambda roll, rate: (-roll, -rate), Address.SENSORS_2)
     node = commissioned(naval, spoil={"sensors_2": wrong})
     assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]
+
+
+def naval_with_both() -> ControllerConfig:
+    naval = controller("naval_constrained_gpc")
+    vessel = naval.vessel.model_copy(update={"redundancy": BOTH})
+    return naval.model_copy(update={"vessel": vessel})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wrong", "check"),
+    [
+        (lambda roll, rate: (1.08 * roll, 1.08 * rate), "roll_2"),
+        (lambda roll, rate: (roll + math.radians(0.6), rate), "roll_2_zero"),
+        (lambda roll, rate: (roll, rate + math.radians(0.04)), "roll_rate_2_zero"),
+    ],
+)
+def test_commissioning_finds_each_error_of_the_second_sensor(
+    wrong: Callable[[float, float], tuple[float, float]], check: str
+) -> None:
+    node = commissioned(naval_with_both(), spoil={"sensors_2": motion(wrong, Address.SENSORS_2)})
+    assert [each.name for each in node.checks() if not each.passed] == [check]
+
+
+@pytest.mark.slow
+def test_commissioning_ends_where_the_second_sensor_falls_silent_during_the_pulses() -> None:
+    begin_ns = round((ARM_S + 8.0) * SECOND)
+    node = commissioned(naval_with_both(), spoil={"sensors_2": dropped()}, begin_ns=begin_ns)
+    assert node.ended.startswith("A motion sensor is silent.")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign: float) -> None:
+    far = altered(
+        SensorTank,
+        lambda tank: tank._replace(port_level_m=-sign * 1.0, starboard_level_m=sign * 1.0),
+    )
+    begin_ns = round((ARM_S + 8.0) * SECOND)
+    node = commissioned(naval_with_both(), spoil={"sensors": far}, begin_ns=begin_ns)
+    assert node.ended.startswith("The level went")
 
 
 def test_a_sensor_that_is_left_is_accused_from_then_on() -> None:

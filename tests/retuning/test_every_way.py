@@ -27,7 +27,7 @@ def candidate(gain: float, **wrong: object) -> Candidate:
         PredictiveLaw(
             wrong.get("input_gains", good.law.input_gains),  # type: ignore[arg-type]
             wrong.get("output_gains", good.law.output_gains),  # type: ignore[arg-type]
-            good.law.reference_gains,
+            wrong.get("reference_gains", good.law.reference_gains),  # type: ignore[arg-type]
             wrong.get("sample_time_s", good.law.sample_time_s),  # type: ignore[arg-type]
         ),
         wrong.get("washout_rad_s", 0.0),  # type: ignore[arg-type]
@@ -42,6 +42,7 @@ NONSENSE = [
     candidate(np.nan),
     candidate(1e5, input_gains=np.full((3, 1, 1), 1.7e308)),
     candidate(1e5, input_gains=np.full((3, 1, 1), np.nan)),
+    candidate(1e5, reference_gains=np.full((3, 1, 1), 1e10)),
     candidate(1e5, sample_time_s=0.5),
     candidate(1e5, washout_rad_s=np.inf),
     candidate_of(1e5, outputs=2),

@@ -1,6 +1,7 @@
 """The twin beside ships that were integrated without it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,7 +82,11 @@ def test_twin_rolls_as_the_passive_ship_in_the_same_waves(
 
 
 def rolled(
-    own: float, twin_too: float, seconds: float, excused: bool = False
+    own: float,
+    twin_too: float,
+    seconds: float,
+    excused: bool = False,
+    doubt: Callable[[float], bool] = lambda _: False,
 ) -> list[tuple[float, bool]]:
     """Judgements over time of a ship that the pump rolls `own` and the waves `twin_too`."""
     ship, tank = FIRST.ship, FIRST.tank
@@ -98,7 +103,8 @@ def rolled(
         roll = twin_too * math.sin(w * t) + own * math.sin(w * t + np.angle(response))
         if excused:
             twin.excuse()
-        twin.update(roll, 0.0, 0.0, own / abs(response) * math.sin(w * t))
+        pressure_pa = own / abs(response) * math.sin(w * t)
+        twin.update(roll, 0.0, 0.0, pressure_pa, counts=not doubt(t))
         judged.append((t, twin.amplified))
     return judged
 
@@ -120,6 +126,18 @@ def test_a_ratio_that_the_first_waves_may_give_counts_only_once_more_is_remember
     )
     assert 12 * PERIOD_S < little < 16 * PERIOD_S
     assert much < 8 * PERIOD_S
+
+
+def test_a_roll_that_is_in_doubt_now_and_then_hides_no_law_that_loses() -> None:
+    judged = rolled(0.1, 0.02, 40 * PERIOD_S, doubt=lambda t: t % 10.0 < 5.0)
+    first = next(t for t, amplified in judged if amplified)
+    assert first <= 24 * PERIOD_S  # twice as long
+    assert not any(amplified for t, amplified in judged if t % 10.0 < 5.0 and t < first)
+
+
+def test_a_roll_in_doubt_is_neither_judged_nor_remembered() -> None:
+    judged = rolled(0.1, 0.02, 40 * PERIOD_S, doubt=lambda t: t > 3 * PERIOD_S)
+    assert not any(amplified for _, amplified in judged)
 
 
 def test_little_roll_waves_alone_and_roll_on_purpose_are_not_judged() -> None:

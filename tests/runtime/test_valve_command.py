@@ -238,6 +238,11 @@ def test_a_faulty_valve_refuses_arming_and_is_reset_only_on_the_operator_s_order
     bench.fault, bench.state = ValveFault.NONE, ValveState.FAIL_POSITION
     bench.run(60)
     assert bench.control is ValveControl.FAIL_POSITION
+    # nothing of that order is left for its next fault
+    bench.state, bench.fault = ValveState.FAULT, ValveFault.COMMAND_TIMEOUT
+    heard = len(bench.told)
+    bench.run(400)
+    assert {told.control for told in bench.told[heard:]} == {ValveControl.FAIL_POSITION}
 
 
 def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck() -> None:
@@ -390,6 +395,15 @@ def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
         bench.tick()
         assert bench.node.seen.valve_off_ms == 0.0
     assert bench.node.alarms.codes == set()
+    # nor is one that reports later
+    bench = ValveBench()
+    bench.now_ns = bench.start_ns = 1000 * 1_000_000_000
+    bench.opening, bench.reports = opening, False
+    bench.run(200)
+    bench.opening, bench.reports = opening, True
+    for _ in range(100):
+        bench.tick()
+        assert bench.node.seen.valve_off_ms == 0.0
     # one that does not move is found
     bench = ValveBench()
     bench.opening, bench.moves = opening, False

@@ -355,13 +355,16 @@ class Monitors:
         excused: bool,
     ) -> None:
         twin = self.twin
-        if excused or self._pair.unclear or seen.motion_age_ms > STALE_MS:
+        if excused or seen.motion_age_ms > STALE_MS:
             twin.excuse()
         # the last pressure that was measured may have ended long ago
         pressure_pa = inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else seen.command_pa
         # what a valve that is not open takes from the water acts like a pump
         pressure_pa -= held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
-        twin.update(inbox.roll_rad, inbox.roll_rate_rad_s, level_rate_m_s, pressure_pa)
+        # two motion sensors that disagree now and then are to hide no law that loses meanwhile
+        sure = not self._pair.unclear
+        roll_rad, rate_rad_s = inbox.roll_rad, inbox.roll_rate_rad_s
+        twin.update(roll_rad, rate_rad_s, level_rate_m_s, pressure_pa, counts=sure)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
 
     def _look_at_water(self, now_ns: int, inbox: Inbox, seen: Observations, held_pa: float) -> None:

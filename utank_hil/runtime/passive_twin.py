@@ -141,7 +141,13 @@ class PassiveTwin:
         return min(lately, math.sqrt(self._record_power / self._twin_record_power) / self._record)
 
     def update(
-        self, roll_rad: float, rate_rad_s: float, level_rate_m_s: float, pressure_pa: float
+        self,
+        roll_rad: float,
+        rate_rad_s: float,
+        level_rate_m_s: float,
+        pressure_pa: float,
+        *,
+        counts: bool = True,
     ) -> None:
         """Take what is measured, once a period.
 
@@ -151,6 +157,8 @@ class PassiveTwin:
             Of the ship and her water.
         pressure_pa : float
             Across the pump, less what the valve takes beyond an open one.
+        counts : bool
+            Whether the roll is to be trusted; else nothing of it is remembered, or judged.
         """
         made, effort = self._made, self._effort
         effort[0] = 0.5 * (pressure_pa + self._pressure_pa)
@@ -165,6 +173,8 @@ class PassiveTwin:
             made[:4] = 0.0
             self.excuse()
         self.roll_rad = twin_rad = roll_rad - float(made[0])
+        if not counts:
+            return
         self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
         self._twin_mean_rad += self._mean_share * (twin_rad - self._twin_mean_rad)
         own_rad, twin_rad = roll_rad - self._mean_rad, twin_rad - self._twin_mean_rad

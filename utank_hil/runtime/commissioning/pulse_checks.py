@@ -28,6 +28,8 @@ from utank_hil.runtime.monitors.tank_equation import DerivativeFilter
 
 SCALE: Final = 0.15
 ROLL_SCALE: Final = 0.3
+ROLL_2_SCALE: Final = 0.05
+"""Two sensors that are farther apart disagree at sea: half a degree at a roll of ten."""
 TANK_PERIOD: Final = 0.1
 ROLL_PERIOD: Final = 0.15
 """Tolerances, as shares."""
@@ -102,7 +104,7 @@ def judge_pulses(
         remedy = "Mount both motion sensors alike: roll is positive starboard down."
         checks += [
             _scale_check("roll_2", "second sensor's roll, by the first's",
-                         _slope(roll_2[_VALUE], roll[_VALUE]), SCALE, remedy),
+                         _slope(roll_2[_VALUE], roll[_VALUE]), ROLL_2_SCALE, remedy),
             _scale_check("roll_rate_2", "second sensor's rate, by its roll",
                          _slope(rate_2[_VALUE], roll_2[_RATE]), SCALE, remedy),
         ]  # fmt: skip
