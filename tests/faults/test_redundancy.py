@@ -344,6 +344,33 @@ def test_commissioning_checks_the_second_sensor_against_the_first() -> None:
     assert [check.name for check in node.checks() if not check.passed] == ["roll_2"]
 
 
+def test_while_the_two_disagree_the_roll_does_not_count_for_the_twin_and_nothing_is_forgotten(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = Bench()
+    monitors = bench.node.monitors
+    assert monitors is not None
+    twin, update = monitors.twin, monitors.twin.update
+    counted: list[bool] = []
+    excused: list[bool] = []
+
+    def noted(*sample: float, counts: bool) -> None:
+        counted.append(counts)
+        update(*sample, counts=counts)
+
+    monkeypatch.setattr(twin, "update", noted)
+    bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2))
+    bench.lockstep.run_until(T0)
+    assert set(counted) == {True}
+    bench.lockstep.run_until(T0 + SECOND)
+    counted.clear()
+    monkeypatch.setattr(twin, "excuse", lambda: excused.append(True))
+    bench.lockstep.run_until(T0 + 3 * SECOND)
+    assert bench.node.mode is Mode.ACTIVE
+    assert set(counted) == {False}
+    assert not excused
+
+
 def naval_with_both() -> ControllerConfig:
     naval = controller("naval_constrained_gpc")
     vessel = naval.vessel.model_copy(update={"redundancy": BOTH})

@@ -118,6 +118,18 @@ def test_admission_of_the_largest_law_allocates_no_square_of_its_order(
     assert peak_bytes < MOST_ORDER**2
 
 
+@pytest.mark.parametrize(("gain", "admitted"), [(9e8, True), (1.1e9, False), (np.inf, False)])
+def test_gains_on_a_reference_are_bounded(gain: float, admitted: bool) -> None:
+    good = candidate_of(1e5)
+    law = good.law
+    gains = np.zeros_like(law.reference_gains)
+    gains.flat[0] = gain
+    other = PredictiveLaw(law.input_gains, law.output_gains, gains, law.sample_time_s)
+    answer = Admission(law_of(1e5), SampleHistory(1000, 1)).admit(replace(good, law=other))
+    assert isinstance(answer, WarmUp) is admitted
+    assert admitted or answer == "the law's gains on a reference are out of bounds"
+
+
 @given(st.data())
 def test_gains_are_those_of_the_whole_laws_matrices(data: st.DataObject) -> None:
     outputs = data.draw(st.integers(1, 2))

@@ -13,7 +13,15 @@ import pytest
 from retuning_toys import candidate_of
 
 from utank_hil.arrays import FloatArray
-from utank_hil.retuning import Answer, Candidate, Desk, Refusal, RetuneFunction, RetunerProcess
+from utank_hil.retuning import (
+    Answer,
+    Candidate,
+    Desk,
+    Refusal,
+    RetuneFunction,
+    RetunerProcess,
+    worker,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -270,3 +278,22 @@ def test_each_desk_has_its_own_answers_and_a_death_refuses_the_open_ones() -> No
         assert _answer_at(first, 1) == Refusal((f"(6, 2) {RECORD.sum():g}",))
         second.submit(2, RECORD, 0)
         assert _answer_at(second, 2) == Refusal(("no",))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("alive", "told"), [(True, "ended with code 3"), (False, "was busy for more than 0.5 s")]
+)
+def test_a_worker_whose_heart_beats_is_left_alone_however_long_it_has_run(
+    alive: bool, told: str
+) -> None:
+    class Desk:
+        @property
+        def beat_ns(self) -> int:
+            return time.monotonic_ns() if alive else 0
+
+    child = os.fork()
+    if child == 0:
+        time.sleep(1.5)
+        os._exit(3)
+    assert worker._watch(child, Desk(), os.getppid(), 0.5) == told  # type: ignore[arg-type]

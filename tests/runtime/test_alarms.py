@@ -307,6 +307,16 @@ def test_what_is_graver_than_what_was_accepted_alarms_again_and_what_is_less_gra
     assert table.states == [ACTIVE]
 
 
+def test_how_often_it_was_raised_counts_since_it_was_accepted() -> None:
+    table = Table()
+    for raised in (1, 2):
+        table.list.raise_anew(HIGH, Mode.FAULT, 0)
+        assert table.list.next_message(0).times_raised == raised
+    table.accept()
+    table.list.raise_anew(HIGH, Mode.FAULT, 0)
+    assert table.list.next_message(0).times_raised == 1
+
+
 class Told(ControllerBench):
     """With the alarms that the node tells of."""
 
