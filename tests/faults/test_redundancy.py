@@ -359,13 +359,13 @@ def test_while_the_two_disagree_the_roll_does_not_count_for_the_twin_and_nothing
         update(*sample, counts=counts)
 
     monkeypatch.setattr(twin, "update", noted)
-    bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2))
+    bench.fail("sensors_2", motion(lambda *both: (1.5 * both[0], 1.5 * both[1]), Address.SENSORS_2))
     bench.lockstep.run_until(T0)
     assert set(counted) == {True}
-    bench.lockstep.run_until(T0 + SECOND)
+    bench.lockstep.run_until(T0 + 6 * SECOND)
     counted.clear()
     monkeypatch.setattr(twin, "excuse", lambda: excused.append(True))
-    bench.lockstep.run_until(T0 + 3 * SECOND)
+    bench.lockstep.run_until(T0 + 10 * SECOND)
     assert bench.node.mode is Mode.ACTIVE
     assert set(counted) == {False}
     assert not excused
