@@ -82,8 +82,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(1 << 63)": _LONG_AGO,
         "Orders.accept: heard = order or self.receiver.intact(frame) -> "
         "heard = self.receiver.intact(frame)": _LONGER_WAY,
-        "Orders.obey: if before is None or now_ns - self.heard_ns > self._gap_ns: -> "
-        "if now_ns - self.heard_ns > self._gap_ns:": _LONG_AGO,
+        "Orders.obey: if before is None or self._anew or "
+        "now_ns - self.heard_ns > self._gap_ns: -> "
+        "if self._anew or now_ns - self.heard_ns > self._gap_ns:": _LONG_AGO,
     },
     "utank_hil/runtime/hardwired.py": {
         "HardwiredHeard.accept: heard = inputs or self.receiver.intact(frame) -> "
