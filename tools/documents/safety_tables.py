@@ -31,7 +31,8 @@ def false_alarms(result: dict[str, Any]) -> Rows:
     found: dict[str, dict[str, str]] = {}
     for run in result["runs"]:
         words = [f"{name} in {len(hours)}" for name, hours in run["found_in_hours"].items()]
-        found.setdefault(run["law"], {})[run["sea"]] = f"{', '.join(words) or 'none'}"
+        cell = f"{', '.join(words) or 'none'} of {run['hours']}"
+        found.setdefault(run["law"], {})[run["sea"]] = cell
     return [
         ["law", *seas],
         *([f"`{law}`", *(cells.get(sea, "") for sea in seas)] for law, cells in found.items()),

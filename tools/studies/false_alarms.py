@@ -133,7 +133,7 @@ def shown(run: dict[str, Any]) -> tuple[dict[str, float], set[str]]:
 
 
 def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, Any]]:
-    """The hours of one law in one sea, those that are kept and those that are missing."""
+    """The hours of one law in one sea: those that are kept, and what is missing to `count`."""
     file = CACHE / code() / f"{name}-{sea}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
 
@@ -150,7 +150,7 @@ def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, 
             growing.write(json.dumps(run) + "\n")
         kept.append(run)
         sys.stderr.write(f"{name}, {sea}: hour {seed} of {count}\n")
-    return kept[:count]
+    return kept
 
 
 def rate_per_hour(maxima: list[float]) -> float:
@@ -210,7 +210,7 @@ def main() -> int:
     """Sail what is missing, and print the rates."""
     parser = command_line(__doc__)
     parser.add_argument(
-        "--hours", type=int, default=50, help="of each law in each sea; on the voyage half"
+        "--hours", type=int, default=50, help="of each law in each sea at least; on the voyage half"
     )
     parser.add_argument("--law", action="append", help="only this one; may be given again")
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
