@@ -36,6 +36,13 @@ def test_an_alarm_is_one_line_with_mode_words_and_remedy(capfd) -> None:
     ]  # fmt: skip
 
 
+def test_what_ends_the_command_does_not_end_it_before_the_last_line(capfd) -> None:
+    """Ctrl-C, and a terminal that is closed, go to all of a session."""
+    lines = AlarmLines()
+    assert os.getsid(lines._process.pid) == lines._process.pid != os.getsid(0)
+    lines.close()
+
+
 def test_it_is_printed_at_once(capfd) -> None:
     lines = AlarmLines()
     lines.tell(event(Fault.DRIVE_FAULT), START_NS)
