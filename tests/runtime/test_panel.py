@@ -265,3 +265,9 @@ def test_passive_is_asked_for_again_by_a_change_where_the_controller_has_left_it
     }
     table.run(10)
     assert table.last.mode_request is Mode.PASSIVE
+    # who arms meanwhile is not made to wait
+    table.panel.press(Action.PASSIVE)
+    table.tick()
+    table.panel.press(Action.ARM)
+    table.tick()
+    assert (table.last.mode_request, table.last.arm) == (Mode.ACTIVE, True)

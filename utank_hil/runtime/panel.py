@@ -189,7 +189,7 @@ class OperatorPanel:
             self._take(action, now_ns)
         self._pressed.clear()
         command = OperatorCommand(
-            mode_request=self._mode if now_ns >= self._asks_ns else Mode.STANDBY,
+            mode_request=self._asked(now_ns),
             arm=self._armed and now_ns >= self._arms_ns,
             stop=self.stopping,
             reset=now_ns < self._pressed_until_ns[Action.RESET],
@@ -206,6 +206,11 @@ class OperatorPanel:
         frames.extend(self._housekeeping.frames(now_ns))
         self._ticks += 1
         return frames
+
+    def _asked(self, now_ns: int) -> Mode:
+        """The mode to ask for; PASSIVE that is asked for again comes after STANDBY."""
+        waits = self._mode is Mode.PASSIVE and now_ns < self._asks_ns
+        return Mode.STANDBY if waits else self._mode
 
     def _note_alarm(self, alarm: Alarm, code: Fault, now_ns: int) -> None:
         """Keep an alarm, and forget those that the controller no longer repeats."""
