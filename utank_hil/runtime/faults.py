@@ -329,7 +329,7 @@ FAULTS: Final = (
         ),
         Condition(
             Reaction.STOP,
-            "the address of another node was claimed under two names within 10 s",
+            "the address of another node was claimed under another name in the last 10 s",
             lambda seen, _: seen.claimed_twice,
         ),
     ),

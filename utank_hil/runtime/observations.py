@@ -35,7 +35,7 @@ VALVE_OFF: Final = 0.15
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _DRIVE_ENABLED: Final = DriveState.OPERATION_ENABLED
 _DRIVE_FAULT: Final = DriveState.FAULT
-_DRIVE_FAULTS: Final = DriveState.FAULT_REACTION_ACTIVE
+_DRIVE_BRAKES: Final = DriveState.FAULT_REACTION_ACTIVE
 _NO_DRIVE_FAULT: Final = DriveFault.NONE
 
 
@@ -80,7 +80,7 @@ class Observations:
     address_conflict : bool
         Another node sends with the controller's address, or has within `CONFLICT_NS`.
     claimed_twice : bool
-        Another node's address was claimed under two names within `CONFLICT_NS`.
+        Another node's address was claimed under another name than before, within `CONFLICT_NS`.
     versions_match : bool
         Drive, sensors and valve run the controller's catalogue and configuration.
     panel_matches : bool
@@ -233,7 +233,7 @@ class Observer:
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (
             inbox.drive_state is _DRIVE_FAULT
-            or inbox.drive_state is _DRIVE_FAULTS
+            or inbox.drive_state is _DRIVE_BRAKES
             or inbox.drive_fault is not _NO_DRIVE_FAULT
         )
         seen.drive_warns = inbox.drive_warns
