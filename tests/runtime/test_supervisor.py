@@ -339,6 +339,7 @@ def test_passive_that_was_asked_for_meanwhile_is_entered_when_it_can_be() -> Non
     assert bench.supervisor.mode is Mode.PASSIVE
     # one that was taken back is not, nor one that a stop came after
     for last in ({"requested_mode": Mode.STANDBY}, {"requested_mode": Mode.PASSIVE, "stop": True}):
+        bench.tick(motion_age_ms=50)
         bench.tick(motion_age_ms=50, requested_mode=Mode.PASSIVE, passive_edge=True)
         bench.tick(motion_age_ms=50, **last)
         for _ in range(3):

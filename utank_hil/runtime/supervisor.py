@@ -160,12 +160,8 @@ class Supervisor:
         elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
             if not ramping:
                 self._disarm(Mode.STANDBY)
-        elif (
-            self._passive_due
-            and self.mode is Mode.STANDBY
-            # an old order says nothing of now
-            and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms
-        ):
+        # an old order says nothing of now
+        elif self._passive_due and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms:
             self._disarm(Mode.PASSIVE)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:
