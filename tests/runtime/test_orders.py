@@ -121,6 +121,9 @@ def test_asking_for_passive_is_an_edge(asked: Mode | None) -> None:
     line.say(mode_request=Mode.PASSIVE)
     assert not line.orders.take().passive_edge
     line.say(mode_request=asked)
+    line.say(mode_request=Mode.ACTIVE)
+    line.say(mode_request=asked)
+    assert not line.orders.take().passive_edge
     line.say(mode_request=Mode.PASSIVE)
     assert line.orders.take().passive_edge
     line.say(mode_request=Mode.PASSIVE)

@@ -177,6 +177,25 @@ def test_a_panel_that_claims_its_address_arms_by_no_bit_of_its_first_frame(secon
     assert bench.node.mode is Mode.ACTIVE
 
 
+def test_the_claim_of_one_panel_takes_no_press_from_the_other() -> None:
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(1000)
+    bench.send(CATALOGUE.transmitter(AddressClaim, Address.OPERATOR_2).frame(AddressClaim(0x123)))
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(1000)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_taking_the_command_enters_no_passive() -> None:
+    bench = Bench()
+    bench.second = IDLE
+    bench.run(1000)
+    bench.second_is(take_command=True, mode_request=Mode.PASSIVE)
+    bench.run(1000)
+    assert (bench.node.mode, bench.station) == (Mode.STANDBY, Station.OPERATOR_2)
+
+
 def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
     bench = Bench()
     bench.second = IDLE

@@ -21,6 +21,7 @@ _FIRST = "before the first levels one more update by nothing, and after them a f
 _LOSS = "a pascal at a metre a second: the valve does not move by that"
 _NOT_NONE = "for the type checker: it is not None, and no place is 0"
 _LONG_AGO = "any time so long ago is as good"
+_ANEW = "the first frame is one of a panel that starts anew, whatever else"
 _LONGER_WAY = "what is not there adds nothing, to rounding: the longer way to the same"
 _DIFFERENCES = "only differences of it are used"
 _NEVER_THERE = "no computed value is exactly there"
@@ -82,9 +83,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(1 << 63)": _LONG_AGO,
         "Orders.accept: heard = order or self.receiver.intact(frame) -> "
         "heard = self.receiver.intact(frame)": _LONGER_WAY,
+        "Orders.__init__: self._out_of_sequence = 0 -> self._out_of_sequence = 1": _ANEW,
         "Orders.obey: if before is None or self._anew or "
         "now_ns - self.heard_ns > self._gap_ns: -> "
-        "if self._anew or now_ns - self.heard_ns > self._gap_ns:": _LONG_AGO,
+        "if self._anew or now_ns - self.heard_ns > self._gap_ns:": _ANEW,
     },
     "utank_hil/runtime/hardwired.py": {
         "HardwiredHeard.accept: heard = inputs or self.receiver.intact(frame) -> "

@@ -91,8 +91,8 @@ class Orders:
         if heard is not None:
             self.news = True
             self._stop_heard |= heard.stop
-            # of an accepted frame it is known that it came before what is pressed later
-            released = order is None or self.last is None or self.last.arm
+            # where it was not pressed before, what is pressed later in the tick counts
+            released = self.last is None or self.last.arm
             self._disarm_heard |= released and not heard.arm
         return order
 
