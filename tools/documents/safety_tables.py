@@ -12,13 +12,16 @@ def fault_times(result: dict[str, Any]) -> Rows:
     times = ("found_ms", "limit_ms", "zero_ms", "zero_limit_ms")
     return [
         ["row", "found, ms", "limit", "zero, ms", "limit",
-         "roll variance over the passive ship's", "called"],
+         "roll variance over the passive ship's", "called", "seas not passed"],
         *(
             [
                 f"`{row['id']}`",
                 *(number(row[name], ".0f") for name in times),
                 number(row["roll_ratio"], ".2f"),
                 " ".join(row["codes"]),
+                ", ".join(dict.fromkeys(
+                    why.partition(":")[0].removeprefix("seed ") for why in row["problems"]
+                )),
             ]
             for row in result["rows"]
         ),
