@@ -56,6 +56,20 @@ def false_alarm_rates(result: dict[str, Any]) -> Rows:
     ]
 
 
+def twin_errors(result: dict[str, Any]) -> Rows:
+    """The passive ship beside the twin, where a law came nearest to ROLL_AMPLIFIED."""
+    runs = sorted(result["runs"], key=lambda run: -run["share"])
+    return [
+        ["law", "sea", "over its threshold", "roll over the twin's", "over the passive ship's",
+         "the same over twelve periods"],
+        *(
+            [f"`{run['law']}`", run["sea"], *(number(run[name], ".2f") for name in (
+                "share", "ratio_of_twin", "ratio_of_passive_ship", "over_twelve_periods"))]
+            for run in runs
+        ),
+    ]  # fmt: skip
+
+
 def week(result: dict[str, Any]) -> Rows:
     """What the process took at the beginning, in the middle and at the end of the week."""
     samples = [dict(zip(result["samples"]["head"], row, strict=True))
@@ -74,5 +88,6 @@ TABLES: dict[str, Table] = {
     "fault times": ("fault_campaign", fault_times),
     "false alarms": ("false_alarms", false_alarms),
     "false alarm rates": ("false_alarms", false_alarm_rates),
+    "twin errors": ("twin_errors", twin_errors),
     "week": ("week", week),
 }

@@ -131,6 +131,12 @@ PARTS = (
         1200,
     ),
     Part(
+        "twin_errors",
+        "python -m tools.studies.twin_errors --json",
+        "the passive ship beside the twin where a law came nearest to ROLL_AMPLIFIED",
+        8,
+    ),
+    Part(
         "fault_campaign",
         "python -m firmware_sim.commands.faults --seeds 100 --json",
         "every fault of the table in a hundred seas: found in time, zero in time",
