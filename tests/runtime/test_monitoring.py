@@ -150,7 +150,7 @@ def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set
     for _ in range(round(seconds / TICK_S)):
         time_s, inbox = table.now_ns * 1e-9, table.inbox
         inbox.roll_rad, inbox.pressure_pa = ship.roll_rad(time_s), ship.pressure_pa(time_s)
-        inbox.roll_rate_rad_s = ship.rate_rad_s(time_s)
+        inbox.roll_rate_rad_s, inbox.motion_ns = ship.rate_rad_s(time_s), table.now_ns
         inbox.starboard_level_m = level_m = ship.level_m(time_s)
         inbox.port_level_m = -level_m
         stale = {name: age(time_s) for name, age in seen.items() if callable(age)}
@@ -296,6 +296,40 @@ def test_late_ticks_keep_nothing_from_being_judged(late_ticks: int) -> None:
         assert not moved(table, ROLLING, 2.0)
         table.now_ns += late_ticks * TICK_NS
     assert table.monitors.confirmed
+
+
+@pytest.mark.parametrize("phase", range(5))
+@pytest.mark.parametrize("lost", [1, 3])
+def test_samples_that_are_lost_while_she_rolls_fast_are_no_drift(lost: int, phase: int) -> None:
+    """Rate and roll are those of the last sample: the roll has not moved since, nor turned."""
+    table = Table()
+    found = 0
+    for k in range(300):
+        if not 200 + phase <= k < 200 + phase + lost:
+            table.inbox.roll_rad, table.inbox.motion_ns = 0.1 * TICK_S * k, table.now_ns
+            table.inbox.roll_rate_rad_s = 0.1
+        found |= table.tick()
+    assert not found & (Finding.DRIFT | Finding.MOTION_SIGN | Finding.NOISE)
+
+
+class Freezing(MovingShip):
+    """Whose motion sensor sends its last sample again and again, from a turning point on."""
+
+    def roll_rad(self, t: float) -> float:
+        return super().roll_rad(min(t, 3 * math.pi / self.w))
+
+    def rate_rad_s(self, t: float) -> float:
+        return super().rate_rad_s(min(t, 3 * math.pi / self.w))
+
+
+def test_samples_that_are_all_the_same_are_told_by_the_water_in_half_the_time() -> None:
+    table, ship = Table(), Freezing(math.radians(1.0), 5e3, noise=False)
+    gate, found = table.monitors.gates.motions[0], set()
+    while not found and table.now_ns < 20e9:
+        gate.passes(table.inbox.roll_rad, table.inbox.roll_rate_rad_s, table.now_ns)
+        found = moved(table, ship, TICK_S)
+    assert found == {Finding.ROLL_STUCK}
+    assert 1.0 <= table.now_ns * 1e-9 - 3 * math.pi / ship.w <= 2.3
 
 
 def test_a_gauge_that_stands_still_alone_is_found() -> None:

@@ -281,6 +281,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "RollAgainstRate.update: if abs(summed_rad) < 0.5 * limit_rad: -> "
         "if abs(summed_rad) <= 0.5 * limit_rad:": _NEVER_THERE,
     },
+    "utank_hil/runtime/monitors/motion_sign.py": {
+        "SignTest._judge: if evidence < STEP and self._elapsed_s < LONGEST_S: -> "
+        "if evidence <= STEP and self._elapsed_s < LONGEST_S:": _NEVER_THERE,
+    },
     "utank_hil/runtime/monitors/repetition.py": {
         ": MIXED: Final = 7.0 -> MIXED: Final = 8.75": "any mixture is as good",
         "Repetition.take: sample = roll_rad + MIXED * rate_rad_s -> "
@@ -295,6 +299,9 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/monitors/motion_watch.py": {
         "MotionWatch.__init__: self._last_rate_rad_s = 0.0 -> self._last_rate_rad_s = 1.0": (
             "the first sample has none before it to be compared with"
+        ),
+        "MotionWatch.__init__: self.heard_ns = 0 -> self.heard_ns = 1": (
+            "how far she turned before the first sample is not used"
         ),
     },
     "utank_hil/runtime/monitors/motion_pair.py": {
@@ -466,8 +473,17 @@ TARGETS = (
         ("tests/runtime/monitors/test_motion_sums.py",),
         ("tests/runtime/monitors/test_roll_against_rate.py",),
     ),
+    Target(
+        f"{_MONITORS}/motion_sign.py",
+        ("tests/runtime/monitors/test_motion_sign.py",),
+        ("tests/runtime/monitors/test_motion_sums.py",),
+    ),
     Target(f"{_MONITORS}/repetition.py", ("tests/runtime/monitors/test_repetition.py",)),
-    Target(f"{_MONITORS}/motion_watch.py", ("tests/runtime/monitors/test_motion_watch.py",)),
+    Target(
+        f"{_MONITORS}/motion_watch.py",
+        ("tests/runtime/monitors/test_motion_watch.py",),
+        ("tests/runtime/test_monitoring.py",),
+    ),
     Target(f"{_MONITORS}/motion_pair.py", ("tests/runtime/monitors/test_motion_pair.py",)),
     Target(f"{_MONITORS}/thresholds.py", ("tests/runtime/monitors/test_thresholds.py",)),
     Target(

@@ -243,8 +243,8 @@ class Monitors:
             if (motions.used is motions.first) is not (self._used is self._of_first):
                 self._used, self._spare = spare, self._used  # the other one is silent
                 spare = self._spare
-            spare.watch.turned_rad += motions.spare.roll_rate_rad_s * elapsed_s
-        self._used.watch.turned_rad += inbox.roll_rate_rad_s * elapsed_s
+            _turn(spare.watch, motions.spare.roll_rate_rad_s, motions.spare.heard_ns, elapsed_s)
+        _turn(self._used.watch, inbox.roll_rate_rad_s, inbox.motion_ns, elapsed_s)
         phase = self._phase
         self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
         if phase == 0 or phase == 5:
@@ -387,7 +387,10 @@ class Monitors:
             for _ in range(steps):
                 self._of_level = self._level_stuck.update(roll_rad, level_m, pressure_pa)
         told, equation = self._told_by_water, self._used.equation
-        water = equation.update(roll_rad, level_m, pressure_pa, steps, held_pa) & told
+        frozen = self._used.watch.repetition.frozen
+        water = told & equation.update(
+            roll_rad, level_m, pressure_pa, steps, held_pa, frozen=frozen
+        )
         self._used.water = water
         wrong = water or self._used.watch.found & _MOTION_SIGN
         self._note_watch(equation, elapsed_s, sound=not wrong)
@@ -398,8 +401,10 @@ class Monitors:
             spare.restart_water()
         else:
             spare_rad = motions.spare.roll_rad
-            found = spare.equation.update(spare_rad, level_m, pressure_pa, steps, held_pa)
-            spare.water = found & told
+            frozen = spare.watch.repetition.frozen
+            spare.water = told & spare.equation.update(
+                spare_rad, level_m, pressure_pa, steps, held_pa, frozen=frozen
+            )
         self._leave_accused(inbox, motions, seen, spare)
 
     def _note_watch(self, equation: TankEquation, elapsed_s: float, *, sound: bool) -> None:
@@ -415,6 +420,15 @@ class Monitors:
             self._of_watch = _UNWATCHED_LONG if self._unwatched_s > longest_s else _UNWATCHED
         known = self.confirmed and not unwatched and elapsed_s <= shortest_s
         self.confirmed = sound and (known or equation.obeyed)
+
+
+def _turn(watch: MotionWatch, rate_rad_s: float, heard_ns: int, elapsed_s: float) -> None:
+    """Integrate the rate up to the newest sample: where some were lost, the roll is as old."""
+    watch.waited_s += elapsed_s
+    if heard_ns != watch.heard_ns:
+        watch.heard_ns = heard_ns
+        watch.turned_rad += rate_rad_s * watch.waited_s
+        watch.waited_s = 0.0
 
 
 def _may_be(found: ModelSummary | ShipFigures, configured: RollShip) -> bool:

@@ -61,6 +61,35 @@ def test_a_signal_that_stands_still_does_not_repeat() -> None:
     assert not any(taken([(0.1 + 1e-4 * (k // 10 % 2), 0.0) for k in range(1000)]))
 
 
+def test_a_hundred_times_the_same_after_the_first_two_is_frozen() -> None:
+    repetition = Repetition(150)
+    assert repetition.frozen is False
+    for sample in noise(40):
+        repetition.take(*sample)
+    # the first two tell how long ago; once more after one like these it takes another
+    for latest in (101, 102):
+        frozen = []
+        for _ in range(400):
+            repetition.take(0.1, 0.0)
+            frozen.append(repetition.frozen)
+        assert 101 <= frozen.index(True) <= latest
+        assert all(frozen[latest:])
+        repetition.take(0.1, 1e-4)
+        assert not repetition.frozen
+
+
+def test_samples_that_are_each_sent_more_than_once_are_not_frozen() -> None:
+    repetition = Repetition(150)
+    for sample in noise(60):
+        for _ in range(50):
+            repetition.take(*sample)
+            assert not repetition.frozen
+    repetition = Repetition(150)
+    for sample in [(0.1, 0.0), (0.2, 0.0), (0.2, 0.0), (0.3, 0.0)] * 200:
+        repetition.take(*sample)
+        assert not repetition.frozen
+
+
 def test_one_of_both_that_differs_is_enough() -> None:
     rolls, rates = [a for a, _ in noise(50)] * 10, [b for _, b in noise(500)]
     assert not any(taken(list(zip(rolls, rates, strict=True))))

@@ -8,16 +8,14 @@ So a bias that explains nothing for a minute is forgotten, and learned as at the
 goes on being found until the two have agreed for half a minute.
 
 The sum tells *that* the two disagree. What disagrees is found by the sums over the time in which
-one of them has not moved. A wrong sign of one, m = -t, is found against a roll that does not move,
-m = 0, and with that against health, m = t, by a sequential test (CUSUM; Page, Continuous Inspection
-Schemes, Biometrika 41, 1954): steps add their log-likelihood ratio, -t (m + t / 2) over the
-variance of m, and the sum is kept above zero.
+one of them has not moved, and by a test of the sign (`SignTest`).
 """
 
 import math
 from typing import Final
 
 from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.motion_sign import SignTest
 from utank_hil.runtime.monitors.noise import Noise, SecondDifference, within
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
@@ -26,15 +24,11 @@ BIAS_S: Final = 300.0
 FIRST_BIAS_S: Final = 30.0
 """The bias is zero at the start as if it had been learned for so long."""
 SMOOTH_S: Final = 0.25
-LONG_STEP_S: Final = 0.14
-"""Steps of the sign's test: in a longer one a sensor's noise is a smaller share."""
-SIGN_SUM: Final = 8.0
-"""Log-likelihood ratio from which a sign is wrong. To a sound sensor's sum, noise n of the standard
-deviation s adds n^2 / 6 s^2 in a step at most.
-"""
-SIGN_STEP: Final = 5.0
-"""One step adds so much at most: one jump is no wrong sign."""
 STUCK_S: Final = 0.7
+STUCK_STEP: Final = 0.5
+"""One step adds so many thresholds at most to what a still signal leaves: noise that begins while
+a signal stands still at a turning point is no standstill.
+"""
 LEARN: Final = 3.0
 """Up to so many times the threshold what is left is taken for a bias."""
 LARGE_DRIFT: Final = 4.0
@@ -96,7 +90,8 @@ class RollAgainstRate:
     unexplained_rad : float
         Leaky sum of the roll's moves that the rate does not account for.
     noise : Noise
-        Of the roll, by its second difference: three times the power of a difference.
+        Of the roll, by its second difference.
+    sign : SignTest
     """
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
@@ -106,8 +101,7 @@ class RollAgainstRate:
         self._roll_stuck = Stuck(thresholds.roll_still_rad, least_rad)
         self._rate_stuck = Stuck(thresholds.rate_still_rad_s, thresholds.drift_rad)
         self.noise = Noise(math.sqrt(6) * thresholds.roll_noise_rad)
-        # of a difference of two samples with the noise that the maker states, a fifth of the limit
-        self._least_power = 2 * (thresholds.roll_noise_rad / 5) ** 2
+        self.sign = SignTest(thresholds)
         self._bend = SecondDifference()
         self._bias_rad_s = 0.0
         self._learned_s = FIRST_BIAS_S
@@ -120,7 +114,7 @@ class RollAgainstRate:
         self._bend.restart()
         self.unexplained_rad = 0.0
         self._over_s = self._smooth_rad = 0.0
-        self._moved_rad = self._turned_rad = self._long_s = self._sign = 0.0
+        self.sign.restart()
 
     def update(
         self, roll_rad: float, rate_rad_s: float, turned_rad: float, elapsed_s: float
@@ -156,16 +150,13 @@ class RollAgainstRate:
         summed_rad = within(keep * (self.unexplained_rad + left_rad), MOST_DRIFT * limit_rad)
         self.unexplained_rad = summed_rad
         self._smooth_rad += (summed_rad - self._smooth_rad) * min(elapsed_s / SMOOTH_S, 1.0)
+        slow_rad = within(slow_rad, STUCK_STEP * limit_rad)
         roll_stuck = self._roll_stuck.update(roll_rad, slow_rad, keep, elapsed_s)
         rate_stuck = self._rate_stuck.update(rate_rad_s, slow_rad, keep, elapsed_s)
-        # nor is a jump a wrong sign
-        self._moved_rad += within(moved_rad, abs(turned_rad) + limit_rad)
-        self._turned_rad += turned_rad
-        self._long_s += elapsed_s
-        if self._long_s >= LONG_STEP_S:
-            self._judge_sign()
         found = _NOISE if noisy else 0
-        if self._sign > SIGN_SUM:
+        # else it is the rate that is wrong
+        judged = self._rate_stuck.still_s <= STUCK_S
+        if self.sign.update(moved_rad, turned_rad, elapsed_s, judged=judged):
             found |= _SIGN
         if abs(summed_rad) <= limit_rad:
             if abs(summed_rad) < 0.5 * limit_rad:
@@ -192,12 +183,3 @@ class RollAgainstRate:
         self._bias_rad_s = self.unexplained_rad = self._smooth_rad = self._beyond_s = 0.0
         self._learned_s = FIRST_BIAS_S
         self._trial_s = TRIAL_S
-
-    def _judge_sign(self) -> None:
-        """Take a long step to the test of the sign, and begin the next."""
-        turned_rad = self._turned_rad
-        if self._rate_stuck.still_s <= STUCK_S:  # else it is the rate that is wrong
-            power = max(self.noise.power / 3, self._least_power)
-            against = -turned_rad * (self._moved_rad + turned_rad / 2) / power
-            self._sign = min(max(self._sign + min(against, SIGN_STEP), 0.0), 2 * SIGN_SUM)
-        self._moved_rad = self._turned_rad = self._long_s = 0.0

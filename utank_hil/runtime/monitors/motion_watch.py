@@ -28,10 +28,13 @@ class MotionWatch:
     ----------
     motion : RollAgainstRate
     rate_noise : Noise
-    turned_rad : float
-        Integral of the rate since the last update, each rate held for a tick: kept by the caller.
+    heard_ns, waited_s, turned_rad : int, float, float
+        When the newest sample came, the time since then, and the integral of the rate since the
+        last update, each rate for the time from the sample before it: kept by the caller.
     found : int
         Bits of `Finding`.
+    repetition : Repetition
+        Of its samples.
     """
 
     def __init__(self, thresholds: MonitorThresholds, gate: MotionGate) -> None:
@@ -39,14 +42,16 @@ class MotionWatch:
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
         self._gate = gate
+        self.repetition = gate.repetition
         self._spikes = SpikeCount()
         self._last_rate_rad_s = 0.0
-        self.turned_rad = 0.0
+        self.heard_ns = 0
+        self.waited_s = self.turned_rad = 0.0
         self.found = 0
 
     def update(self, roll_rad: float, rate_rad_s: float, elapsed_s: float, *, stale: bool) -> None:
         """Take a sample, and set `found`; one that is `stale` begins anew."""
-        # the sum holds each rate for a tick: half a tick of the ends makes it a trapezoid
+        # half a tick of the ends makes a trapezoid of the sum
         turned_rad = self.turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
         self.turned_rad = 0.0
         self._last_rate_rad_s = rate_rad_s
@@ -62,6 +67,6 @@ class MotionWatch:
         # the largest samples of noise are discarded, too
         if self._spikes.update(gate.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
-        if gate.repetition.found:
+        if self.repetition.found:
             found |= _REPEATS
         self.found = found

@@ -2,6 +2,8 @@
 
 A gateway that hangs, or a replay, sends intact frames whose counters go on. The noise of a sensor
 is several steps of the message, so that no second stretch of samples is equal to an earlier one.
+Samples that are all the same are counted by themselves: a sensor without noise sends them where
+nothing moves, so the water has to say that it did.
 """
 
 import math
@@ -9,6 +11,8 @@ from typing import Final
 
 REPEATED_SAMPLES: Final = 32
 """So many in a row, each unlike the one before it, equal those some constant time ago."""
+FROZEN_SAMPLES: Final = 100
+"""So many in a row are the same."""
 MIXED: Final = 7.0
 """Roll and seven times its rate make one number: one comparison in a tick in the place of two."""
 
@@ -25,14 +29,16 @@ class Repetition:
     ----------
     found : bool
         Whether the samples repeat.
+    frozen : bool
+        Whether the last samples were all the same, to the last bit.
     """
 
     def __init__(self, samples: int) -> None:
         self._last_place = samples - 1
         self._kept = [math.nan] * samples
         self._place_of: dict[float, int] = {}
-        self._place = self._lag = self._run = 0
-        self.found = False
+        self._place = self._lag = self._run = self._same = 0
+        self.found = self.frozen = False
 
     def take(self, roll_rad: float, rate_rad_s: float) -> None:
         """Take the next sample."""
@@ -52,7 +58,10 @@ class Repetition:
         if self._lag and kept[place - self._lag] == sample:
             if sample != kept[place - 1]:
                 self._run += 1
+            elif self._lag == 1:
+                self._same += 1
         else:
-            self._run = 0
+            self._run = self._same = 0
             self._lag = 0 if before is None else (place - before) % len(kept) or len(kept)
         self.found = self._run >= REPEATED_SAMPLES
+        self.frozen = self._same >= FROZEN_SAMPLES

@@ -14,6 +14,7 @@ differentiating. Sums with a memory of 0.4 roll periods tell the gains::
 
 and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
 Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
+Where the samples of roll and rate have all been the same for a second, less of it does.
 No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
 pass. Something is found only if no constant of that size explains it.
 The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
@@ -44,6 +45,8 @@ STUCK_GAIN: Final = 0.3
 STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
+FROZEN_PUSHES: Final = 1.0
+"""The same where the samples were all the same: no noise is left that could look like it."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
@@ -187,7 +190,10 @@ class TankEquation:
         self._still_rad = thresholds.roll_still_rad
         self._still_samples = round(STILL_PERIODS * thresholds.roll_period_s / period_s)
         self._most_unmoved = STILL_PUSHES**2 * self._least_xx
+        self._most_frozen = FROZEN_PUSHES**2 * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
+        self._spike_m = thresholds.level_spike_m
+        self._most_step_m = thresholds.level_most_m_s * period_s
         self._late_samples = round(thresholds.roll_period_s / period_s)
         self.restart()
 
@@ -197,11 +203,18 @@ class TankEquation:
         self.settled = self.obeyed = False
         self._xx = self._pp = self._vv = self._rest_x = self._rest_p = 0.0
         self._both = self._level_both = 0.0
-        self._x = self._p = self._left = self._weight = self._lead = self._d = self._dd = 0.0
-        self._samples = self._still = 0
+        self._x = self._p = self._left = self._weight = 0.0
+        self._forget_lead()
+        self._still = 0
         self._roll_rad = math.inf
         self._unmoved = 0.0
+        self._frozen = False
         self.roll_gain = self.pump_gain = self.level_gain = self.late_s = math.nan
+
+    def _forget_lead(self) -> None:
+        """Begin anew with what leads the roll."""
+        self._lead = self._d = self._dd = 0.0
+        self._samples = 0
 
     def update(
         self,
@@ -210,12 +223,16 @@ class TankEquation:
         pressure_pa: float,
         steps: int = 1,
         held_pa: float = 0.0,
+        *,
+        frozen: bool = False,
     ) -> int:
         """Take a sample of all three; return what was found.
 
         Between two samples that are some `steps` apart all three are taken to run straight. The
-        pressure is that on the water, with what a valve holds back, `held_pa`, taken off.
+        pressure is that on the water, with what a valve holds back, `held_pa`, taken off. The roll
+        is `frozen` where the samples of the motion sensor have all been the same for a while.
         """
+        self._frozen = frozen
         held, push, held_m2_s2 = self._held, pressure_pa / self._density, held_pa / self._density
         if self._wait < 0:
             self._roll.start(roll_rad)
@@ -227,6 +244,8 @@ class TankEquation:
             return 0
         found = 0
         level, roll, pump = self._level, self._roll, self._pump
+        if abs(level_m - level.last) > self._spike_m + steps * self._most_step_m:
+            self._forget_lead()  # gauges that jumped say nothing of the motion sensor
         for left in range(steps, 0, -1):
             if held is not None:
                 held.update(held.last + (held_m2_s2 - held.last) / left)
@@ -304,10 +323,11 @@ class TankEquation:
                 found |= _WATER_SIGN
             elif gain < STUCK_GAIN:
                 found |= _LEVEL_STUCK
-        if self._still > self._still_samples:
+        if self._frozen or self._still > self._still_samples:
             weight = self._weight
             mean = within(self._left / weight, zero)
-            if self._unmoved + mean * (weight * mean - 2 * self._left) > self._most_unmoved:
+            most = self._most_frozen if self._frozen else self._most_unmoved
+            if self._unmoved + mean * (weight * mean - 2 * self._left) > most:
                 found |= _ROLL_STUCK
         if dd > self._least_dd and self._samples > self._late_samples:
             self.late_s = late_s = (self._lead - zero * abs(self._d)) / dd
