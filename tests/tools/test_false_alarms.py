@@ -22,6 +22,7 @@ def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
         assert np.median(rates) == pytest.approx(expected, rel=0.25)
     assert rate_per_hour([0.3] * 50) == 0.0
     assert rate_per_hour([]) == 0.0
+    assert rate_per_hour([None] * 50) == 0.0
     assert rate_per_hour([float("nan")] * 50) == 0.0
 
 
@@ -111,6 +112,17 @@ def test_hours_of_the_record_are_gone_on_from_if_this_code_makes_the_same(
         sailed.clear()
         assert judged("gpc", sea, sail("gpc", sea, scenario, 5)) == whole
         assert sailed == [2]
+        # the hours that there were have no new statistic
+        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "newer")
+        plain = margins
+        monkeypatch.setattr(
+            false_alarms,
+            "margins",
+            lambda *case: (run := plain(*case)) | {"largest": run["largest"] | {"sign": 0.5}},
+        )
+        more_hours = judged("gpc", sea, sail("gpc", sea, scenario, 6))
+        assert more_hours["maxima"]["sign"] == [None] * 5 + [0.5]
+        assert more_hours["maxima"]["drift"][:5] == whole["maxima"]["drift"]
         # nor is a law kept that the record does not have
         assert false_alarms.recorded("dpc", sea, lambda _: {}) == []
 
@@ -126,7 +138,7 @@ def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:
         }
         for law, sea, maxima, rates in (
             ("self_tuned", "storm", {"drift": [0.2, 0.4]}, {"drift": 0.1}),
-            ("dpc", "voyage", {"drift": [0.6], "noise": [0.1]}, {"drift": 0.3, "noise": 0.0}),
+            ("dpc", "voyage", {"drift": [0.6], "noise": [None, 0.1]}, {"drift": 0.3, "noise": 0.0}),
             ("pd", "calm", {"drift": [5.0]}, {"drift": 1.0}),
             ("self_tuned", "voyage", {"drift": [6.0]}, {"drift": 1.0}),
         )

@@ -7,10 +7,10 @@ half as many on the voyage; a law that can be retuned is so every second hour, p
 unit is an hour of its own seed. Of each hour the largest statistic of each monitor over its
 threshold is kept (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the
 same command goes on, in a fresh clone with the hours of docs/evidence. Those of an earlier code are
-kept where the second of that law and sea comes out the same once more: each statistic to four
-digits, and what was found. A Gumbel distribution is fitted to the hourly maxima of each law in each
-sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it is the mean. The
-aim is one in 1000 hours.
+kept where the second of that law and sea comes out the same once more: each statistic that they
+have to four digits, and what was found. A Gumbel distribution is fitted to the hourly maxima of
+each law in each sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it
+is the mean. The aim is one in 1000 hours. An hour ends a minute after control has.
 """
 
 import json
@@ -112,7 +112,11 @@ def recorded(name: str, sea: str, sailed: Callable[[int], dict[str, Any]]) -> li
     runs = [
         {
             "code": of,
-            "largest": {monitor: maxima[hour] for monitor, maxima in row["maxima"].items()},
+            "largest": {
+                monitor: maxima[hour]
+                for monitor, maxima in row["maxima"].items()
+                if maxima[hour] is not None
+            },
             "found_s": dict.fromkeys(
                 finding for finding, found in row["found_in_hours"].items() if hour + 1 in found
             ),
@@ -121,15 +125,18 @@ def recorded(name: str, sea: str, sailed: Callable[[int], dict[str, Any]]) -> li
     ]
     if result["code"] == code():
         return runs
-    if len(runs) < ONCE_MORE or shown(sailed(ONCE_MORE)) != shown(runs[ONCE_MORE - 1]):
+    if len(runs) < ONCE_MORE or not same(runs[ONCE_MORE - 1], sailed(ONCE_MORE)):
         return []
     return runs
 
 
-def shown(run: dict[str, Any]) -> tuple[dict[str, float], set[str]]:
-    """What the record keeps of an hour."""
-    largest = {monitor: round(value, DIGITS) for monitor, value in run["largest"].items() if value}
-    return largest, set(run["found_s"])
+def same(kept: dict[str, Any], now: dict[str, Any]) -> bool:
+    """Whether an hour finds the same as before, by the same statistics; there may be new ones."""
+    largest = now["largest"]
+    return set(kept["found_s"]) == set(now["found_s"]) and all(
+        round(largest.get(monitor, 0.0), DIGITS) == round(value, DIGITS)
+        for monitor, value in kept["largest"].items()
+    )
 
 
 def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, Any]]:
@@ -153,9 +160,9 @@ def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, 
     return kept
 
 
-def rate_per_hour(maxima: list[float]) -> float:
+def rate_per_hour(maxima: list[float | None]) -> float:
     """Expected hours with a statistic beyond 1 per hour, by the tail of their distribution."""
-    values = np.array([value for value in maxima if math.isfinite(value)])
+    values = np.array([value for value in maxima if value is not None and math.isfinite(value)])
     if len(values) < 5 or np.ptp(values) == 0:
         return float(np.mean(values > 1)) if len(values) else 0.0
     place, scale = gumbel_r.fit(values)
@@ -163,10 +170,13 @@ def rate_per_hour(maxima: list[float]) -> float:
 
 
 def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """Rates of one law in one sea, by monitor."""
+    """Rates of one law in one sea, by monitor; hours without a statistic have None."""
     monitors = sorted({monitor for run in runs for monitor in run["largest"]})
     maxima = {
-        monitor: [round(run["largest"].get(monitor, 0.0), DIGITS) for run in runs]
+        monitor: [
+            round(run["largest"][monitor], DIGITS) if monitor in run["largest"] else None
+            for run in runs
+        ]
         for monitor in monitors
     }
     rates = {monitor: rate_per_hour(values) for monitor, values in maxima.items()}
@@ -192,9 +202,10 @@ def by_monitor(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for monitor in sorted({name for row in sound for name in row["maxima"]}):
         its = [row for row in sound if monitor in row["maxima"]]
+        known = [each for row in its for each in row["maxima"][monitor] if each is not None]
         found[monitor] = {
-            "hours": sum(row["hours"] for row in its),
-            "largest": max(max(row["maxima"][monitor]) for row in its),
+            "hours": len(known),
+            "largest": max(known),
             "rate_per_hour": float(np.mean([row["rate_per_hour"][monitor] for row in its])),
         }
     return found

@@ -16,23 +16,27 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, works_of
-from utank_hil.canbus import Frame
+from utank_hil.canbus import Frame, Mode
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime import Lockstep, SimulatedBus
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.finding import Finding
+from utank_hil.runtime.monitors.motion_sign import MOST as SIGN_SUM
 from utank_hil.runtime.monitors.tank_equation import STUCK_GAIN
 from utank_hil.tick import TICK_NS
 
 LOOK_TICKS = 5
+AFTER_S = 60.0
+"""A run ends so long after control has: nothing is left that could be a false alarm."""
 
 
 def shares(monitors: Monitors) -> dict[str, float]:
     """Each statistic of now over its threshold; NaN where it is not known."""
     limits, equation, twin = monitors.thresholds, monitors.equation, monitors.twin
     return {
+        "motion sign": monitors.motion.sign.sum / SIGN_SUM,
         "drift": abs(monitors.motion.unexplained_rad) / limits.drift_rad,
         "roll noise": monitors.motion.noise.share,
         "rate noise": monitors.rate_noise.share,
@@ -64,7 +68,7 @@ class Onlooker:
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Look at the monitors."""
         for name, share in shares(self._monitors).items():
-            if share > self.largest.get(name, 0.0):
+            if share > self.largest.setdefault(name, 0.0):
                 self.largest[name] = share
         if self._monitors.found:
             for finding in Finding(self._monitors.found):
@@ -81,6 +85,12 @@ def controller_of(scenario: Scenario, name: str) -> ControllerNode:
     return build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
 
 
+def _advance(lockstep: Lockstep, until_s: float) -> None:
+    lockstep.run_until(
+        min(lockstep.now_ns + round(AFTER_S * SECOND_NS), round(until_s * SECOND_NS))
+    )
+
+
 def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
     """Margins of one run."""
     node = controller_of(scenario, name)
@@ -88,7 +98,9 @@ def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[st
     ship = build_ship_side(scenario, seed, scenario.operator)
     bus = SimulatedBus(bit_rate=scenario.controllers[name].bit_rate)
     lockstep = Lockstep([*ship.nodes, node, onlooker], bus)
-    lockstep.run_until(round(seconds * SECOND_NS))
+    while lockstep.now_ns < seconds * SECOND_NS and node.mode is not Mode.FAULT:
+        _advance(lockstep, seconds)
+    _advance(lockstep, seconds)
     return {
         "scenario": scenario.name,
         "controller": name,
