@@ -85,12 +85,6 @@ def controller_of(scenario: Scenario, name: str) -> ControllerNode:
     return build_controller_node(config, commissioned=True, retuner=retuner, estimating=estimating)
 
 
-def _advance(lockstep: Lockstep, until_s: float) -> None:
-    lockstep.run_until(
-        min(lockstep.now_ns + round(AFTER_S * SECOND_NS), round(until_s * SECOND_NS))
-    )
-
-
 def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[str, object]:
     """Margins of one run."""
     node = controller_of(scenario, name)
@@ -98,9 +92,11 @@ def margins(scenario: Scenario, name: str, seed: int, seconds: float) -> dict[st
     ship = build_ship_side(scenario, seed, scenario.operator)
     bus = SimulatedBus(bit_rate=scenario.controllers[name].bit_rate)
     lockstep = Lockstep([*ship.nodes, node, onlooker], bus)
-    while lockstep.now_ns < seconds * SECOND_NS and node.mode is not Mode.FAULT:
-        _advance(lockstep, seconds)
-    _advance(lockstep, seconds)
+    end_ns, step_ns = round(seconds * SECOND_NS), round(AFTER_S * SECOND_NS)
+    ended = False
+    while lockstep.now_ns < end_ns and not ended:
+        ended = node.mode is Mode.FAULT
+        lockstep.run_until(min(lockstep.now_ns + step_ns, end_ns))
     return {
         "scenario": scenario.name,
         "controller": name,
