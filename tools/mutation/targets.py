@@ -284,6 +284,8 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "utank_hil/runtime/monitors/motion_sign.py": {
         "SignTest._judge: if evidence < STEP and self._elapsed_s < LONGEST_S: -> "
         "if evidence <= STEP and self._elapsed_s < LONGEST_S:": _NEVER_THERE,
+        "SignTest._judge: if judged and evidence >= LEAST: -> "
+        "if judged and evidence > LEAST:": _NEVER_THERE,
     },
     "utank_hil/runtime/monitors/repetition.py": {
         ": MIXED: Final = 7.0 -> MIXED: Final = 8.75": "any mixture is as good",

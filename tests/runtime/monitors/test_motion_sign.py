@@ -47,7 +47,7 @@ def sums_of(looks: list[Look]) -> list[float]:
         evidence = np.var(turns) * len(step) / 2 / power
         if elapsed >= 0.6 or (elapsed >= 0.14 and evidence >= 5):
             ratio = -np.cov(turns, rolled + turns / 2, bias=True)[0, 1] * len(step) / power
-            if judged:
+            if judged and evidence >= 2:
                 total = min(max(total + min(ratio, 5.0), 0.0), 16.0)
             step, elapsed = [(0.0, 0.0)], 0.0
         sums.append(float(total))
@@ -92,7 +92,83 @@ def test_a_gap_forgets_all_but_the_noise() -> None:
     # evidence of 5 without the noise: none is said before the longest step ends
     sums = []
     for _ in range(12):
-        test.update(-1.5 * S, 1.5 * S, 0.05, judged=True)
+        test.update(-4 * S, 4 * S, 0.05, judged=True)
         sums.append(test.sum)
     assert sums[:11] == [0.0] * 11
-    assert 0.0 < sums[11] < 1.0
+    assert 1.0 < sums[11] < 5.0
+
+
+@pytest.mark.parametrize("times", [1.0, 2.0, 4.0])
+def test_noise_of_a_rate_that_does_not_turn_is_no_evidence(times: float) -> None:
+    """In a calm, or in the dock: with the default figures of a sensor, and with noisier ones."""
+    test, draw = SignTest(THRESHOLDS), np.random.default_rng(1)
+    rolls = 2e-4 * draw.standard_normal(50_000)
+    turns = times * 5e-4 * 0.01 * math.sqrt(5) * draw.standard_normal(50_000)
+    largest = 0.0
+    for moved_rad, turned_rad in zip(np.diff(rolls, prepend=0.0), turns, strict=True):
+        test.update(float(moved_rad), float(turned_rad), 0.05, judged=True)
+        largest = max(largest, test.sum)
+    assert largest < (0.1 if times <= 2 else 6.0)
+
+
+def evidence(turned_s: list[float]) -> float:
+    """Log-likelihood ratio of a wrong sign by the samples of a step, in units of S, one by one."""
+    return float(np.var(np.cumsum([0.0, *turned_s])) * (len(turned_s) + 1) / 2)
+
+
+def first_found(test: SignTest, turned_s: float, step_s: float) -> int:
+    """After how many looks a wrong sign is found."""
+    return next(
+        number
+        for number in range(1, 99)
+        if test.update(-turned_s * S, turned_s * S, step_s, judged=True)
+    )
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(
+    ("step_s", "turned_s", "steps"),
+    [
+        # as short as they may be, where each says all that one step may
+        (0.14, 4.5, 1),
+        (0.13, 2.25, 2),
+        (0.07, 2.25, 2),
+        (0.05, 1.5, 3),
+        # until they do
+        (0.14, 3.1, 2),
+        (0.05, 0.8, 5),
+        # but no longer than 0.6 s, of which each says 4.1
+        (0.05, 0.2122, 12),
+    ],
+)
+def test_steps_last_until_they_say_enough(
+    step_s: float, turned_s: float, steps: int, way: int
+) -> None:
+    needed = math.floor(8 / min(evidence([turned_s] * steps), 5)) + 1
+    assert first_found(SignTest(LIMITS), way * turned_s, step_s) == needed * steps
+    # a gap forgets the step that was begun, and all before it
+    test = SignTest(LIMITS)
+    for _ in range(needed * steps - 1):
+        test.update(-turned_s * S, turned_s * S, step_s, judged=True)
+    test.restart()
+    assert first_found(test, way * turned_s, step_s) == needed * steps
+
+
+def test_a_turning_point_takes_nothing_from_a_step() -> None:
+    """At its end the ship has rolled back to where it began."""
+    test, sums = SignTest(LIMITS), []
+    there_and_back = [2.0, 2.0, -2.0, -2.0]
+    assert evidence(there_and_back[:3]) < 5 < evidence(there_and_back)
+    for turned_s in (*there_and_back, *there_and_back):
+        test.update(-turned_s * S, turned_s * S, 0.1, judged=True)
+        sums.append(test.sum)
+    assert sums == [0.0] * 3 + [5.0] * 4 + [10.0]
+
+
+def test_neither_a_right_sign_nor_a_roll_that_does_not_move_is_found() -> None:
+    test = SignTest(LIMITS)
+    for way in (-1, 1):
+        for _ in range(20):
+            assert not test.update(way * 4 * S, way * 4 * S, 0.6, judged=True)
+            assert not test.update(0.0, way * 4 * S, 0.6, judged=True)
+    assert test.sum == 0.0

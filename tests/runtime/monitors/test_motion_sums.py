@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from moving_ship import THRESHOLDS
 from scipy.integrate import solve_ivp
@@ -214,104 +213,6 @@ def test_a_stuck_signal_is_found_when_more_is_left_than_its_threshold(way: int) 
             assert first[Finding.RATE_STUCK] is None
 
 
-def against(turned_s: float, moved_s: float, power_s2: float = 2.0) -> float:
-    """Log-likelihood ratio of a step, in units of S."""
-    return -turned_s * (moved_s + turned_s / 2) / power_s2
-
-
-class Turning(Fed):
-    """Longest steps, whose roll moves evenly, so that nothing of it is noise."""
-
-    def __init__(self, moved_s: float = -64.0) -> None:
-        super().__init__(0.6, SIGNS)
-        self._moved_s = moved_s
-
-    def says(self, ratio: float) -> bool:
-        """Turn so much that the step adds this ratio; whether the sign is wrong now."""
-        # -t (m + t / 2) / 2 = ratio, the root that is near to none
-        moved_s = self._moved_s
-        turned_s = -moved_s - math.sqrt(moved_s**2 - 4 * ratio)
-        assert against(turned_s, moved_s) == pytest.approx(ratio)
-        return bool(self(moved_s * S, turned_s * S) & Finding.MOTION_SIGN)
-
-
-def test_a_wrong_sign_adds_its_ratio_until_it_is_more_than_eight() -> None:
-    for sign in (-1, 1):
-        fed = Fed(0.6, SIGNS)
-        # m = -t: t^2 / 2 over twice the variance of a sample
-        assert against(4, -4) == 4
-        found = [bool(fed(-sign * 4 * S, sign * 4 * S) & Finding.MOTION_SIGN) for _ in range(3)]
-        assert found == [False, False, True]
-        fed = Fed(0.6, SIGNS)
-        for _ in range(20):
-            assert not fed(sign * 4 * S, sign * 4 * S)  # a right one
-            assert not fed(0.0, sign * 4 * S)  # nor one of a roll that does not move
-
-
-def test_one_step_adds_five_at_most_and_the_sum_sixteen() -> None:
-    assert [Turning().says(4.9), (one := Turning()).says(999.0), one.says(2.9)] == [False] * 3
-    assert one.says(0.2)
-    two = Turning()
-    assert [two.says(999.0) for _ in range(3)] == [False, True, True]
-    for _ in range(5):
-        assert two.says(999.0)
-    assert two.says(-7.9)
-    assert not two.says(-0.2)
-    # and not below zero
-    assert not two.says(-999.0)
-    assert [two.says(4.9), two.says(3.0), two.says(0.2)] == [False, False, True]
-
-
-def evidence(turned_s: list[float]) -> float:
-    """Log-likelihood ratio of a wrong sign by the samples of a step, in units of S, one by one."""
-    return float(np.var(np.cumsum([0.0, *turned_s])) * (len(turned_s) + 1) / 2)
-
-
-@pytest.mark.parametrize(
-    ("step_s", "turned_s", "steps"),
-    [
-        # as short as they may be, where each says all that one step may
-        (0.14, 4.5, 1),
-        (0.13, 2.25, 2),
-        (0.07, 2.25, 2),
-        (0.05, 1.5, 3),
-        # until they do
-        (0.14, 3.1, 2),
-        (0.05, 0.8, 5),
-        # but no longer than 0.6 s, of which each says 4.1
-        (0.05, 0.2122, 12),
-    ],
-)
-def test_steps_last_until_they_say_enough(step_s: float, turned_s: float, steps: int) -> None:
-    def first(monitor: Fed) -> int:
-        return next(
-            number
-            for number in range(1, 99)
-            if monitor(-turned_s * S, turned_s * S) & Finding.MOTION_SIGN
-        )
-
-    needed = math.floor(8 / min(evidence([turned_s] * steps), 5)) + 1
-    assert first(Fed(step_s, SIGNS)) == needed * steps
-    # a gap forgets the step that was begun, and all before it
-    fed = Fed(step_s, SIGNS)
-    for _ in range(needed * steps - 1):
-        fed(-turned_s * S, turned_s * S)
-    fed.monitor.restart()
-    fed(0.0)
-    assert first(fed) == needed * steps
-
-
-def test_a_turning_point_takes_nothing_from_a_step() -> None:
-    """At its end the ship has rolled back to where it began."""
-    fed, sums = Fed(0.1, SIGNS), []
-    there_and_back = [2.0, 2.0, -2.0, -2.0]
-    assert evidence(there_and_back[:3]) < 5 < evidence(there_and_back)
-    for turned_s in (*there_and_back, *there_and_back):
-        fed(-turned_s * S, turned_s * S)
-        sums.append(fed.monitor.sign.sum)
-    assert sums == [0.0] * 3 + [5.0] * 4 + [10.0]
-
-
 def test_where_the_rate_stands_still_for_longer_the_sign_is_not_judged() -> None:
     fed = Fed(0.35, SIGNS)
     found = []
@@ -320,22 +221,3 @@ def test_where_the_rate_stands_still_for_longer_the_sign_is_not_judged() -> None
         found.append(fed.monitor.sign.sum)
     # 0.7 s is not longer
     assert found == [5.0, 10.0, 15.0, 15.0, 16.0]
-
-
-def test_a_jump_counts_as_little_more_than_the_rate_says_and_noise_as_noise() -> None:
-    jumps = replace(SIGNS, drift_rad=4 * S, roll_still_rad=1.0)
-    # m is cut to -(t + 4) of S: t = 1 makes -(1 (-5 + 1/2)) / 2 = 2.25 of it
-    assert against(1, -5) == 2.25
-    fed = Fed(0.6, jumps)
-    found = [bool(fed(-1000 * S, S) & Finding.MOTION_SIGN) for _ in range(4)]
-    assert found == [False, False, False, True]
-
-    # noise of +-3 S: a second difference of 12, its square over three in the place of twice S^2
-    odd, even = against(9, -15, 144 / 3), against(9, -3, 144 / 3)
-    assert 4 * (odd + even) + odd > 8 > 3 * (odd + even) + odd
-    fed, found = Fed(2.0, SIGNS), []
-    for k in range(-4, 12):
-        turned_s = 9 if k >= 0 else 0
-        moved_s = 6 * (-1) ** k - turned_s
-        found.append(bool(fed(moved_s * S, turned_s * S) & Finding.MOTION_SIGN))
-    assert found.index(True) == 4 + 9

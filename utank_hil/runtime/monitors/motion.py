@@ -135,7 +135,8 @@ class RollAgainstRate:
         if moved_rad != moved_rad:  # the first sample
             return 0
         limit_rad = self._limit_rad
-        left_rad = moved_rad - turned_rad - self._bias_rad_s * elapsed_s
+        turned_rad += self._bias_rad_s * elapsed_s
+        left_rad = moved_rad - turned_rad
         noisy = self.noise.update(self._bend.update(roll_rad), elapsed_s)
         slow_rad = within(left_rad, limit_rad)  # a jump is neither bias nor standstill
         if abs(self.unexplained_rad) < LEARN * limit_rad:  # a fault is no bias

@@ -30,6 +30,10 @@ deviation s adds n^2 / 6 s^2 in a step at most.
 """
 STEP: Final = 5.0
 """One step adds so much at most: one jump is no wrong sign."""
+LEAST: Final = 2.0
+"""A longest step in which a wrong sign would add less than that is left out: it tells of the rate's
+noise, not of a roll.
+"""
 
 
 class SignTest:
@@ -93,7 +97,7 @@ class SignTest:
         evidence = (self._squares - self._turned_sum**2 / self._points) / (2 * power)
         if evidence < STEP and self._elapsed_s < LONGEST_S:
             return
-        if judged:
+        if judged and evidence >= LEAST:
             shared = self._products - self._turned_sum * self._moved_sum / self._points
             against = -shared / power - evidence
             self.sum = min(max(self.sum + min(against, STEP), 0.0), 2 * MOST)
