@@ -11,7 +11,7 @@ import pytest
 from utank_hil.pictures.report_page import write_report_page
 from utank_hil.pictures.style import picture
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.whole_file import write_whole
+from utank_hil.whole_file import left_whole, write_whole
 
 ROOM = 1024
 
@@ -54,6 +54,14 @@ def test_what_does_not_fit_is_named_and_not_left_in_half(
     assert path.stat().st_size > ROOM
     with little_room(), pytest.raises(OSError, match=str(path)):
         write(path)
+    assert not path.exists()
+
+
+def test_what_is_interrupted_is_not_left_in_half(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    with pytest.raises(KeyboardInterrupt), left_whole(path):  # noqa: PT012
+        path.write_text("ha")
+        raise KeyboardInterrupt
     assert not path.exists()
 
 

@@ -22,6 +22,7 @@ from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
 from tools.evidence import campaign_part
 from utank_hil.commands.common import new_app
+from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import write_page
 
 pytestmark = pytest.mark.slow
@@ -189,6 +190,27 @@ def test_study_as_a_part_of_the_evidence_keeps_its_rows(
     assert list(rows) == [(90.0, "no tank"), (90.0, "passive"), (90.0, "gpc"), (0.0, "")]
     assert rows[90.0, "no tank"]["strikes"] is None
     assert rows[0.0, ""]["status"] == "failed"
+
+
+def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path, whole = written(tmp_path, grid={"seed": [1, 2]}), Driver.run
+
+    def interrupted(driver: Driver, client: Client) -> None:
+        whole(driver, client)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Driver, "run", interrupted)
+        done = run(path, "--json")
+    assert done.exit_code == ExitCode.INTERRUPTED, done.output
+    told = json.loads(done.stdout)
+    assert told["interrupted"] is True
+    assert told["groups"][0]["runs"]["gpc"]["roll_rms_rad"]["cases"] == 2
+    again = run(path, "--json", "--resume")
+    assert again.exit_code == ExitCode.OK, again.output
+    assert json.loads(again.stdout)["interrupted"] is False
 
 
 def test_wrong_study_ends_before_anything_is_computed(run, tmp_path: Path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -192,6 +193,35 @@ def test_a_record_is_there_as_a_whole_or_not_at_all(
         write_record(path, {"passed": False})
     assert path.read_text() == before
     assert sorted(each.name for each in file.parent.iterdir()) == [path.name, file.name]
+
+
+def test_a_record_is_on_the_disk_before_it_takes_the_place_of_the_one_before(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = passed(file)
+    before = path.read_text()
+    on_disk: list[tuple[Path, str, str]] = []
+
+    def fsync(descriptor: int) -> None:
+        written = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        on_disk.append((written.parent, written.read_text(), path.read_text()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with path.open() as read_meanwhile:
+        write_record(path, {"passed": False})
+        assert read_meanwhile.read() == before
+    # in the same folder: what takes the place of another in one step is on the same disk
+    assert on_disk == [(file.parent, path.read_text(), before)]
+    assert json.loads(path.read_text()) == {"passed": False}
+
+
+def test_a_record_can_be_read_by_the_service_whoever_commissioned(file: Path) -> None:
+    before = os.umask(0o077)
+    try:
+        path = passed(file)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o644
 
 
 class AtTheQuay:

@@ -1,5 +1,6 @@
 """A run's recording: named by its time, and never a reason not to control."""
 
+import errno
 import json
 import os
 import re
@@ -13,8 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ports import QuietBus
+from typer.testing import CliRunner
 
+from utank_hil.cli import app
 from utank_hil.commands import recording as module
+from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.recorder import RecorderError, RecorderReport
@@ -92,6 +97,38 @@ def test_lost_rows_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(module, "RecorderProcess", Instant)
     summary = record(tmp_path, 1)
     assert (summary.rows, summary.lost, summary.error) == (5, 2, None)
+
+
+@pytest.mark.parametrize("keep_bytes", [None, 2_500_000])
+def test_a_recording_goes_on_in_another_file_each_hour_within_the_bound(
+    keep_bytes: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[object] = []
+
+    def recorder(ring: str, file: Path, **others: object) -> Instant:
+        given.append(others["rotation"])
+        return Instant(ring, file)
+
+    monkeypatch.setattr(module, "RecorderProcess", recorder)
+    RunRecording(tmp_path, keep_bytes=keep_bytes).stop()
+    assert given == [Rotation(3600.0, keep_bytes)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "keep_bytes"), [((), None), (("--keep", "2.5"), 2_500_000)])
+def test_run_hands_on_the_bound_of_its_recordings(
+    words: tuple[str, ...], keep_bytes: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[object] = []
+
+    def refuse(*_: object, **named: object) -> None:
+        given.append(named["keep_bytes"])
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(command, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(command, "RunRecording", refuse)
+    CliRunner().invoke(app, ["run", "configs/controllers/gpc.yaml", "--bus", "any0", *words])
+    assert given == [keep_bytes]
 
 
 @pytest.mark.parametrize("place", ["file", "/proc/nowhere"])

@@ -2,7 +2,9 @@
 
 import socket
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ports import QuietBus
@@ -68,6 +70,22 @@ def test_a_manager_that_never_takes_it_is_an_error(manager, monkeypatch) -> None
             service.progress(0)
         with pytest.raises(TimeoutError):
             service.ready("here")
+
+
+@pytest.mark.slow
+def test_run_that_the_manager_does_not_hear_is_started_again_and_controls_nothing(
+    manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unheard(*_: object) -> None:
+        raise TimeoutError("timed out")
+
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(module, "RealTimeLoop", lambda *_, **__: pytest.fail("begun"))
+    monkeypatch.setattr(ServiceManager, "ready", unheard)
+    monkeypatch.setenv("NOTIFY_SOCKET", manager.getsockname())
+    result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
+    assert result.exit_code == ExitCode.SYSTEM
+    assert "NOTIFY_SOCKET: the manager does not answer: timed out" in result.stderr
 
 
 def test_without_a_watchdog_nothing_is_fed_and_without_a_manager_nothing_is_sent(manager) -> None:
@@ -147,3 +165,61 @@ def test_an_error_in_the_loop_ends_the_watchdog_before_its_traceback(
     result = CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0", "--duration", "5"])
     assert "a defect" in str(result.exception)
     assert [each[-1] for each in told] == ["STOPPING=1"]
+
+
+@pytest.mark.slow
+def test_ready_is_told_when_nothing_but_the_loop_is_left_to_begin(
+    manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: dict[str, list[str]] = {}
+
+    def noting(step: str) -> Callable[..., Any]:
+        do = getattr(module, step)
+
+        def noted(*words: Any, **named: Any) -> Any:
+            told[step] = messages(manager)
+            return do(*words, **named)
+
+        return noted
+
+    class NoLoop:
+        def __init__(self, *_: object, **__: object) -> None:
+            told["loop"] = messages(manager)
+
+        def run(self, *_: object) -> None:
+            pass
+
+    before = (
+        *("SocketCanPort", "RunRecording", "retuner_process", "AlarmLines"),
+        *("build_controller_node", "real_time_scheduling"),
+    )
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    for step in before:
+        monkeypatch.setattr(module, step, noting(step))
+    monkeypatch.setattr(module, "RealTimeLoop", NoLoop)
+    for name, value in environment(manager).items():
+        monkeypatch.setenv(name, value)
+    CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
+    ready = {"loop": ["READY=1\nSTATUS=GPC, roll on any0"]}
+    assert told == {step: [] for step in before} | ready
+
+
+@pytest.mark.slow
+def test_a_loop_that_stands_still_feeds_no_watchdog(
+    manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Standing:
+        def __init__(self, *_: object, statistics: Any) -> None:
+            self._statistics = statistics
+
+        def run(self, stop: Callable[[], bool], _duration_ns: int | None) -> None:
+            for ticks in (*range(25), *[25] * 1000):
+                self._statistics.ticks = ticks
+                stop()
+
+    monkeypatch.setattr(module, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(module, "RealTimeLoop", Standing)
+    for name, value in environment(manager).items():
+        monkeypatch.setenv(name, value)
+    CliRunner().invoke(app, ["run", str(GPC), "--bus", "any0"])
+    assert messages(manager)[1:] == ["WATCHDOG=1"] * 3 + ["STOPPING=1"]  # at ticks 0, 12 and 24

@@ -2,7 +2,10 @@
 
 import json
 import math
+import os
+import signal
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +20,7 @@ from firmware_sim.commands.faults import faults
 from firmware_sim.fault_campaign import live, runner
 from firmware_sim.fault_campaign.campaign import Campaign, LiveRow, Row
 from firmware_sim.fault_campaign.live import ACTIONS
+from firmware_sim.fault_campaign.report import write_junit
 from firmware_sim.fault_campaign.runner import run_rows
 from firmware_sim.fault_campaign.trial import Outcome, Sea, Window, in_a_copy
 from firmware_sim.fault_campaign.verdict import Result, judged
@@ -24,6 +28,7 @@ from firmware_sim.fault_campaign.watch import BusLog, first_difference
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.failures import KILLED
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.runtime.faults import FAULTS
@@ -444,6 +449,36 @@ def test_results_of_live_rows_are_in_every_output(
     assert failure.get("message") == "too late"
 
 
+def test_junit_has_a_case_for_each_row_and_counts_failures_of_both_sides(tmp_path: Path) -> None:
+    """Problems are words of others: a program's last line may look like XML."""
+    unlike_xml = 'KeyError: <"a" & b>'
+    results = [
+        verdict("roll-sign-flipped", replace(GOOD, error=unlike_xml)),
+        verdict("roll-stuck", replace(GOOD, row="roll-stuck", error="x"), GOOD),
+        replace(verdict("roll-sign-flipped", GOOD), row=ROWS["rate-stuck"], requirement="F & T"),
+    ]
+    told = {"id": "live-a", "verdict": "fail", "problems": ["off & on"], "requirement": "F02"}
+    file = tmp_path / "junit.xml"
+    write_junit(file, results, [told, told | {"id": "b", "verdict": "pass"}], {"c": "no <bus>"}, 1)
+    suite = ElementTree.parse(file).getroot()
+    assert (suite.tag, suite.attrib) == (
+        "testsuite",
+        {"name": "faults", "tests": "6", "failures": "3", "skipped": "1", "time": "1.0"},
+    )
+    cases = {case.get("name"): case for case in suite}
+    assert [*cases] == ["roll-sign-flipped", "roll-stuck", "rate-stuck", "live-a", "b", "c"]
+    assert {(case.tag, case.get("classname")) for case in suite} == {("testcase", "faults")}
+    failed = {name: case.find("failure") for name, case in cases.items()}
+    assert [name for name, each in failed.items() if each is not None] == [*[*cases][:2], "live-a"]
+    first = failed["roll-sign-flipped"]
+    assert first is not None
+    assert first.get("message") == f"seed 1: {unlike_xml}"
+    assert first.text == "\n".join(results[0].problems)
+    assert cases["rate-stuck"].findtext("system-out") == "F & T\ndiffers"
+    assert [each.get("message") for each in suite.iter("skipped")] == ["no <bus>"]
+    assert cases["c"].find("skipped") is not None
+
+
 def test_an_ended_campaign_begins_no_live_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runner, "run_rows", lambda _, rows, *__, **___: {r.id: [] for r in rows})
     monkeypatch.setattr(live, "run_live", lambda *_: pytest.fail("begun"))
@@ -451,6 +486,29 @@ def test_an_ended_campaign_begins_no_live_row(monkeypatch: pytest.MonkeyPatch) -
     assert done.exit_code == ExitCode.SYSTEM
     reasons = {each["id"]: each["why"] for each in json.loads(done.stdout)["not_run"]}
     assert "--bus" in reasons["live-controller-killed"]
+
+
+@pytest.mark.parametrize(
+    ("signalled", "code", "why"),
+    [(True, ExitCode.INTERRUPTED, "interrupted"), (False, ExitCode.SYSTEM, KILLED)],
+)
+def test_a_campaign_that_ends_early_judges_no_row_that_lacks_a_sea_and_says_why(
+    signalled: bool, code: ExitCode, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run_rows(
+        _: Campaign, rows: Sequence[Row], seeds: Sequence[int], *__: object, **___: object
+    ) -> dict[str, list[Outcome]]:
+        if signalled:
+            os.kill(os.getpid(), signal.SIGINT)
+        whole = [replace(GOOD, seed=seed) for seed in seeds]
+        return {row.id: whole if row.id == GOOD.row else whole[:1] for row in rows}
+
+    monkeypatch.setattr(runner, "run_rows", run_rows)
+    done = invoke("--rows", f"{GOOD.row},rate-stuck", "--seeds", "2", "--json")
+    assert done.exit_code == code
+    told = json.loads(done.stdout)
+    assert [(row["id"], row["verdict"]) for row in told["rows"]] == [(GOOD.row, "pass")]
+    assert told["not_run"] == [{"id": "rate-stuck", "why": why}]
 
 
 @pytest.mark.parametrize(

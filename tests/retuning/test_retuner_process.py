@@ -1,5 +1,6 @@
 """A retuner in a real process: what it answers, and what its end, sleep and nonsense do."""
 
+import multiprocessing
 import os
 import random
 import signal
@@ -7,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from utank_hil.retuning import (
     Refusal,
     RetuneFunction,
     RetunerProcess,
+    retuner_process,
     worker,
 )
 
@@ -149,6 +152,46 @@ def test_it_is_alive_when_it_is_made_and_dead_when_it_is_closed() -> None:
         assert retuner.alive
     retuner.close()
     _wait(lambda: not retuner.alive)
+
+
+def never_beats(*_: object) -> None:
+    time.sleep(3600)
+
+
+def ends_at_once(*_: object) -> None:
+    pass
+
+
+@pytest.mark.parametrize(("process", "waited_s"), [(never_beats, 30.0), (ends_at_once, 0.01)])
+def test_the_loop_begins_without_a_retuner_that_does_not_start(
+    process: Callable[..., None], waited_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 0.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal now_s
+        now_s += seconds
+        if process is ends_at_once:
+            for child in multiprocessing.active_children():
+                child.join()
+        assert now_s < 100.0
+
+    clock = SimpleNamespace(monotonic=lambda: now_s, sleep=sleep)
+    monkeypatch.setattr(retuner_process, "time", clock)
+    monkeypatch.setattr(retuner_process, "run_watchdog", process)
+    with RetunerProcess((answers_with_the_sum, SHAPE)) as retuner:
+        assert now_s == pytest.approx(waited_s)
+        assert not retuner.alive
+    assert not _alive(retuner.pid)
+
+
+def test_both_processes_are_out_of_reach_of_ctrl_c_and_give_way_to_the_loop() -> None:
+    with running(answers_with_the_sum) as retuner:
+        for pid in (retuner.pid, worker_of(retuner)):
+            assert pid is not None
+            assert os.getpgid(pid) == retuner.pid  # not that of the terminal
+            own = os.getpriority(os.PRIO_PROCESS, 0)
+            assert os.getpriority(os.PRIO_PROCESS, pid) == min(own + 10, 19)
 
 
 def test_work_that_fails_is_a_refusal_with_the_reason_and_the_next_order_is_worked_off() -> None:

@@ -19,8 +19,19 @@ from rerun.chunk import RrdReader
 from utank_hil.canbus import Mode, RetuningState
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.signals import SIGNALS
+from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind
 from utank_hil.telemetry.event_ring import EventWriter
-from utank_hil.telemetry.recorder import RecorderError, RecorderProcess, RecorderReport
+from utank_hil.telemetry.frame_log import FrameLog
+from utank_hil.telemetry.part import RecordingPart
+from utank_hil.telemetry.recorder import (
+    Places,
+    Progress,
+    RecorderError,
+    RecorderProcess,
+    RecorderReport,
+    Source,
+    record_part,
+)
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rotation import Rotation
@@ -115,6 +126,67 @@ def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
         with pytest.raises(RecorderError, match="exit code -9"):
             recorder.stop()
     np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
+    """Files by name, as they were brought to the disk."""
+    files: dict[str, bytes] = {}
+
+    def fsync(descriptor: int) -> None:
+        file = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        files[file.name] = file.read_bytes()
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    return files
+
+
+def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(
+    tmp_path: Path, disk: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is left is what was brought to the disk; the recorder's sleep is the clock."""
+    cuts: list[tuple[int, dict[str, bytes]]] = []
+    rows, written = table(2000), 0
+
+    def sleep(_: object, seconds: float) -> object:
+        nonlocal written
+        for number in range(written, written + round(100 * seconds)):
+            ring.write(rows[number])
+            frames.write(LAYOUT.pack(0, b"", Kind.TICK, 10_000_000 * number))
+            written += 1
+        cuts.append((written, dict(disk)))
+        return None if written < 200 else signal.SIGTERM
+
+    def left(kept: dict[str, bytes]) -> tuple[int, int]:
+        for name, content in kept.items():
+            (tmp_path / "left" / name).write_bytes(content)
+        records = sum(map(len, FrameLog(tmp_path / "left" / "run.frames").blocks()))
+        return len(recorded(tmp_path / "left" / "run.rrd")) if "run.rrd" in kept else 0, records
+
+    monkeypatch.setattr(signal, "sigtimedwait", sleep)
+    (tmp_path / "left").mkdir()
+    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
+        source = Source(ring.name, tmp_path / "run.rrd", None, None, frames.name, {})
+        assert not record_part(source, Progress(RecorderReport(0, 0, 0), Places()))
+    for now, kept in cuts:
+        assert now - min(left(kept)) <= 50
+    assert left(disk) == (written, written)
+
+
+def test_a_power_cut_leaves_all_of_a_file_that_was_finished(
+    tmp_path: Path, disk: dict[str, bytes]
+) -> None:
+    with RecordingPart(tmp_path / "run.rrd", SIGNALS) as part:
+        part.write(table(300))
+    (tmp_path / "left.rrd").write_bytes(disk["run.rrd"])
+    np.testing.assert_allclose(recorded(tmp_path / "left.rrd"), table(300), rtol=4e-16)
+
+
+def test_it_gives_way_to_the_loop_and_is_out_of_reach_of_ctrl_c(tmp_path: Path) -> None:
+    with RingWriter(SIGNALS) as ring, RecorderProcess(ring.name, tmp_path / "run.rrd") as recorder:
+        own = os.getpriority(os.PRIO_PROCESS, 0)
+        assert os.getpriority(os.PRIO_PROCESS, recorder.pid) == min(own + 5, 19)
+        assert os.getsid(recorder.pid) == recorder.pid
 
 
 @pytest.mark.parametrize(
