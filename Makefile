@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test tests-without-bus tests-on-bus test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
+.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -65,18 +65,9 @@ check: setup
 
 test: setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
-	$(MAKE) --no-print-directory --jobs=2 tests-without-bus tests-on-bus
+	$(PARALLEL) -m "not socketcan and not evidence"
+	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan
 	$(PYTHON) -m tools.mutation.run --not-judged --within 60
-
-# the tests on a bus sleep most of the time and must not be held up: the others give way
-tests-without-bus: setup
-	nice -n 19 $(PARALLEL) -m "not socketcan and not evidence"
-
-# what they print comes when they are done: the other tests show their progress meanwhile
-tests-on-bus: setup
-	@mkdir -p out
-	@tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan \
-		> out/tests-on-bus.txt 2>&1; status=$$?; cat out/tests-on-bus.txt; exit $$status
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few

@@ -1,9 +1,10 @@
 """A campaign's results as JSON, as JUnit and as a table."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from xml.etree import ElementTree
 
 from rich.table import Table
@@ -11,6 +12,9 @@ from rich.text import Text
 
 from firmware_sim.fault_campaign.campaign import Campaign
 from firmware_sim.fault_campaign.verdict import Result
+
+_NOT_IN_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""What a program printed may hold control characters, which XML 1.0 can't."""
 
 
 def as_json(
@@ -75,8 +79,9 @@ def write_junit(
     for name, passed, problems, shows in told_of:
         case = ElementTree.SubElement(suite, "testcase", classname="faults", name=name)
         if not passed:
-            failure = ElementTree.SubElement(case, "failure", message=next(iter(problems), ""))
-            failure.text = "\n".join(problems)
+            said = [_NOT_IN_XML.sub("\N{REPLACEMENT CHARACTER}", each) for each in problems]
+            failure = ElementTree.SubElement(case, "failure", message=next(iter(said), ""))
+            failure.text = "\n".join(said)
         ElementTree.SubElement(case, "system-out").text = shows
     for name, why in not_run.items():
         case = ElementTree.SubElement(suite, "testcase", classname="faults", name=name)

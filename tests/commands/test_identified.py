@@ -1,6 +1,7 @@
 """Configurations of ships that were found: they load, say what was found, and stay."""
 
 import dataclasses
+import os
 import resource
 from pathlib import Path
 
@@ -125,6 +126,19 @@ def test_next_start_has_the_law_that_was_retuned(tmp_path: Path) -> None:
         np.testing.assert_array_equal(
             getattr(retuned.matrices(), part), getattr(again.matrices(), part)
         )
+
+
+def test_a_ship_that_was_found_outlives_a_power_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on_disk: list[bytes] = []
+
+    def fsync(descriptor: int) -> None:
+        on_disk.append(Path(f"/proc/self/fd/{descriptor}").read_bytes())
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    files = ships(tmp_path).write(FOUND)
+    assert on_disk == [files[name].read_bytes() for name in ("vessel", "config")]
 
 
 @pytest.mark.parametrize("which", ["vessel", "config"])

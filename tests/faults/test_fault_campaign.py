@@ -450,8 +450,8 @@ def test_results_of_live_rows_are_in_every_output(
 
 
 def test_junit_has_a_case_for_each_row_and_counts_failures_of_both_sides(tmp_path: Path) -> None:
-    """Problems are words of others: a program's last line may look like XML."""
-    unlike_xml = 'KeyError: <"a" & b>'
+    """Problems are words of others: a program's last line may be what XML can't hold."""
+    unlike_xml = 'KeyError: <"a" & b> \x1b[31m\x00\ud800\uffff'
     results = [
         verdict("roll-sign-flipped", replace(GOOD, error=unlike_xml)),
         verdict("roll-stuck", replace(GOOD, row="roll-stuck", error="x"), GOOD),
@@ -472,8 +472,8 @@ def test_junit_has_a_case_for_each_row_and_counts_failures_of_both_sides(tmp_pat
     assert [name for name, each in failed.items() if each is not None] == [*[*cases][:2], "live-a"]
     first = failed["roll-sign-flipped"]
     assert first is not None
-    assert first.get("message") == f"seed 1: {unlike_xml}"
-    assert first.text == "\n".join(results[0].problems)
+    assert first.get("message") == 'seed 1: KeyError: <"a" & b> \ufffd[31m\ufffd\ufffd\ufffd'
+    assert first.text == "\n".join([str(first.get("message")), *results[0].problems[1:]])
     assert cases["rate-stuck"].findtext("system-out") == "F & T\ndiffers"
     assert [each.get("message") for each in suite.iter("skipped")] == ["no <bus>"]
     assert cases["c"].find("skipped") is not None

@@ -4,6 +4,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -464,6 +465,26 @@ def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
     later = recorded(tmp_path / "run-a-part002.rrd")
     np.testing.assert_allclose(later, table(750)[-len(later) :], rtol=4e-16)
     assert len(later) >= 600
+
+
+@pytest.mark.slow
+def test_where_nobody_writes_any_more_no_further_file_is_tried(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Else it would go on for ever: a folder that is gone does not come back."""
+    folder = tmp_path / "log"
+    folder.mkdir()
+    with RingWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(ring.name, folder / "run-a.rrd", rotation=Rotation(3600.0))
+        feed(ring, table(100))
+        wait_for(lambda: any_recorded(folder / "run-a.rrd"))
+        subprocess.run(["prlimit", f"--pid={recorder.pid}", "--fsize=400000:unlimited"], check=True)
+        feed(ring, table(700)[100:])
+        wait_for(lambda: "tried again" in capfd.readouterr().err)
+        shutil.rmtree(folder)
+    wait_for(lambda: recorder.has_ended, seconds=30.0)
+    with pytest.raises(RecorderError, match="the recorder failed"):
+        recorder.stop()
 
 
 def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -86,11 +86,11 @@ def commission(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
             "nothing is recorded."
         )
-        with suppress(PortError):  # the loop meets it too, and its node reacts
-            port.receive()  # what came before is old, and must not look fresh
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
                 notes.say(line)
+            with suppress(PortError):  # the loop meets it too, and its node reacts
+                port.receive()  # what came before is old, and must not look fresh
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
         fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)

@@ -1,6 +1,7 @@
 """The configuration for a ship that was identified: vessel, and a controller that names it."""
 
 import dataclasses
+import os
 from pathlib import Path
 from typing import Any, Final
 
@@ -105,7 +106,10 @@ def _write(
     with left_whole(controller_file), left_whole(vessel_file):
         for file, held in ((vessel_file, _vessel_content(found)), (controller_file, controller)):
             text = f"# Identified by {headline()}.\n{yaml.safe_dump(held, sort_keys=False)}"
-            file.write_text(text, encoding="utf-8")
+            with file.open("w", encoding="utf-8") as written:
+                written.write(text)
+                written.flush()
+                os.fsync(written.fileno())  # found once, perhaps in hours: it outlives a power cut
     return {"vessel": vessel_file, "config": controller_file}
 
 

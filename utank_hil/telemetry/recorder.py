@@ -408,6 +408,7 @@ def _main() -> None:
     except (OSError, RuntimeError) as error:
         reason = _reason(error, arguments.file)
         again = rotation is not None and progress.report.parts > 0
+        again = again and not _nobody_writes(content["rings"][0])
         if again:
             begun = part_of(arguments.file, progress.report.parts + 1)
             for suffix in SUFFIXES:  # of a part that has nothing yet
@@ -421,6 +422,15 @@ def _main() -> None:
             _go_on(content | asdict(progress) | {"failing": reason})
         _print_json({"error": reason})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
+
+
+def _nobody_writes(ring: str) -> bool:
+    """Whether the writer of a ring has closed it or is dead: there is nothing to try again for."""
+    try:
+        with RingReader(ring) as reader:
+            return reader.ended
+    except (OSError, RuntimeError):
+        return True
 
 
 def _reason(error: Exception, file: Path) -> str:
