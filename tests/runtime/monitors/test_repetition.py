@@ -61,21 +61,51 @@ def test_a_signal_that_stands_still_does_not_repeat() -> None:
     assert not any(taken([(0.1 + 1e-4 * (k // 10 % 2), 0.0) for k in range(1000)]))
 
 
-def test_a_hundred_times_the_same_after_the_first_two_is_frozen() -> None:
-    repetition = Repetition(150)
-    assert repetition.frozen is False
-    for sample in noise(40):
+def frozen_after(before: list[Sample], within: int = 150, same: int = 400) -> list[bool]:
+    """After each of some samples that are the same, and one that differs."""
+    repetition, frozen = Repetition(within), []
+    for sample in before:
         repetition.take(*sample)
-    # the first two tell how long ago; once more after one like these it takes another
-    for latest in (101, 102):
-        frozen = []
-        for _ in range(400):
-            repetition.take(0.1, 0.0)
-            frozen.append(repetition.frozen)
-        assert 101 <= frozen.index(True) <= latest
-        assert all(frozen[latest:])
-        repetition.take(0.1, 1e-4)
-        assert not repetition.frozen
+        assert repetition.frozen is False
+    for _ in range(same):
+        repetition.take(0.5, 0.0)
+        frozen.append(repetition.frozen)
+    repetition.take(0.5, 1e-4)
+    assert repetition.frozen is False
+    return frozen
+
+
+@pytest.mark.parametrize("count", [44, 45, 200, 250])
+def test_a_hundred_times_the_same_after_noise_is_frozen(count: int) -> None:
+    # the first two tell how long ago
+    assert frozen_after(noise(count)) == [False] * 101 + [True] * 299
+
+
+def test_a_sensor_that_had_no_noise_before_is_not_frozen() -> None:
+    """It sends the same where nothing moves: the gauges have noise then, too."""
+    assert not any(frozen_after([]))
+    assert not any(frozen_after(noise(43)))
+    assert not any(frozen_after([(0.1, 0.0)] * 300))
+    # with a coarse resolution, while she rolled
+    assert not any(frozen_after([(round(0.05 * k) * 1e-3, 0.0) for k in range(300)]))
+    some = [sample for sample in noise(300) for _ in range(2)]
+    assert not any(frozen_after(some))
+
+
+def test_nine_in_ten_samples_before_it_have_to_differ() -> None:
+    for equal, expected in ((4, True), (5, False)):
+        before = noise(200)
+        for k in range(equal):
+            before[-10 * k - 2] = before[-10 * k - 3]
+        assert any(frozen_after(before)) is expected
+    # of fifty pairs 45 are not enough
+    assert not any(frozen_after(noise(45), within=152))
+    assert any(frozen_after(noise(46), within=152))
+
+
+def test_a_memory_that_is_too_short_says_nothing() -> None:
+    assert not any(frozen_after(noise(300), within=102))
+    assert any(frozen_after(noise(300), within=103))
 
 
 def test_samples_that_are_each_sent_more_than_once_are_not_frozen() -> None:

@@ -25,8 +25,8 @@ LONGEST_S: Final = 0.6
 most: in a longer one a sensor's noise is a smaller share.
 """
 MOST: Final = 8.0
-"""Log-likelihood ratio from which a sign is wrong. To a sound sensor's sum, noise n of the standard
-deviation s adds n^2 / 6 s^2 in a step at most.
+"""Log-likelihood ratio from which a sign is wrong. To a sound sensor's sum, noise n of the roll, of
+the standard deviation s, adds n^2 / 6 s^2 in a step at most.
 """
 STEP: Final = 5.0
 """One step adds so much at most: one jump is no wrong sign."""

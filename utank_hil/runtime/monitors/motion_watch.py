@@ -51,7 +51,7 @@ class MotionWatch:
 
     def update(self, roll_rad: float, rate_rad_s: float, elapsed_s: float, *, stale: bool) -> None:
         """Take a sample, and set `found`; one that is `stale` begins anew."""
-        # half a tick of the ends makes a trapezoid of the sum
+        # half a tick of the ends makes a trapezoid of the sum, where no sample was lost
         turned_rad = self.turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
         self.turned_rad = 0.0
         self._last_rate_rad_s = rate_rad_s

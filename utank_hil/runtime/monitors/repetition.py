@@ -2,8 +2,8 @@
 
 A gateway that hangs, or a replay, sends intact frames whose counters go on. The noise of a sensor
 is several steps of the message, so that no second stretch of samples is equal to an earlier one.
-Samples that are all the same are counted by themselves: a sensor without noise sends them where
-nothing moves, so the water has to say that it did.
+Samples that are all the same are judged by themselves: a sensor without noise sends them where
+nothing moves. Only after samples that differed they say that it is frozen.
 """
 
 import math
@@ -13,6 +13,8 @@ REPEATED_SAMPLES: Final = 32
 """So many in a row, each unlike the one before it, equal those some constant time ago."""
 FROZEN_SAMPLES: Final = 100
 """So many in a row are the same."""
+NOISY_SHARE: Final = 0.9
+"""Of the samples before them differed from their neighbours, by the sensor's noise."""
 MIXED: Final = 7.0
 """Roll and seven times its rate make one number: one comparison in a tick in the place of two."""
 
@@ -30,7 +32,7 @@ class Repetition:
     found : bool
         Whether the samples repeat.
     frozen : bool
-        Whether the last samples were all the same, to the last bit.
+        Whether the last samples were all the same to the last bit, and those before them were not.
     """
 
     def __init__(self, samples: int) -> None:
@@ -64,4 +66,15 @@ class Repetition:
             self._run = self._same = 0
             self._lag = 0 if before is None else (place - before) % len(kept) or len(kept)
         self.found = self._run >= REPEATED_SAMPLES
-        self.frozen = self._same >= FROZEN_SAMPLES
+        if self._same < FROZEN_SAMPLES:
+            self.frozen = False
+        elif self._same == FROZEN_SAMPLES:
+            self.frozen = self._was_noisy(place)
+
+    def _was_noisy(self, place: int) -> bool:
+        """Whether the samples that are kept from before a standstill differed."""
+        kept = self._kept
+        first = place - FROZEN_SAMPLES - 1  # of those that are the same; a ring goes on below zero
+        older = range(first, place - self._last_place, -1)
+        differed = sum(kept[k - 1] < kept[k] or kept[k - 1] > kept[k] for k in older)
+        return differed > NOISY_SHARE * len(older)

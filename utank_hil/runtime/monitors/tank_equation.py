@@ -14,7 +14,7 @@ differentiating. Sums with a memory of 0.4 roll periods tell the gains::
 
 and what leads y - p - x the measured roll tells the motion sensor's delay, over 1.5 roll periods.
 Where the roll has not moved for a quarter of a period, y - p - x itself tells that it should have.
-Where the samples of roll and rate have all been the same for a second, less of it does.
+Where a motion sensor that had noise has sent a hundred samples that are the same, less of it does.
 No sensor's zero is quite right: y - p - x may hold any constant up to +-z, as a commissioning lets
 pass. Something is found only if no constant of that size explains it.
 The ship's inertia, stiffness and load stand in none of this. A gain is judged only where its own
@@ -46,7 +46,7 @@ STILL_PERIODS: Final = 0.25
 STILL_PUSHES: Final = 4.0
 """Of the least push, root mean square: so much must be left unexplained by a roll that is still."""
 FROZEN_PUSHES: Final = 1.0
-"""The same where the samples were all the same: no noise is left that could look like it."""
+"""The same where a sensor with noise sends the same sample all the time: it is to be confirmed."""
 MEMORY_PERIODS: Final = 0.4
 LATE_PERIODS: Final = 1.5
 LATE_PUSHES: Final = 1.75
@@ -230,7 +230,7 @@ class TankEquation:
 
         Between two samples that are some `steps` apart all three are taken to run straight. The
         pressure is that on the water, with what a valve holds back, `held_pa`, taken off. The roll
-        is `frozen` where the samples of the motion sensor have all been the same for a while.
+        is `frozen` as `Repetition` says.
         """
         self._frozen = frozen
         held, push, held_m2_s2 = self._held, pressure_pa / self._density, held_pa / self._density
