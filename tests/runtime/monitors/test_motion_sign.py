@@ -34,15 +34,17 @@ def sums_of(looks: list[Look]) -> list[float]:
     fast: list[float] = []
     elapsed, last = 0.0, math.nan
     for moved, turned, seconds, judged in looks:
-        move = max(min(moved, abs(turned) + JUMP), -abs(turned) - JUMP)
+        noise = 1.5 * math.sqrt(max(memory(squares, slow), memory(squares, fast)))
+        most = abs(turned) + max(JUMP, noise)
+        move = max(min(moved, most), -most)
         if not math.isnan(last):
             squares.append((move - last) ** 2)
             slow.append(min(seconds / 2.0, 1.0))
-            fast.append(min(seconds / 0.25, 1.0))
+            fast.append(min(seconds / 0.15, 1.0))
         last = move
         step.append((step[-1][0] + move, step[-1][1] + turned))
         elapsed += seconds
-        power = max(memory(squares, slow), memory(squares, fast) / 3, 6.0) / 6
+        power = max(memory(squares, slow), memory(squares, fast) / 1.5, 6.0) / 6
         rolled, turns = np.array(step).T
         evidence = np.var(turns) * len(step) / 2 / power
         if elapsed >= 0.6 or (elapsed >= 0.14 and evidence >= 5):

@@ -16,8 +16,8 @@ from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 
 SCATTER_S: Final = 2.0
 """Memory of the noise: a shorter one knows it less well."""
-BURST_S: Final = 0.25
-BURST: Final = 3.0
+BURST_S: Final = 0.15
+BURST: Final = 1.5
 """So many times as much in a shorter one is noise that has just begun."""
 SHORTEST_S: Final = 0.14
 LONGEST_S: Final = 0.6
@@ -28,6 +28,8 @@ MOST: Final = 8.0
 """Log-likelihood ratio from which a sign is wrong. To a sound sensor's sum, noise n of the roll, of
 the standard deviation s, adds n^2 / 6 s^2 in a step at most.
 """
+JUMP_NOISES: Final = 1.5
+"""A move of so many times the noise of a second difference is no jump."""
 STEP: Final = 5.0
 """One step adds so much at most: one jump is no wrong sign."""
 LEAST: Final = 2.0
@@ -70,8 +72,10 @@ class SignTest:
 
         A step that ends while nothing is `judged` is left out.
         """
-        # a jump is no wrong sign, and adds little to the noise
-        moved_rad = within(moved_rad, abs(turned_rad) + self._jump_rad)
+        # a jump is no wrong sign, and adds little to the noise; noise that is cut would walk
+        scatter = max(self._scatter, self._burst)
+        jump_rad = max(self._jump_rad, JUMP_NOISES * math.sqrt(scatter))
+        moved_rad = within(moved_rad, abs(turned_rad) + jump_rad)
         bend_rad = moved_rad - self._last_rad
         self._last_rad = moved_rad
         if bend_rad == bend_rad:
