@@ -56,7 +56,7 @@ def sums_of(looks: list[Look]) -> list[float]:
     return sums
 
 
-moves = st.integers(-80, 80).map(float)
+moves = st.integers(-300, 300).map(float)
 looks = st.lists(
     st.tuples(moves, moves, st.sampled_from([0.05, 0.125, 0.3, 0.7, 3.0]), st.booleans()),
     max_size=20,
@@ -71,6 +71,18 @@ def test_the_sum_is_that_of_its_formulas(looks: list[Look]) -> None:
         found.append(test.update(moved * S, turned * S, seconds, judged=judged))
         assert test.sum == pytest.approx(expected[len(found) - 1], rel=1e-6, abs=1e-6)
     assert found == [each > 8 for each in expected]
+
+
+@pytest.mark.parametrize("jump", [-1000.0, -300.0, 300.0, 1000.0])
+@pytest.mark.parametrize("noise", [0.0, 20.0, 60.0, 200.0])
+def test_a_jump_is_cut_to_the_limit_or_to_the_noise(noise: float, jump: float) -> None:
+    looks = [(noise * (-1) ** k, 0.0, 0.05, True) for k in range(60)]
+    looks += [(jump, 30.0, 0.05, True), *[(-10.0, 10.0, 0.05, True)] * 30]
+    test, sums = SignTest(LIMITS), []
+    for moved, turned, seconds, judged in looks:
+        test.update(moved * S, turned * S, seconds, judged=judged)
+        sums.append(test.sum)
+    assert sums == pytest.approx(sums_of(looks), rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("turned", [2.0, 5.0, 20.0])
