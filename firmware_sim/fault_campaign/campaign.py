@@ -6,11 +6,12 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario, missing_nodes
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
-from utank_hil.parameters import Finite, NotNegative, Positive, refuse
+from utank_hil.parameters import Finite, Positive, refuse
 from utank_hil.retuning import EstimateSettings
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
@@ -171,10 +172,10 @@ class Row(Section):
     may_end: tuple[FaultName, ...] = ()
     hardwired_stop: bool = False
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
-    roll_window_s: Positive | None = None
+    roll_window_s: FaultSpan | None = None
     roll_limit: Positive = 1.05
     from_start: bool = False
-    followed_s: Positive = 4.0
+    followed_s: FaultSpan = 4.0
     long: bool = False
 
     @model_validator(mode="after")
@@ -228,8 +229,8 @@ class Campaign(Section):
         When the operator arms.
     """
 
-    fault_s: NotNegative
-    arm_s: NotNegative
+    fault_s: FaultTime
+    arm_s: FaultTime
     setups: dict[str, Setup]
     requirements: tuple[Requirement, ...]
     rows: tuple[Row, ...]

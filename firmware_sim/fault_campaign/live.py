@@ -27,6 +27,7 @@ from utank_hil.canbus import (
     Mode,
     PumpCommand,
     SensorMotion,
+    SocketCanPort,
     load_catalogue,
 )
 from utank_hil.commands.common import CONFIGS
@@ -69,6 +70,7 @@ class LiveBench:
     """
 
     def __init__(self, bus: str, folder: Path) -> None:
+        SocketCanPort(bus).close()  # says what is missing, and what to do
         self.bus = bus
         catalogue = load_catalogue()
         self._status = catalogue.receiver(ControllerStatus)

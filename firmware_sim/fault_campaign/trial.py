@@ -25,7 +25,7 @@ from firmware_sim.truth import TRUTH
 from firmware_sim.worker_pool import end_with
 from utank_hil.arrays import FloatArray
 from utank_hil.assembly import estimator_work
-from utank_hil.canbus import Fault, Mode
+from utank_hil.canbus import Mode
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime.panel import Action, TimedAction
@@ -91,7 +91,6 @@ class Outcome:
     zero_ms: float | None = None
     mode: str = ""
     code: str = ""
-    alarms: tuple[str, ...] = ()
     was_active: bool = False
     armed_again: bool = False
     refused: int = 0
@@ -317,7 +316,6 @@ class Sea:
             after(zero_ns),
             "",
             watch.code.name,
-            tuple(sorted(code.name for code in watch.alarms if code is not Fault.NONE)),
             watch.active_ns is not None,
             watch.armed_again,
             steepest_pa_s=log.steepest_pa_s(start_ns),

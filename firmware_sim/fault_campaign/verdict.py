@@ -20,6 +20,8 @@ STOPS: Final = {
     if any(condition.reaction is Reaction.STOP for condition in row.conditions)
 }
 RATE_SHARE: Final = 1.001
+ALARM_MS: Final = 100.0
+"""The list of alarms is renewed, and looked at, ten times a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +165,14 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
     return found_ms + STOP_ZERO_MS
 
 
+def _named_in_time(row: Row, outcome: Outcome) -> bool:
+    """Whether an alarm had one of the row's names by the time that it was, or had to be, found."""
+    if outcome.alarm_ms is None or row.reaction == "refuse":
+        return outcome.alarm_ms is not None
+    found_ms = _reaction_ms(row, outcome)
+    return outcome.alarm_ms <= max(row.within_ms or 0.0, found_ms or 0.0) + ALARM_MS
+
+
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
     """What was not as it should be in one sea."""
     found_ms = _reaction_ms(row, outcome)
@@ -197,7 +207,7 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         yield "was not in charge before"
     if outcome.armed_again:
         yield "armed again by itself"
-    if row.codes and outcome.code not in row.codes and not set(outcome.alarms) & set(row.codes):
+    if row.codes and outcome.code not in row.codes and not _named_in_time(row, outcome):
         yield f"called {outcome.code}"
     limits = setup.config.limits
     if row.reaction != "stop" and outcome.steepest_pa_s > RATE_SHARE * limits.rate_pa_s:

@@ -93,8 +93,6 @@ class Watch:
         When the drive's set-point last was not zero, or the valve last followed.
     code : Fault
         First one that was latched; while none is, what is shown.
-    alarms : set of Fault
-        All that were raised.
     armed_again : bool
         In charge once more after a fault.
     roll_sum, roll_square, samples : float
@@ -127,7 +125,6 @@ class Watch:
         self._codes = {Fault[name] for name in codes}
         self.pressed_ns = now_ns - TICK_NS
         self.code = Fault.NONE
-        self.alarms: set[Fault] = set()
         self.armed_again = self._waited = False
         self.roll_sum = self.roll_square = 0.0
         self.samples = 0
@@ -175,10 +172,12 @@ class Watch:
         self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
         if self.noted_ns is None and self._count() > self._noted:
             self.noted_ns = now_ns
-        if now_ns % (10 * TICK_NS) == 0:
-            self.alarms |= node.alarms.codes
-            if self.alarm_ns is None and self.alarms & self._codes:
-                self.alarm_ns = now_ns
+        if (
+            self.alarm_ns is None
+            and now_ns % (10 * TICK_NS) == 0
+            and node.alarms.codes & self._codes
+        ):
+            self.alarm_ns = now_ns
         ship = self._bench.ship
         if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
             ship.valve is not None and ship.valve.following

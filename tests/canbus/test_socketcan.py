@@ -1,6 +1,7 @@
 """The SocketCAN port over stand-ins that behave as python-can's bus was seen to on a real one."""
 
 import errno
+import gc
 import socket
 
 import can
@@ -161,6 +162,24 @@ def test_frames_that_came_with_an_error_are_not_lost(buses, wrong):
         port.receive()
     assert before + list(port.receive()) == [FRAME, FRAME]
     assert list(port.receive()) == []
+
+
+@pytest.mark.parametrize("with_it", [[], [message()]])
+def test_an_error_leaves_nothing_behind_for_the_garbage_collector(buses, with_it):
+    """The loop has switched it off."""
+    port = SocketCanPort("can0")
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(10):
+            buses[0].script = [error_frame(0x20), *with_it]
+            for _ in with_it:
+                assert port.receive() == [FRAME]
+            with pytest.raises(PortError, match="acknowledges"):
+                port.receive()
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 def test_a_flood_of_error_frames_does_not_hold_frames_back(buses):

@@ -3,8 +3,11 @@
 import contextlib
 import errno
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
@@ -45,9 +48,9 @@ class Table:
     def type(self, text: str) -> None:
         os.write(self.writing, text.encode())
 
-    def look(self) -> bool:
+    def look(self, *, signalled: bool = False) -> bool:
         """A look of the keyboard and a tick of the panel."""
-        left = self.keyboard.look(self.now_ns)
+        left = self.keyboard.look(self.now_ns, signalled=signalled)
         if not left:
             list(self.node.tick(self.now_ns))
         self.now_ns += STEP_NS
@@ -101,8 +104,11 @@ def test_a_line_is_obeyed_when_it_is_whole_or_the_pipe_is_closed(table: Table) -
     assert table.said == ["stop", "the input has ended; what was asked for stays, Ctrl-C leaves"]
 
 
+@pytest.mark.parametrize("signalled", [False, True])
 @pytest.mark.parametrize("gone", [False, True])
-def test_end_of_a_terminal_stops_and_leaves(gone: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_end_of_a_terminal_stops_and_leaves(
+    gone: bool, signalled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Ctrl-D, or a connection that was lost: a panel that hears nobody must not stay armed."""
     table = Table(terminal=True)
     table.hear(Mode.STANDBY)
@@ -118,16 +124,29 @@ def test_end_of_a_terminal_stops_and_leaves(gone: bool, monkeypatch: pytest.Monk
 
         monkeypatch.setattr(os, "read", fail)
     os.close(table.writing)
-    assert not table.look()
+    assert not table.look(signalled=signalled)
     assert table.order.stop
     assert not table.order.arm
     assert table.said[-1] == "stop"
     for _ in range(10):
         table.hear(Mode.STANDBY)
-        if table.look():
+        if table.look(signalled=signalled):
             break
     else:
         raise AssertionError("it stays")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["ctrl-d", "closed"])
+def test_the_command_sends_its_stop_before_it_ends_with_its_terminal(how: str) -> None:
+    """With the terminal comes SIGHUP, and the input ends."""
+    script = Path(__file__).with_name("panel_on_a_terminal.py")
+    done = subprocess.run(
+        [sys.executable, script, how], capture_output=True, text=True, timeout=60, check=True
+    )
+    stops, mode, armed = done.stdout.split()
+    assert int(stops) > 0
+    assert (mode, armed) == ("STANDBY", "False")
 
 
 def test_a_reset_that_is_refused_is_said_with_what_lasts(table: Table) -> None:
@@ -185,10 +204,22 @@ def test_who_leaves_after_a_stop_waits_for_its_answer(table: Table) -> None:
     assert table.look()
 
 
-def test_who_leaves_does_not_wait_for_ever(table: Table) -> None:
-    table.type("stop\nquit\n")
+def test_a_signal_leaves_at_once_and_after_a_stop_when_that_is_answered(table: Table) -> None:
+    assert table.look(signalled=True)
+    other = Table()
+    other.type("stop\n")
+    for _ in range(7):
+        assert not other.look(signalled=True)
+    assert other.order.stop
+    other.hear(Mode.STANDBY)
+    assert other.look(signalled=True)
+
+
+@pytest.mark.parametrize("signalled", [False, True])
+def test_who_leaves_does_not_wait_for_ever(table: Table, signalled: bool) -> None:
+    table.type("stop\n" if signalled else "stop\nquit\n")
     begun_ns = table.now_ns
-    while not table.look():
+    while not table.look(signalled=signalled):
         assert table.now_ns - begun_ns <= LEAVE_NS + STEP_NS
     assert table.now_ns - begun_ns >= LEAVE_NS
 
@@ -283,17 +314,23 @@ def test_arm_is_refused_in_words_while_a_stop_is_not_answered(table: Table) -> N
     assert "not answered the stop" in table.said[-1]
 
 
-def test_a_station_without_the_command_may_stop_and_accept_and_nothing_else() -> None:
+def test_a_station_without_the_command_may_stop_accept_and_forbid_retuning_and_nothing_else() -> (
+    None
+):
     table = Table(station=Station.OPERATOR_2)
     table.hear(Mode.ACTIVE, station=Station.OPERATOR)
     table.type("arm\n")
     table.look()
     assert not table.order.arm
     assert "take" in table.said[-1]
-    table.type("accept\nstop\n")
+    table.type("accept\nstop\nforbid\n")
     table.look()
     assert table.order.stop
     assert table.order.acknowledge
+    assert table.order.forbid_retuning
+    table.type("permit\n")
+    table.look()
+    assert not table.order.forbid_retuning
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Pump limits: each holds, and the level barrier keeps the pump from flooding a reservoir."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -54,6 +56,14 @@ def test_power_put_into_the_water_stays_below_its_limit(desired, level, rate):
     limiter = CommandLimiter(PumpLimits(rate_pa_s=1e9, power_w=2e5), TANK, PERIOD_S)
     command = limiter.limit(desired, level, rate)
     assert command * TANK.reservoir_area_m2 * rate <= 2e5 * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("rate", [5e-324, -5e-324, 1e-310])
+def test_water_that_all_but_stands_still_divides_nothing_by_zero(rate):
+    """Half a square metre times the smallest rate there is rounds to no flow."""
+    small = dataclasses.replace(TANK, reservoir_area_m2=0.4)
+    limiter = CommandLimiter(PumpLimits(pressure_pa=50e3, rate_pa_s=1e9), small, PERIOD_S)
+    assert limiter.limit(7e3, 0.0, rate) == 7e3
 
 
 def test_small_motion_leaves_the_wish_alone():

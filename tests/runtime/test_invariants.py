@@ -2,7 +2,9 @@
 
 A controller node with the emulated drive behind it, on a table. A walk, drawn from a seed, brings
 it into each phase, lets each fault and each order begin there and every other fault follow. Each
-tick is judged by the fault table and by the bench's own knowledge of what was ordered.
+tick is judged by the fault table and by the bench's own knowledge of what was ordered. What only
+monitors find, or a valve, a second sensor or hard-wired inputs have, is written into what the
+supervisor looks at: here are none of them to overwrite it. `utank-hil faults` has the real ones.
 """
 
 import hashlib
@@ -23,8 +25,8 @@ from utank_hil.canbus import (
     AddressClaim,
     DriveFault,
     DriveStatus1,
+    Fault,
     Frame,
-    Heartbeat,
     Mode,
     OperatorCommand,
     Quality,
@@ -69,6 +71,8 @@ class Table(ControllerBench):
         self._arms = self._arms_used = 0
         self._zero_by_ns = 1 << 62
         self.cuts = 0
+        self.named: set[Fault] = set()
+        self.began: Counter[Condition] = Counter()
 
     def order_is(self, **changes: object) -> None:
         self._arms += bool(changes.get("arm")) and not self.order.arm
@@ -94,6 +98,7 @@ class Table(ControllerBench):
 
     def _judge(self, before_pa: float, mode_before: Mode) -> None:
         node, seen = self.node, self.node.seen
+        self.named |= node.alarms.codes | {node.fault}
         pressure_pa, mode = node.command_pa, node.mode
         now_ns = self.now_ns - TICK_NS
         # 1: zero unless armed, fresh and within limits
@@ -174,6 +179,33 @@ def field(**values: object) -> tuple[Callable[[Table], None], Callable[[Table], 
     return lambda table: put(table, values), lambda table: put(table, well)
 
 
+def seen(**values: object) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+    """What the supervisor looks at and nothing on this bench overwrites."""
+
+    def put(table: Table, what: dict[str, Any]) -> None:
+        for name, value in what.items():
+            assert hasattr(table.node.seen, name)
+            setattr(table.node.seen, name, value)
+
+    well = {name: getattr(Table(random.Random(0)).node.seen, name) for name in values}
+    return lambda table: put(table, values), lambda table: put(table, well)
+
+
+def found(reaction: Reaction) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+    """What the monitors find that has a reaction: one of it after the other."""
+    known = [each for each in conditions_of(reaction) if each.findings]
+
+    def begin(table: Table) -> None:
+        its = min(known, key=table.began.__getitem__)
+        table.began[its] += 1
+        table.node.seen.found |= table._draw.choice(list(its.findings)).value
+
+    def end(table: Table) -> None:
+        table.node.seen.found = 0
+
+    return begin, end
+
+
 def spoilt(kind: type) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
     def flip(of: type, frame: Frame) -> tuple[Frame, ...]:
         data = bytes([frame.data[0] ^ 0x41]) + frame.data[1:]
@@ -216,7 +248,19 @@ BEGIN_AND_END: dict[str, tuple[Callable[[Table], None], Callable[[Table], None]]
         lambda table: setattr(table.law, "answer_pa", math.nan),
         lambda table: setattr(table.law, "answer_pa", 40e3),
     ),
-    "heartbeats silent": silent(Heartbeat),
+    "drive warns": field(drive_warns=True),
+    "not commissioned": seen(commissioned=False),
+    "hard-wired stop": seen(hardwired_stop=True),
+    "hard-wired inputs silent": seen(hardwired_age_ms=1e3),
+    "spare sensor silent": seen(motion_spare_age_ms=1e3),
+    "valve silent": seen(valve_age_ms=1e3),
+    "valve fault": seen(valve_fault=True),
+    "valve elsewhere": seen(valve_off_ms=1e3),
+    "little stability": seen(gm_low=True),
+    "found, stops": found(Reaction.STOP),
+    "found, ramps": found(Reaction.RAMP),
+    "found, halves": found(Reaction.HALVE),
+    "found, warns": found(Reaction.WARN),
 }  # fmt: skip
 ORDERS: dict[str, Callable[[Table], None]] = {
     "arm": lambda table: table.order_is(mode_request=Mode.ACTIVE, arm=True),
@@ -350,6 +394,8 @@ class Walk:
             phase = phases[(turn[first] + faults.index(first)) % len(phases)]
             turn[first] += 1
             self.go(phase, (first, then))
+        self.go("ACTIVE", ("panel silent",))
+        self.table.run(SAFETY.panel_age_armed_ms)
         for order in ORDERS:
             for phase in phases:
                 self.go(phase, (order, self.draw.choice(list(ORDERS))))
@@ -378,8 +424,28 @@ def test_invariants_hold_in_every_phase_under_every_pair_of_faults() -> None:
     assert not missed
     faults = list(BEGIN_AND_END)
     assert all(walk.pairs[one, two] for one in faults for two in faults if one != two)
+    known = {row.code for row in FAULTS}
+    assert walk.table.named - {Fault.NONE} == known, known - walk.table.named
+    assert all(walk.table.began[each] for row in FAULTS for each in row.conditions if each.findings)
     assert walk.table.cuts > 100
     assert len(walk.table.commands) > 5000
+
+
+@pytest.mark.parametrize("event", BEGIN_AND_END)
+def test_no_event_of_the_walk_goes_without_effect(event: str) -> None:
+    """It is named while control lasts, or keeps from arming."""
+    named = []
+    for phase in ("ACTIVE", "STANDBY"):
+        table = Table(random.Random(SEED))
+        table.run(400)
+        PHASES[phase](table)
+        table.named.clear()
+        BEGIN_AND_END[event][0](table)
+        ORDERS["arm"](table)
+        table.run(5100)
+        named.append(bool(table.named - {Fault.NONE}))
+        named.append(table.node.mode is not Mode.ACTIVE)
+    assert any(named)
 
 
 def test_the_same_seed_gives_the_same_trace() -> None:

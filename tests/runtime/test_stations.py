@@ -53,7 +53,7 @@ def test_second_station_that_watches_neither_arms_nor_disarms_nor_resets() -> No
     bench.second_is(arm=True, mode_request=Mode.ACTIVE, reset=True, retune=True)
     bench.run(1000)
     assert bench.node.mode is Mode.STANDBY
-    assert not bench.node.inbox.stations.take_retuning().retune
+    assert not bench.node.inbox.stations.take_retuning(bench.now_ns).retune
 
 
 @pytest.mark.parametrize("taken", [False, True])
@@ -204,7 +204,7 @@ def test_taking_the_command_with_the_arm_bit_set_never_arms() -> None:
     bench.run(1000)
     assert bench.station is Station.OPERATOR_2
     assert bench.node.mode is Mode.STANDBY
-    assert not bench.node.inbox.stations.take_retuning().retune
+    assert not bench.node.inbox.stations.take_retuning(bench.now_ns).retune
 
 
 @pytest.mark.parametrize("asked", [Mode.STANDBY, Mode.ACTIVE])
@@ -232,6 +232,33 @@ def test_a_take_that_was_held_since_before_its_first_frame_is_none() -> None:
     bench.second = IDLE._replace(take_command=True)
     bench.run(400)
     assert bench.station is Station.OPERATOR
+
+
+def test_retuning_is_forbidden_while_either_station_says_so() -> None:
+    bench = active_bench()
+    stations = bench.node.inbox.stations
+
+    def forbidden() -> bool:
+        bench.run(300)
+        return stations.take_retuning(bench.now_ns).forbidden
+
+    bench.order_is(forbid_retuning=True)
+    assert forbidden()
+    bench.second_is(take_command=True, arm=True, mode_request=Mode.ACTIVE)
+    assert bench.station is Station.OPERATOR_2
+    bench.second_is(take_command=False)
+    assert forbidden()  # who takes the command is not to lift it
+    bench.order_is(forbid_retuning=False)
+    forbidden()
+    assert not forbidden()
+    bench.second_is(forbid_retuning=True)
+    assert forbidden()
+    bench.second_is(forbid_retuning=False)
+    bench.order_is(forbid_retuning=True)
+    assert forbidden()
+    bench.silent.add(OperatorCommand)  # a panel that is gone forbids nothing for ever
+    bench.run(1000)
+    assert not forbidden()
 
 
 def test_alarms_are_accepted_at_any_station() -> None:

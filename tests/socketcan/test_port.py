@@ -1,13 +1,17 @@
 """The port on a real SocketCAN interface; run with ``tools/vcan pytest -m socketcan``."""
 
 import errno
+import itertools
 import subprocess
+import time
 
 import can
 import pytest
 from can.interfaces.socketcan import SocketcanBus
 
 from utank_hil.canbus import Frame, PortError, SocketCanPort
+from utank_hil.runtime import RealTimeLoop
+from utank_hil.tick import TICK_NS
 
 pytestmark = pytest.mark.socketcan
 
@@ -112,6 +116,40 @@ def test_a_deleted_interface_is_reopened_when_it_is_back(ports):
     assert list(there.receive()) == []
     here.send(FRAME)
     assert list(there.receive()) == [FRAME]
+
+
+class Sender:
+    """Sends a frame a tick, and hears those of the other port."""
+
+    name = "sender"
+    period_ns = TICK_NS
+
+    def __init__(self):
+        self.heard = 0
+
+    def receive(self, frame, now_ns):
+        self.heard += 1
+
+    def tick(self, now_ns):
+        return [FRAME]
+
+
+@pytest.mark.timeout(60)  # what waits by the wall clock waits for a day
+def test_a_wall_clock_that_jumps_holds_no_loop_up(ports, monkeypatch):
+    seconds = itertools.cycle([2e9, 2e9 - 86_400, 2e9 + 86_400, 0.0, 4e9])
+    for module in (time, can.bus):  # this has imported the function
+        monkeypatch.setattr(module, "time", lambda: next(seconds))
+    monkeypatch.setattr(time, "time_ns", lambda: round(1e9 * next(seconds)))
+    here, there = ports
+    node = Sender()
+    loop = RealTimeLoop([node], here)
+    begun_ns = time.monotonic_ns()
+    for _ in range(20):
+        there.send(FRAME)
+    loop.run(duration_ns=100 * TICK_NS)
+    assert time.monotonic_ns() - begun_ns >= 99 * TICK_NS
+    assert node.heard == 20
+    assert 0 < len(there.receive()) <= 100
 
 
 def test_an_interface_that_does_not_exist_is_named():

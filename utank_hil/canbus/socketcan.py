@@ -103,14 +103,13 @@ class SocketCanPort:
 
         An error is raised by the next call where frames came with it: one of them may say stop.
         """
+        frames = self._read() if self._pending is None else []
         if self._pending is not None:
-            pending, self._pending = self._pending, None
-            raise pending
-        frames, error = self._read()
-        if error is not None:
             if not frames:
-                raise error
-            self._pending = error
+                try:
+                    raise self._pending  # held by a variable here it would never be freed
+                finally:
+                    self._pending = None
         elif frames:
             if self._drained:
                 self._down = False
@@ -125,30 +124,30 @@ class SocketCanPort:
         """Frames of all other kinds."""
         return self.error_frames + self.standard_frames + self.remote_frames
 
-    def _read(self) -> tuple[list[Frame], PortError | None]:
-        """Frames, and the first error that came with them."""
+    def _read(self) -> list[Frame]:
+        """Frames; the first error that came with them is pending."""
         bus = self._open_bus()
         frames: list[Frame] = []
-        first: PortError | None = None
         for _ in range(MAX_FRAMES_PER_CALL):
             try:
                 # not recv(0), which uses the wall clock and blocks when that is set back
                 message, _filtered = bus._recv_internal(0)
             except (can.CanError, OSError) as error:
                 failure = self._failure(error)
-                return frames, first or failure
+                self._pending = self._pending or failure
+                break
             if message is None:
                 break
             if message.is_error_frame:
                 problem = self._problem(message)
-                first = first or problem
+                self._pending = self._pending or problem
             elif message.is_remote_frame:
                 self.remote_frames += 1
             elif not message.is_extended_id:
                 self.standard_frames += 1
             else:
                 frames.append(Frame(message.arbitration_id, bytes(message.data)))
-        return frames, first
+        return frames
 
     def close(self) -> None:
         """Release the socket; idempotent."""

@@ -20,12 +20,14 @@ HELP: Final = """\
   accept, reset        accept the alarms; leave FAULT when its cause is gone
   take                 take the command from the other station
   retune, undo         identify the ship and design anew; back to the law before
-  forbid, permit       no retuning; retuning again
+  forbid, permit       no retuning; retuning again, where no other station forbids it
   help, quit           Words may be cut short: d for disarm."""
 
 _READ_BYTES: Final = 4096
 _LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
+_ANYWHERE: Final = (Action.STOP, Action.ACCEPT, Action.TAKE, Action.FORBID, Action.PERMIT)
+"""What a station without the command may press, too."""
 _LASTING: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.ACTIVE_ACKNOWLEDGED)
 _UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
 
@@ -61,8 +63,12 @@ class Keyboard:
         self._reset_ns: int | None = None
         self._alarms: dict[Fault | None, AlarmState | None] = {}
 
-    def look(self, now_ns: int) -> bool:
-        """Obey every line that has come and show what is new; whether to leave."""
+    def look(self, now_ns: int, *, signalled: bool = False) -> bool:
+        """Obey every line that has come and show what is new; whether to leave.
+
+        A signal (`signalled`) is like ``quit``: a closed terminal, whose input has then ended,
+        is to have its stop sent.
+        """
         was_open, self._now_ns = self._open, now_ns
         lines = self._lines()
         self._show(now_ns)
@@ -71,6 +77,8 @@ class Keyboard:
                 self._leave_ns = now_ns + LEAVE_NS
         if was_open and not self._open:
             self._end(now_ns)
+        if signalled and self._leave_ns is None:
+            self._leave_ns = now_ns + LEAVE_NS
         self._tell_of_reset(now_ns)
         # what was pressed last is to be heard: a stop until it is answered
         return self._leave_ns is not None and (not self._node.busy or now_ns >= self._leave_ns)
@@ -140,7 +148,7 @@ class Keyboard:
             self._say("not armed: no controller is heard")
         elif action is Action.ARM and node.stopping:
             self._say("not armed: the controller has not answered the stop yet")
-        elif action not in (Action.STOP, Action.ACCEPT, Action.TAKE) and self._elsewhere:
+        elif action not in _ANYWHERE and self._elsewhere:
             self._say("the other station has the command: take")
         else:
             node.press(action)

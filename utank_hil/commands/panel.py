@@ -54,7 +54,7 @@ def panel(
     try:
         with stop_on_signals() as signalled:
             RealTimeLoop([node], port).run(
-                lambda: keyboard.look(time.monotonic_ns()) or signalled(),
+                lambda: keyboard.look(time.monotonic_ns(), signalled=signalled()),
                 None if duration is None else round(duration * 1e9),
             )
     finally:

@@ -110,10 +110,11 @@ class CommandLimiter:
     ) -> float:
         """Within pressure, level and power limits; the barrier brakes with the share, too."""
         most = self._limits.pressure_pa * share
-        if rate_m_s == 0:
+        flow_m3_s = self._area_m2 * abs(rate_m_s)
+        if flow_m3_s == 0:  # that of the smallest rate is, too
             return min(max(desired_pa, -most), most)
         way = math.copysign(1.0, rate_m_s)  # seen in the direction in which the water moves
-        power_pa = self._limits.power_w / (self._area_m2 * abs(rate_m_s))
+        power_pa = self._limits.power_w / flow_m3_s
         high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s)), power_pa)
         return way * max(min(way * desired_pa, high), -most)
 

@@ -478,7 +478,7 @@ class ControllerNode:
             self._interrupted = False
             self._retuning.update(
                 now_ns,
-                self.inbox.stations.take_retuning(),
+                self.inbox.stations.take_retuning(now_ns),
                 engaged=self._engaged,
                 fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
                 passive_roll_rad=self.twin_roll_rad,

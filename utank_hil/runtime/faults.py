@@ -531,8 +531,8 @@ FAULTS: Final = (
     ),
     _row(
         Fault.STABILITY_LOW,
-        "The ship's metacentric height may be below the limit of her stability booklet, or nothing "
-        "watches it any more: the panel shows no GM then.",
+        "The ship's metacentric height may be below the limit of her stability booklet, or no "
+        "estimates of it come any more: the panel shows no GM then.",
         "Compare with the loading computer; take on ballast or remove weight from above. Without "
         "estimates (the log has the reason) start the controller again when that can be done.",
         Condition(

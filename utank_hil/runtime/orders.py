@@ -129,8 +129,14 @@ class Orders:
 
     def holds_stop(self, now_ns: int) -> bool:
         """Whether the stop bit is set in the last accepted frame, and that is not long ago."""
-        last = self.last
-        return last is not None and last.stop and now_ns - self.heard_ns <= self._gap_ns
+        return self.last is not None and self.last.stop and self._is_fresh(now_ns)
+
+    def forbids_retuning(self, now_ns: int) -> bool:
+        """Whether that frame forbids retuning, likewise."""
+        return self.last is not None and self.last.forbid_retuning and self._is_fresh(now_ns)
+
+    def _is_fresh(self, now_ns: int) -> bool:
+        return now_ns - self.heard_ns <= self._gap_ns
 
     def take(self) -> Wishes:
         """Return what was ordered since the last call."""

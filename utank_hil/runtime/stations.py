@@ -3,7 +3,7 @@
 The first station has the command until the second asks for it, and gets it back the same way. So a
 ship with one station needs to know nothing of this. What a station's levers say counts from when it
 has the command: one that takes it while the controller is active sends the mode that it finds, with
-the arm bit set, or else it disarms. Alarms can be accepted at both.
+the arm bit set, or else it disarms. Alarms can be accepted at both, and retuning be forbidden.
 """
 
 from typing import Final
@@ -75,9 +75,15 @@ class Stations:
         armed = wishes.armed and other.armed
         return Wishes(armed, stop, arm_edge=False, reset_edge=False, passive_edge=False)
 
-    def take_retuning(self) -> RetuningOrder:
-        """Return what the station in command ordered of the retuning since the last call."""
-        return self._leads.take_retuning()
+    def take_retuning(self, now_ns: int) -> RetuningOrder:
+        """Return what was ordered of the retuning since the last call; each station can forbid it.
+
+        Who takes the command does not lift what the other forbids, and can't know of it.
+        """
+        order = self._leads.take_retuning()
+        if self._watches.forbids_retuning(now_ns):
+            return order._replace(forbidden=True)
+        return order
 
     def take_accepted(self) -> list[int | None]:
         """Return the codes of the alarms accepted at any station since the last call."""
