@@ -347,6 +347,33 @@ def test_a_gauge_that_stands_still_alone_is_found() -> None:
     assert found & Finding.LEVEL_STUCK
 
 
+@pytest.mark.parametrize(
+    ("still", "found_s"), [("port", 0.3), ("starboard", 0.3), ("port starboard", 0.22)]
+)
+def test_gauges_with_noise_that_send_one_level_only_are_found(still: str, found_s: float) -> None:
+    draw, table = np.random.default_rng(1), Table()
+
+    def noisy_m() -> float:
+        return round(0.01 * draw.standard_normal(), 3)
+
+    def found_after_s(still: str) -> float:
+        for k in range(200):
+            port_m, starboard_m = noisy_m(), noisy_m()
+            table.say_levels(
+                0.0 if "port" in still.split() else port_m,
+                0.0 if "starboard" in still.split() else starboard_m,
+            )
+            if table.tick(2 * TICK_S) & Finding.LEVEL_STUCK:
+                return 2 * TICK_S * (k + 1)
+        return math.inf
+
+    assert found_after_s("") == math.inf
+    assert found_s <= found_after_s(still) <= found_s + 0.06
+    for _ in range(10):
+        ended_s = found_after_s("")
+    assert ended_s == math.inf
+
+
 def test_everything_is_looked_at_in_a_round() -> None:
     """Something wrong for each group is found within one round of ticks or the next."""
     table = Table()

@@ -27,7 +27,25 @@ _DIFFERENCES = "only differences of it are used"
 _NEVER_THERE = "no computed value is exactly there"
 _AT_THE_BOUND = "a value at the bound is the bound"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
+_TEN_OR_MORE = "it is zero, or ten or more"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
+    "utank_hil/runtime/monitors/standstill.py": {
+        "Standstill.__init__: self._same = self.still = 0 -> ": _SET_FIRST,
+        "Standstill.__init__: self._same = self.still = 0 -> self._same = self.still = 1": (
+            _SET_FIRST
+        ),
+        "Standstill.take: if abs(step_m - self._step_m) > JERK_M: -> "
+        "if abs(step_m - self._step_m) >= JERK_M:": _NEVER_THERE,
+        "Standstill.take: if self.still or (self._same == STILL_LEVELS and self._noisy > "
+        "_LEFT_OF_IT): -> if self.still or (self._same == STILL_LEVELS and self._noisy >= "
+        "_LEFT_OF_IT):": _NEVER_THERE,
+        "gauges_stand_still: return one > 0 and other > 0 or one >= STILL_ALONE or other >= "
+        "STILL_ALONE -> return one > 1 and other > 0 or one >= STILL_ALONE or other >= "
+        "STILL_ALONE": _TEN_OR_MORE,
+        "gauges_stand_still: return one > 0 and other > 0 or one >= STILL_ALONE or other >= "
+        "STILL_ALONE -> return one > 0 and other > 1 or one >= STILL_ALONE or other >= "
+        "STILL_ALONE": _TEN_OR_MORE,
+    },
     "utank_hil/runtime/supervisor.py": {
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 1 << 63": _NEVER,
@@ -172,10 +190,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "inbox.level_m), fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS)": _AT_50_MS,
         "ControllerNode._control: self._law_pa = 0.0 -> self._law_pa = 1.0": _ROUNDED,
         "ControllerNode._answer: self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(), engaged=self._engaged, "
+        "self.inbox.stations.take_retuning(now_ns), engaged=self._engaged, "
         "fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS, "
         "passive_roll_rad=self.twin_roll_rad) -> self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(), engaged=self._engaged, "
+        "self.inbox.stations.take_retuning(now_ns), engaged=self._engaged, "
         "fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
         "passive_roll_rad=self.twin_roll_rad)": _AT_50_MS,
         "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
@@ -463,7 +481,11 @@ TARGETS = (
     ),
     Target(f"{_MONITORS}/volume.py", ("tests/runtime/monitors/test_volume.py",)),
     Target(f"{_MONITORS}/noise.py", ("tests/runtime/monitors/test_noise.py",)),
-    Target(f"{_MONITORS}/spikes.py", ("tests/runtime/monitors/test_spikes.py",)),
+    Target(
+        f"{_MONITORS}/spikes.py",
+        ("tests/runtime/monitors/test_spikes.py",),
+        ("tests/runtime/test_monitoring.py",),
+    ),
     Target(f"{_MONITORS}/senders.py", ("tests/runtime/monitors/test_senders.py",)),
     Target(
         f"{_MONITORS}/drive.py",
@@ -480,6 +502,7 @@ TARGETS = (
         ("tests/runtime/monitors/test_motion_sign.py",),
         ("tests/runtime/monitors/test_motion_sums.py",),
     ),
+    Target(f"{_MONITORS}/standstill.py", ("tests/runtime/monitors/test_standstill.py",)),
     Target(f"{_MONITORS}/repetition.py", ("tests/runtime/monitors/test_repetition.py",)),
     Target(
         f"{_MONITORS}/motion_watch.py",

@@ -27,6 +27,7 @@ from utank_hil.runtime.monitors.motion_watch import MotionWatch
 from utank_hil.runtime.monitors.noise import Noise
 from utank_hil.runtime.monitors.senders import Heard, Senders, Stream
 from utank_hil.runtime.monitors.spikes import SpikeCount, SpikeGates
+from utank_hil.runtime.monitors.standstill import gauges_stand_still
 from utank_hil.runtime.monitors.tank_equation import TankEquation
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 from utank_hil.runtime.monitors.volume import Volume
@@ -60,6 +61,7 @@ MOST_CHANGE: Final = 10.0
 MOST_DAMPING_RATIO: Final = 1.0
 """Of ship and tank, as identified."""
 
+_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
 _NOISE: Final = int(Finding.NOISE)
 _SPIKES: Final = int(Finding.SPIKES)
 _AMPLIFIED: Final = int(Finding.ROLL_AMPLIFIED)
@@ -268,7 +270,11 @@ class Monitors:
                 volume = self.volume.update(port_m, starboard_m, SHORT_S)
                 stuck = self._port_stuck.update(port_m, starboard_m)
                 stuck |= self._starboard_stuck.update(starboard_m, port_m)
-                self._of_volume = volume | stuck if volume & _VOLUME else volume
+                if not volume & _VOLUME:
+                    stuck = 0
+                if gauges_stand_still(self.gates.port, self.gates.starboard):
+                    stuck = _LEVEL_STUCK
+                self._of_volume = volume | stuck
         else:
             elapsed_s = (now_ns - self._senders_ns) * 1e-9
             self._senders_ns = now_ns

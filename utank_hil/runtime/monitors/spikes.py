@@ -3,6 +3,7 @@
 from typing import Final
 
 from utank_hil.runtime.monitors.repetition import Repetition
+from utank_hil.runtime.monitors.standstill import Standstill
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
 from utank_hil.tick import TICK_S
 
@@ -76,6 +77,8 @@ class SpikeGates:
     ----------
     motions : tuple of MotionGate
         Of the first sensor, and of the second where there is one.
+    port, starboard : Standstill
+        Of the gauges.
     levels_discarded : int
         Samples of the gauges so far that did not pass, by either level.
     """
@@ -84,10 +87,13 @@ class SpikeGates:
         self.motions = MotionGate(thresholds), MotionGate(thresholds)
         self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
         self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self.port, self.starboard = Standstill(), Standstill()
         self.levels_discarded = 0
 
     def levels_pass(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
         """Whether a sample of the level gauges may be used."""
+        self.port.take(port_m)
+        self.starboard.take(starboard_m)
         passes = self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
         self.levels_discarded += not passes
         return passes
