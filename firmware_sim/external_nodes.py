@@ -6,6 +6,7 @@ no report, nor is one whose value is not available.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ STALE_NS: Final = 60_000_000
 """Three cycles of the reports, after which the controller too calls a drive or valve silent."""
 
 
-class _ExternalNode:
+class _ExternalNode(ABC):
     period_ns = TICK_NS
 
     def __init__(self, plant: Plant, receiver: Receiver[Any], signal: str) -> None:
@@ -51,8 +52,9 @@ class _ExternalNode:
         self._act(self._value if fresh else None)
         return ()
 
+    @abstractmethod
     def _act(self, value: float | None) -> None:
-        raise NotImplementedError
+        """Have the plant do what was reported; None without a fresh report."""
 
 
 class ExternalDrive(_ExternalNode):

@@ -167,10 +167,10 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
 
 def _named_in_time(row: Row, outcome: Outcome) -> bool:
     """Whether an alarm had one of the row's names by the time that it was, or had to be, found."""
-    if outcome.alarm_ms is None or row.reaction == "refuse":
-        return outcome.alarm_ms is not None
-    found_ms = _reaction_ms(row, outcome)
-    return outcome.alarm_ms <= max(row.within_ms or 0.0, found_ms or 0.0) + ALARM_MS
+    if outcome.alarm_ms is None:
+        return False
+    latest_ms = max(row.within_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
+    return row.reaction == "refuse" or outcome.alarm_ms <= latest_ms
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:

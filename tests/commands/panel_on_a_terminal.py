@@ -2,7 +2,8 @@
 
     python panel_on_a_terminal.py ctrl-d | closed
 
-Prints what the panel had sent at its end: how many frames with stop, and the last frame.
+Prints what the panel had sent at its end: how many frames with the arm bit, how many with stop, and
+what the last one asked for.
 """
 
 import os
@@ -57,8 +58,16 @@ class Controller:
     def close(self) -> None:
         last = self.heard[-1]
         stops = sum(order.stop for order in self.heard)
+        armed = sum(order.arm for order in self.heard)
         asked = last.mode_request
-        os.write(RESULT, f"{stops} {asked and asked.name} {last.arm}".encode())
+        os.write(RESULT, f"{armed} {stops} {asked and asked.name} {last.arm}".encode())
+
+
+def wait_for(words: str, times: int = 1) -> None:
+    """Until the panel has shown them."""
+    shown = ""
+    while shown.count(words) < times:
+        shown += os.read(terminal, 1000).decode(errors="replace")
 
 
 how = sys.argv[1]
@@ -71,9 +80,10 @@ if child == 0:
     finally:
         os._exit(0)
 os.close(RESULT)
-time.sleep(0.5)  # the first status has come
+wait_for("controller: ACTIVE")
 os.write(terminal, b"arm\n")
-time.sleep(0.5)
+wait_for("arm", times=2)  # the terminal's echo is the first
+time.sleep(0.1)  # a frame with it has left
 if how == "closed":
     os.close(terminal)
 else:

@@ -144,7 +144,8 @@ def test_the_command_sends_its_stop_before_it_ends_with_its_terminal(how: str) -
     done = subprocess.run(
         [sys.executable, script, how], capture_output=True, text=True, timeout=60, check=True
     )
-    stops, mode, armed = done.stdout.split()
+    armed_frames, stops, mode, armed = done.stdout.split()
+    assert int(armed_frames) > 0
     assert int(stops) > 0
     assert (mode, armed) == ("STANDBY", "False")
 

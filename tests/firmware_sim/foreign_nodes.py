@@ -1,6 +1,7 @@
 """Nodes as another maker would build them: from the DBC, with cantools and a library for E2E."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -17,7 +18,7 @@ DATABASE = Database()
 DATABASE.add_dbc_file(DBC_PATH)
 
 
-class ForeignNode:
+class ForeignNode(ABC):
     """Sends and reads frames; `every` is the cycle of the DBC."""
 
     period_ns = 10 * MS
@@ -36,8 +37,9 @@ class ForeignNode:
     def on(self, name: str, now_ns: int) -> None:
         """Take note of a message that came."""
 
+    @abstractmethod
     def tick(self, now_ns: int) -> Iterable[Frame]:
-        raise NotImplementedError
+        """Send what is due."""
 
     def frame(self, name: str, **values: float) -> Frame:
         message = DATABASE.get_message_by_name(name)

@@ -3,7 +3,8 @@
 A node that hangs with its counter going on, or that repeats its last measurement, does so. Noise of
 three steps of the message leaves fourteen levels in a row the same once in 10^14 times, and
 ten of both gauges less often. A gauge without noise may stand still: where the water does, or at a
-turning point. Noise is told from the water's motion by the line through the last two levels.
+turning point. Noise is told from the water's motion by the line through the last two levels: this
+finding needs no other evidence, as that of `Repetition` does.
 """
 
 import math
