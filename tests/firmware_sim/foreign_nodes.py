@@ -34,7 +34,7 @@ class ForeignNode(ABC):
         self.heard[message.name] = dict(message.decode(frame.data, decode_choices=False))
         self.on(message.name, now_ns)
 
-    def on(self, name: str, now_ns: int) -> None:
+    def on(self, name: str, now_ns: int) -> None:  # noqa: B027  # few take note of one
         """Take note of a message that came."""
 
     @abstractmethod
