@@ -251,3 +251,50 @@ def test_limit_of_the_stability_that_nothing_watches_is_warned_of(
     refused, warned = told(tmp_path, controller, ControllerConfig)
     assert refused == {}
     assert ("vessel.least_gm_m" not in warned) == watched
+
+
+def controller(name: str, **changes: Any) -> Any:
+    """A shipped controller with sections changed."""
+    content = parse_yaml((CONFIGS / "controllers" / f"{name}.yaml").read_text())[0]
+    vessel = (CONFIGS / "controllers" / content["vessel"]).resolve()
+    return {**content, "vessel": str(vessel), **changes}
+
+
+def test_roll_and_heel_are_limited_while_she_still_rights_herself(tmp_path: Path) -> None:
+    """Patti-B with her water: her righting moment is greatest at 10.9 degrees, gone at 19.0."""
+    limits = {}
+    for name in ("patti_b_constrained_gpc", "gpc"):
+        safety = load_config(CONFIGS / "controllers" / f"{name}.yaml", ControllerConfig).safety
+        limits[name] = (safety.roll_limit_rad, safety.heel_limit_rad)
+    assert limits == {"patti_b_constrained_gpc": (0.19, 0.095), "gpc": (0.35, 0.14)}
+    given = {"roll_limit_rad": 0.33, "heel_limit_rad": 0.2}
+    file = tmp_path / "given.yaml"
+    file.write_text(yaml.safe_dump(controller("patti_b_constrained_gpc", safety=given)))
+    safety = load_config(file, ControllerConfig).safety
+    assert (safety.roll_limit_rad, safety.heel_limit_rad) == (0.33, 0.2)
+
+
+def test_a_roll_limit_at_which_she_no_longer_rights_herself_is_refused(tmp_path: Path) -> None:
+    wrong = controller("patti_b_constrained_gpc", safety={"roll_limit_rad": 0.34})
+    refused, _ = told(tmp_path, wrong, ControllerConfig)
+    assert list(refused) == ["safety.roll_limit_rad"]
+    assert "vanishes at 0.33 rad" in refused["safety.roll_limit_rad"]
+    assert "set it to 0.19 or less" in refused["safety.roll_limit_rad"]
+
+
+@pytest.mark.parametrize(("pressure_pa", "warned"), [(20e3, True), (4.5e3, True), (4.2e3, False)])
+def test_a_pump_that_could_capsize_her_is_warned_of(
+    tmp_path: Path, pressure_pa: float, warned: bool
+) -> None:
+    limits = {"pressure_pa": pressure_pa, "level_m": 1.64, "brake_share": 1.0, "sharpness": 4.0}
+    law = controller("patti_b_self_tuning", limits=limits)
+    refused, warnings = told(tmp_path, law, ControllerConfig)
+    assert refused == {}
+    assert ("limits.pressure_pa" in warnings) == warned
+    if warned:
+        assert (
+            f"is {pressure_pa / 1e3:.3g} kPa, and more than 4.4 kPa capsizes her"
+            in (warnings["limits.pressure_pa"])
+        )
+    passive = controller("valve_clipped")
+    assert "limits.pressure_pa" not in told(tmp_path, passive, ControllerConfig)[1]

@@ -9,7 +9,7 @@ import pytest
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics import RollModel, simulate
-from utank_hil.dynamics.steady_heel import steady_heel
+from utank_hil.dynamics.steady_heel import greatest_held_pa, righting_range, steady_heel
 
 SHIPS = Path("configs/ships")
 RISE_S, HOLD_S = 1000.0, 200.0
@@ -54,6 +54,40 @@ def test_pump_that_is_stronger_than_the_righting_moment_capsizes_her() -> None:
     assert steady_heel(model, 20e3) is None
     assert left_alone(model, 20e3)[1] < RISE_S + HOLD_S
     assert steady_heel(model, 2e3).roll_rad == pytest.approx(left_alone(model, 2e3)[0][0], rel=2e-3)
+
+
+def test_the_greatest_pressure_that_is_held_is_where_she_begins_to_capsize() -> None:
+    given = vessel("patti_b")
+    model = RollModel(given.ship, given.tank)
+    held_pa = greatest_held_pa(model, 20e3)
+    for share, capsizes in ((0.97, False), (1.03, True)):
+        assert (left_alone(model, share * held_pa)[1] < RISE_S + HOLD_S) == capsizes
+    assert greatest_held_pa(model, 2e3) == 2e3
+
+
+def test_a_ship_rights_herself_as_far_as_her_levers_less_what_the_water_takes() -> None:
+    """M = k1 phi - k3 phi^3, hardly a tank: greatest at sqrt(k1 / 3 k3), gone at sqrt(k1 / k3)."""
+    given = vessel("patti_b")
+    ship = replace(given.ship, wind_moment_nm=1e4)  # which has no part in it
+    small = replace(given.tank, reservoir_area_m2=2e-3, duct_area_m2=2e-4)
+    k1, k3 = ship.stiffness_nm_rad, -ship.restoring_odd_nm[0]
+    far = righting_range(RollModel(ship, small))
+    assert far.greatest_rad == pytest.approx(math.sqrt(k1 / (3 * k3)), abs=1.5e-3)
+    assert far.vanishing_rad == pytest.approx(math.sqrt(k1 / k3), abs=1.5e-3)
+    stiffening = vessel("thesis_first")
+    assert righting_range(RollModel(stiffening.ship, stiffening.tank)).vanishing_rad == math.inf
+
+
+@pytest.mark.parametrize(("share", "capsizes"), [(0.98, False), (1.02, True)])
+def test_from_where_her_stability_vanishes_she_falls_over(share: float, capsizes: bool) -> None:
+    """Let go at rest with the water level, so heavily damped that the water keeps up with her."""
+    given = vessel("patti_b")
+    model = RollModel(replace(given.ship, damping_nms_rad=1000 * given.ship.damping_nms_rad),
+                      given.tank)  # fmt: skip
+    roll_rad = share * righting_range(model).vanishing_rad
+    level_m = given.tank.width_m / 2 * math.tan(roll_rad)
+    run = simulate(model, 400.0, (roll_rad, 0.0, level_m, 0.0), record_every=50)
+    assert (abs(run.state[-1, 0]) > roll_rad) == capsizes
 
 
 def test_upright_ship_stays_and_wind_heels_her() -> None:

@@ -1,5 +1,5 @@
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -499,6 +499,43 @@ def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degrade
     assert bench.pressure_pa == sign * LIMITS.pressure_pa / 2
 
 
+def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    monitors.thresholds = replace(monitors.thresholds, degraded_share=0.125)
+    monitors.confirmed = True
+    bench = ControllerBench(START_NS)
+    monkeypatch.setattr(bench.node, "monitors", monitors)
+    monkeypatch.setattr(bench.node.supervisor, "degraded", True)
+    assert bench.node._share == 0.125
+    monkeypatch.setattr(bench.node.supervisor, "degraded", False)
+    assert bench.node._share == 1.0
+
+
+@dataclass
+class PlanningLaw(ToyLaw):
+    fallbacks: int = 3
+    allowed: list[float] = field(default_factory=list)
+
+    def allow(self, share: float) -> None:
+        self.allowed.append(share)
+
+
+def test_a_law_that_plans_is_told_what_it_may_use() -> None:
+    law = PlanningLaw()
+    bench = ControllerBench(START_NS, law=law)
+    bench.arm()
+    bench.run(600)
+    assert set(law.allowed) == {1.0}
+    bench.silent.add(SensorPump)
+    bench.run(600)
+    assert law.allowed[-1] == 0.5
+    bench.silent.clear()
+    bench.run(600)
+    assert law.allowed[-1] == 1.0
+
+
 def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -565,11 +602,6 @@ def test_frames_of_other_kinds_fill_the_bus_too() -> None:
     assert bench.node.fault is Fault.UNKNOWN_IDENTIFIERS
     assert bench.node.inbox.foreign == 600
     assert bench.node.seen.bus_load > 0.15
-
-
-@dataclass
-class PlanningLaw(ToyLaw):
-    fallbacks: int = 3
 
 
 def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(

@@ -23,6 +23,7 @@ ROWS: Final = (
     ("spike of a level, m in 20 ms", "level_spike_m", 1.0),
     ("error of the pump's pressure, kPa", "pressure_error_pa", 1e-3),
     ("pressure until the water obeyed, share", "unconfirmed_share", 1.0),
+    ("degraded pressure, share", "degraded_share", 1.0),
     ("roll compared with the twin's from, degrees RMS", "amplified_roll_rad", DEGREES),
 )
 """What it says, of `MonitorThresholds`, and times what; spikes beside what she moves meanwhile."""

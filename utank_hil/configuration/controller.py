@@ -45,7 +45,8 @@ class ControllerConfig(Section):
     """Use the law even if it misses the required margins."""
     limits: Annotated[PumpLimits, Field(default_factory=dict, validate_default=True)]
     """Those not given are the vessel's (`Vessel.default_limits`)."""
-    safety: SafetyLimits = SafetyLimits()
+    safety: Annotated[SafetyLimits, Field(default_factory=dict, validate_default=True)]
+    """Thresholds of the fault table; roll and heel not given: `Vessel.default_safety`."""
     sensors: SensorFigures = SensorFigures()
     """Noise of the sensors, from which the monitors' thresholds follow."""
     command_timeout_ms: Annotated[float, Range(least=20, most=100)] = 50.0
@@ -63,6 +64,14 @@ class ControllerConfig(Section):
             return limits
         return {**vessel.default_limits, **limits}
 
+    @field_validator("safety", mode="before")
+    @classmethod
+    def _as_the_ship_rights_herself(cls, safety: Any, info: ValidationInfo) -> Any:
+        vessel = info.data.get("vessel")
+        if vessel is None or not isinstance(safety, dict):
+            return safety
+        return {**vessel.default_safety, **safety}
+
     @field_validator("bit_rate")
     @classmethod
     def _bits_of_whole_nanoseconds(cls, bit_rate: int) -> int:
@@ -75,6 +84,7 @@ class ControllerConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> "ControllerConfig":
         problems = [*self._limit_problems(), *self._retuning_problems(), *self._law_problems()]
+        problems += self._roll_problems()
         if self.renews and not isinstance(self.law, SelfTunedDesign):
             reason = f"is for a law of kind self_tuned, not {self.law.kind}: leave it out"
             problems.append(("sea_estimate.renew", reason))
@@ -87,7 +97,21 @@ class ControllerConfig(Section):
         if self.vessel.least_gm_m is not None and self.sea_estimate is None:
             reason = "is not watched without the section sea_estimate: add `sea_estimate: {}`"
             found.append(("vessel.least_gm_m", reason))
-        return found
+        return found + self._pressure_warnings()
+
+    def _pressure_warnings(self) -> list[Problem]:
+        """A pump that could capsize her: no monitor is as quick as a drive that hangs."""
+        most_pa = self.limits.pressure_pa
+        if self.vessel.pump is None:
+            return []
+        held_pa = self.vessel.greatest_held_pa(most_pa)
+        if held_pa == most_pa:
+            return []
+        reason = (
+            f"is {most_pa / 1e3:.3g} kPa, and more than {held_pa / 1e3:.2g} kPa capsizes her if it "
+            "is held, as by a drive that hangs: lower it, or let a hard-wired stop cut the power"
+        )
+        return [("limits.pressure_pa", reason)]
 
     @property
     def renews(self) -> bool:
@@ -127,6 +151,18 @@ class ControllerConfig(Section):
             )
             if value > most
         ]
+
+    def _roll_problems(self) -> list[Problem]:
+        """The protection against great roll must act while the ship still rights herself."""
+        limit_rad, righting = self.safety.roll_limit_rad, self.vessel.righting
+        if limit_rad < righting.vanishing_rad:
+            return []
+        reason = (
+            f"is {limit_rad:g}, but with the tank's water her stability vanishes at "
+            f"{righting.vanishing_rad:.2f} rad: leave it out, or set it to "
+            f"{righting.greatest_rad:.2f} or less, where her righting moment is greatest"
+        )
+        return [("safety.roll_limit_rad", reason)]
 
     def _retuning_problems(self) -> list[Problem]:
         settings, law = self.retuning, self.law

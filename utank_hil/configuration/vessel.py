@@ -12,11 +12,14 @@ from pydantic import ValidationInfo, field_validator, model_validator
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
+from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
+from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
+from utank_hil.runtime.safety_limits import SafetyLimits
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""
@@ -83,6 +86,25 @@ class Vessel(Section):
             similar = Pump.for_duct(1.0)  # what is wrong with these two is found at their keys
         others = {name: of for name, of in asdict(similar).items() if name != "max_pressure_pa"}
         return others | pump
+
+    @property
+    def righting(self) -> RightingRange:
+        """How far she rights herself with the tank's water."""
+        return righting_range(RollModel(self.ship, self.tank))
+
+    @property
+    def default_safety(self) -> dict[str, float]:
+        """Limits of roll and heel, where she rights herself less far than by `SafetyLimits`."""
+        greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
+        most = SafetyLimits()
+        return {
+            "roll_limit_rad": min(most.roll_limit_rad, greatest_rad),
+            "heel_limit_rad": min(most.heel_limit_rad, greatest_rad / 2),
+        }
+
+    def greatest_held_pa(self, most_pa: float) -> float:
+        """The greatest pressure up to `most_pa` that does not capsize her if it is held."""
+        return greatest_held_pa(RollModel(self.ship, self.tank), most_pa)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -43,7 +43,7 @@ class Controller(Protocol):
 
 @runtime_checkable
 class Plans(Protocol):
-    """A controller that searches for a plan each sample, within a budget.
+    """A controller that searches for a plan each sample, within limits and a budget.
 
     Attributes
     ----------
@@ -52,6 +52,9 @@ class Plans(Protocol):
     """
 
     fallbacks: int
+
+    def allow(self, share: float) -> None:
+        """Tell the share of its pressure limit that the next plan may use."""
 
 
 @runtime_checkable

@@ -1,12 +1,16 @@
-"""The heel at which a ship comes to rest under steady moments and pressure, at any angle."""
+"""The heel at which a ship comes to rest under steady moments and pressure; how far she rights."""
 
+import math
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from utank_hil.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import RollModel
 
 _HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))
+_HALVINGS: Final = 12
 
 
 class SteadyHeel(NamedTuple):
@@ -22,6 +26,45 @@ class SteadyHeel(NamedTuple):
     at_the_end: bool
 
 
+class RightingRange(NamedTuple):
+    """How far a ship rights herself with the water at rest in her tank.
+
+    Attributes
+    ----------
+    greatest_rad : float
+        Heel of the greatest righting moment.
+    vanishing_rad : float
+        Heel from which she capsizes; infinite where there is none up to 90 degrees.
+    """
+
+    greatest_rad: float
+    vanishing_rad: float
+
+
+def righting_range(model: RollModel) -> RightingRange:
+    """The righting range of a ship, without her steady moments."""
+    upright = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
+    push, _ = _at_rest(RollModel(upright, model.tank), _HEELS_RAD, 0.0)
+    over = np.flatnonzero(push[1:] > 0)
+    vanishing_rad = float(_HEELS_RAD[1 + over[0]]) if over.size else math.inf
+    before = push[: 1 + over[0]] if over.size else push
+    return RightingRange(float(_HEELS_RAD[np.argmin(before)]), vanishing_rad)
+
+
+def greatest_held_pa(model: RollModel, most_pa: float) -> float:
+    """The greatest pressure up to `most_pa` that does not capsize a ship if it is held."""
+    if steady_heel(model, most_pa) is not None:
+        return most_pa
+    low_pa, high_pa = 0.0, most_pa
+    for _ in range(_HALVINGS):
+        middle_pa = (low_pa + high_pa) / 2
+        if steady_heel(model, middle_pa) is None:
+            high_pa = middle_pa
+        else:
+            low_pa = middle_pa
+    return low_pa
+
+
 def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None:
     """Where a ship comes to rest to the side to which she is pushed; None if she capsizes.
 
@@ -32,26 +75,28 @@ def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None
     pressure_pa : float
         Of the pump, held.
     """
-    c = model.coefficients
-
-    def pushed(roll_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Roll acceleration, and the level that the water would have if there were room."""
-        flat_m = c.weight_h * np.tan(roll_rad) / (2 * c.weight_h2)
-        flat_m = flat_m + c.area * pressure_pa / (2 * c.weight_h2 * np.cos(roll_rad))
-        level_m = np.clip(flat_m, -c.level_limit, c.level_limit)
-        at_rest = np.zeros_like(roll_rad)
-        states = np.stack([roll_rad, at_rest, level_m, at_rest], axis=-1)
-        return model.derivative(states, pressure_pa, stopped=True)[:, 1], flat_m
-
-    side = float(np.sign(pushed(np.zeros(1))[0][0]))
+    side = float(np.sign(_at_rest(model, np.zeros(1), pressure_pa)[0][0]))
     if side == 0:
         return SteadyHeel(0.0, False)
     heels = side * _HEELS_RAD
-    push, flat_m = pushed(heels)
+    push, flat_m = _at_rest(model, heels, pressure_pa)
     back = np.flatnonzero(push * side < 0)
     if not back.size:
         return None
     after = int(back[0])
     share = push[after - 1] / (push[after - 1] - push[after])
     roll_rad = heels[after - 1] + share * (heels[after] - heels[after - 1])
-    return SteadyHeel(float(roll_rad), bool(abs(flat_m[after]) > c.level_limit))
+    return SteadyHeel(float(roll_rad), bool(abs(flat_m[after]) > model.coefficients.level_limit))
+
+
+def _at_rest(
+    model: RollModel, roll_rad: FloatArray, pressure_pa: float
+) -> tuple[FloatArray, FloatArray]:
+    """Roll acceleration, and the level that the water would have if there were room."""
+    c = model.coefficients
+    flat_m = c.weight_h * np.tan(roll_rad) / (2 * c.weight_h2)
+    flat_m = flat_m + c.area * pressure_pa / (2 * c.weight_h2 * np.cos(roll_rad))
+    level_m = np.clip(flat_m, -c.level_limit, c.level_limit)
+    still = np.zeros_like(roll_rad)
+    states = np.stack([roll_rad, still, level_m, still], axis=-1)
+    return model.derivative(states, pressure_pa, stopped=True)[:, 1], flat_m

@@ -107,10 +107,13 @@ class RenewingController(LawExchange):
         self.renewed: RenewedLaw | None = None
         self.fallbacks = 0
 
+    def allow(self, share: float) -> None:
+        """As of `Plans`, for the law in charge."""
+        self._in_charge.allow(share)
+
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
-        controller = self.laws.active.controller
-        assert isinstance(controller, ConstrainedController)
+        controller = self._in_charge
         before = controller.fallbacks
         command = super().step(y, reference)
         self.fallbacks += controller.fallbacks - before
@@ -122,6 +125,12 @@ class RenewingController(LawExchange):
         elif self._fresh:
             self._rest_if_losing()
         return command
+
+    @property
+    def _in_charge(self) -> ConstrainedController:
+        controller = self.laws.active.controller
+        assert isinstance(controller, ConstrainedController)
+        return controller
 
     def _rest_if_losing(self) -> None:
         for window in (self._lately, self._record):

@@ -35,6 +35,7 @@ from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.judging import all_halving, first_stopping
 from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.redundancy import Redundancy
@@ -45,7 +46,6 @@ from utank_hil.runtime.valve_command import ValveCommander
 from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
-DEGRADED_SHARE: Final = 0.5
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
 
@@ -187,6 +187,7 @@ class ControllerNode:
                 f"{TICK_S} s; design the controller for a multiple of it"
             )
         self._controller = controller
+        self._plans = controller if isinstance(controller, Plans) else None
         self._starts_anew = controller if isinstance(controller, StartsAnew) else None
         self._retuning = retuning
         self._estimator = estimator
@@ -273,12 +274,20 @@ class ControllerNode:
         monitors = self.monitors
         if monitors is not None and self._pump and not monitors.confirmed:
             return monitors.thresholds.unconfirmed_share
-        return DEGRADED_SHARE if self.supervisor.degraded else 1.0
+        return self._degraded_share
+
+    @property
+    def _degraded_share(self) -> float:
+        """The same where the water obeys."""
+        if not self.supervisor.degraded:
+            return 1.0
+        monitors = self.monitors
+        return DEGRADED_SHARE if monitors is None else monitors.thresholds.degraded_share
 
     @property
     def fallbacks(self) -> int | None:
         """Of a law that searches for plans, see `Plans`; else None."""
-        return self._controller.fallbacks if isinstance(self._controller, Plans) else None
+        return None if self._plans is None else self._plans.fallbacks
 
     @property
     def _law_fault(self) -> Fault:
@@ -424,6 +433,8 @@ class ControllerNode:
             self._start_anew()
             if not due:
                 return
+            if self._plans is not None:
+                self._plans.allow(self._degraded_share)
             self._law_pa, self._law_loss = self._answer(now_ns)
             if not math.isfinite(self._law_pa + self._law_loss):
                 self._law_failed = True

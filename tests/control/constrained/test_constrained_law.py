@@ -1,6 +1,7 @@
 """Constrained GPC: the analytic law inside the limits, an independent optimum at them."""
 
 import math
+from dataclasses import replace
 
 import clarabel
 import numpy as np
@@ -140,13 +141,16 @@ def test_thousand_limited_steps_equal_an_independent_optimum():
         controller = design_constrained_gpc(
             arx, limits, hc, hp, weight, level_output=1, level_penalty=penalty
         ).controller()
+        share = rng.choice([1.0, 0.5, 0.2])
+        controller.allow(share)
+        allowed = replace(limits, pressure_pa=share * limits.pressure_pa)
         u, y = [np.zeros(1)] * 4, [np.zeros(2)] * 3
         last = 0.0
         for _ in range(10):
             newest = 5 * rng.normal(size=2) + respond(arx, u[:-1], y, u[-1])
             y.append(newest)
             command = controller.step(newest)
-            expected = independent(arx, u, y, limits, last, hc, hp, weight, penalty)
+            expected = independent(arx, u, y, allowed, last, hc, hp, weight, penalty)
             worst = max(worst, abs(command[0] - expected) / limits.pressure_pa)
             limited += controller.limited
             u.append(command)
@@ -170,9 +174,9 @@ def test_cost_in_another_unit_makes_the_same_law(size):
     np.testing.assert_allclose(commands(size), commands(2.0), atol=1e-5)
 
 
-def saturating(iteration_limit=100) -> ConstrainedController:
+def saturating(iteration_limit=100, level_m=0.5) -> ConstrainedController:
     arx = random_arx(np.random.default_rng(11), 3)
-    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=2.0, level_m=0.5)
+    limits = PumpLimits(pressure_pa=1.0, rate_pa_s=2.0, level_m=level_m)
     return design_constrained_gpc(
         arx,
         limits,
@@ -201,6 +205,18 @@ def test_pressure_and_rate_hold_for_any_measurement_and_budget(sequence, budget)
         assert abs(command) <= 1.0
         assert abs(command - last) <= 0.4 * (1 + 1e-12)
         last = command
+
+
+def test_a_share_of_the_pressure_is_kept_as_soon_as_the_rate_allows_and_not_for_good():
+    controller = saturating(level_m=1e6)
+    push = np.array([0.0, 1e3])
+    full = [float(controller.step(push)[0]) for _ in range(6)]
+    assert abs(full[-1]) == pytest.approx(1.0)
+    controller.allow(0.3)
+    held = [abs(float(controller.step(push)[0])) for _ in range(4)]
+    assert held == pytest.approx([0.6, 0.3, 0.3, 0.3], abs=1e-6)
+    controller.allow(1.0)
+    assert abs(float(controller.step(push)[0])) == pytest.approx(0.7)
 
 
 def test_when_the_budget_is_too_small_the_last_plan_goes_on_and_ends_in_zero():

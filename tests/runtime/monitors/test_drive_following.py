@@ -238,9 +238,13 @@ def test_a_command_at_its_limit_is_saturated_after_ten_seconds(way: int) -> None
     assert first_saturated(lambda k: 100.0 * way * (-1) ** (k // 20), lambda _: False) is None
 
 
-@pytest.mark.parametrize(("left_pa", "still"), [(45.0, True), (-45.0, False), (44.9, False)])
-def test_once_found_less_than_half_the_pressure_ends_it(left_pa: float, still: bool) -> None:
-    saturation = Saturation(BOUNDS)
+@pytest.mark.parametrize("share", [0.5, 0.1])
+@pytest.mark.parametrize(("left", "still"), [(0.9, True), (-0.9, False), (0.898, False)])
+def test_once_found_less_than_the_degraded_pressure_ends_it(
+    share: float, left: float, still: bool
+) -> None:
+    left_pa = left * share * 100.0
+    saturation = Saturation(replace(BOUNDS, degraded_share=share))
     assert first_saturated(lambda _: 100.0, lambda _: False, saturation=saturation)
     found = saturation.update(left_pa, drive_limited=False, elapsed_s=0.5)
     assert found == (Finding.SATURATED if still else 0)

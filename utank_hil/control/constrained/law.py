@@ -150,7 +150,7 @@ class ConstrainedController:
         )
         self._levels_plan = horizon.outputs_plan[:, output]
         self._held_state = self._levels_state[self._programme.held]
-        self._pressure_pa = limits.pressure_pa
+        self._pressure_pa = self._allowed_pa = limits.pressure_pa
         self._step_pa = limits.rate_pa_s * model.dt
         self._reach_pa = self._step_pa * (horizon.knots + 1.0)
         samples = len(horizon.interpolation)
@@ -196,6 +196,10 @@ class ConstrainedController:
         self._command_pa = self._mean_pa = self._last_pa = command
         return np.array([command])
 
+    def allow(self, share: float) -> None:
+        """Tell the share of its pressure limit that the next plan may use."""
+        self._allowed_pa = share * self._pressure_pa
+
     def observe(self, y: FloatArray) -> None:
         """Take a measurement as `step` does, and plan nothing: how a law learns the past."""
         state, mean = self._state, self._mean_pa
@@ -237,7 +241,7 @@ class ConstrainedController:
 
     def _bounds(self, steady_pa: float) -> tuple[FloatArray, FloatArray]:
         """Least and greatest pressure at the knots, less the steady command."""
-        high = np.full(len(self._knots), self._pressure_pa)
+        high = np.full(len(self._knots), self._allowed_pa)
         low = -high
         if self._power_pa_m_s < math.inf:
             plan = self._plan_pa[self._next] - steady_pa

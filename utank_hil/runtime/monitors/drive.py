@@ -20,8 +20,8 @@ HASTY: Final = 3
 chatters."""
 FULL_SHARE: Final = 0.98
 HELD_S: Final = 10.0
-DEGRADED_SHARE: Final = 0.45
-"""Once found, less than half the pressure ends it: half is all that is left then."""
+STILL_SHARE: Final = 0.9
+"""Of the degraded pressure: once found, less than that ends it, as no more is left then."""
 
 _LAGS: Final = int(Finding.DRIVE_LAGS)
 _LOST: Final = int(Finding.DRIVE_LOST)
@@ -145,13 +145,14 @@ class Saturation:
 
     def __init__(self, thresholds: MonitorThresholds) -> None:
         self._limit_pa = thresholds.pressure_limit_pa
+        self._still_share = STILL_SHARE * thresholds.degraded_share
         self._side = 0.0
         self._held_s = self._limited_s = 0.0
         self._found = False
 
     def update(self, command_pa: float, *, drive_limited: bool, elapsed_s: float) -> int:
         """Take the command; return what was found."""
-        share = DEGRADED_SHARE if self._found else FULL_SHARE
+        share = self._still_share if self._found else FULL_SHARE
         held = drive_limited or abs(command_pa) >= share * self._limit_pa
         side = math.copysign(1.0, command_pa)
         if held and side == self._side:

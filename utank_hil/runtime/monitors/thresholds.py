@@ -19,6 +19,9 @@ from utank_hil.parameters import Range, range_problems, refuse
 UNCONFIRMED_SHARE: Final = 0.25
 UNCONFIRMED_HEEL_DEG: Final = 0.25
 """Steady heel by a pressure that does little harm, whichever way it presses."""
+DEGRADED_SHARE: Final = 0.5
+DEGRADED_HEEL_DEG: Final = 6.0
+"""Steady heel by a pressure of which nobody knows whether it presses the right way."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
@@ -88,6 +91,8 @@ class MonitorThresholds:
         Greatest command.
     unconfirmed_share : float
         Of the pressure, until the water was seen to move as roll and pressure push it.
+    degraded_share : float
+        Of the pressure, while a sensor or the drive is in doubt.
     amplified_roll_rad : float
         Root mean square of the roll below which it is not compared with the twin's.
     """
@@ -115,6 +120,7 @@ class MonitorThresholds:
     free_rotor_pa_m: float
     pressure_limit_pa: float
     unconfirmed_share: float
+    degraded_share: float
     amplified_roll_rad: float
 
 
@@ -162,15 +168,15 @@ def thresholds_of(
         # its inertia is some 7 % of the water's, which 2 rho g accelerates per level
         free_rotor_pa_m=0.1 * 2 * tank.density_kg_m3 * GRAVITY_M_S2,
         pressure_limit_pa=limits.pressure_pa,
-        unconfirmed_share=_unconfirmed_share(plant),
+        unconfirmed_share=_share_that_heels(plant, UNCONFIRMED_HEEL_DEG, UNCONFIRMED_SHARE),
+        degraded_share=_share_that_heels(plant, DEGRADED_HEEL_DEG, DEGRADED_SHARE),
         amplified_roll_rad=math.radians(0.5),
     )
 
 
-def _unconfirmed_share(plant: DesignPlant) -> float:
-    """A quarter, or what heels a ship whose pump is strong for her size by so little."""
+def _share_that_heels(plant: DesignPlant, heel_deg: float, most: float) -> float:
+    """The share of the pressure that heels her so far if it is held, or `most` if that is less."""
     push_n = plant.limits.pressure_pa * plant.tank.reservoir_area_m2
     stiffness = coupled_matrices(plant.ship, plant.tank)[2]
     heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0])
-    least = UNCONFIRMED_SHARE * heel_rad <= math.radians(UNCONFIRMED_HEEL_DEG)
-    return UNCONFIRMED_SHARE if least else float(math.radians(UNCONFIRMED_HEEL_DEG) / heel_rad)
+    return min(most, float(math.radians(heel_deg) / heel_rad))
