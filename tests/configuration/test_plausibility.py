@@ -293,8 +293,39 @@ def test_a_pump_that_could_capsize_her_is_warned_of(
     assert ("limits.pressure_pa" in warnings) == warned
     if warned:
         assert (
-            f"is {pressure_pa / 1e3:.3g} kPa, and more than 4.4 kPa capsizes her"
+            f"is {pressure_pa / 1e3:.4g} kPa, and over 4.44 kPa takes her beyond 0.19"
             in (warnings["limits.pressure_pa"])
         )
-    passive = controller("valve_clipped")
-    assert "limits.pressure_pa" not in told(tmp_path, passive, ControllerConfig)[1]
+
+
+def test_without_a_pump_none_is_warned_of(tmp_path: Path) -> None:
+    ship = vessel("patti_b")
+    del ship["pump"]
+    (tmp_path / "ship.yaml").write_text(yaml.safe_dump(ship))
+    passive = {"name": "Passive", "vessel": "ship.yaml", "law": {"kind": "passive"}}
+    refused, warnings = told(tmp_path, passive, ControllerConfig)
+    assert refused == {}
+    assert "limits.pressure_pa" not in warnings
+
+
+def test_a_ship_that_hardly_rights_herself_is_refused_in_words(tmp_path: Path) -> None:
+    ship = vessel("patti_b", ship__restoring_odd_nm=[-1.6e9])
+    (tmp_path / "ship.yaml").write_text(yaml.safe_dump(ship))
+    refused, _ = told(
+        tmp_path, {**controller("patti_b_self_tuning"), "vessel": "ship.yaml"}, ControllerConfig
+    )
+    assert "rights herself by hardly any heel" in refused[""]  # of ship.yaml
+
+
+@pytest.mark.parametrize(("roll_rad", "warned"), [(0.19, True), (0.18, False)])
+def test_a_retuning_that_ends_after_control_has_is_warned_of(
+    tmp_path: Path, roll_rad: float, warned: bool
+) -> None:
+    safety, retuning = (
+        {"roll_limit_rad": 0.19},
+        {"roll_limit_rad": roll_rad, "roll_period_range_s": [9, 16]},
+    )
+    law = controller("gpc", safety=safety, retuning=retuning)
+    refused, warnings = told(tmp_path, law, ControllerConfig)
+    assert refused == {}
+    assert ("retuning.roll_limit_rad" in warnings) == warned

@@ -59,10 +59,37 @@ def test_pump_that_is_stronger_than_the_righting_moment_capsizes_her() -> None:
 def test_the_greatest_pressure_that_is_held_is_where_she_begins_to_capsize() -> None:
     given = vessel("patti_b")
     model = RollModel(given.ship, given.tank)
-    held_pa = greatest_held_pa(model, 20e3)
+    held_pa = greatest_held_pa(model, 20e3, 0.19)
     for share, capsizes in ((0.97, False), (1.03, True)):
         assert (left_alone(model, share * held_pa)[1] < RISE_S + HOLD_S) == capsizes
-    assert greatest_held_pa(model, 2e3) == 2e3
+    assert greatest_held_pa(model, 2e3, 0.19) == 2e3
+
+
+@pytest.mark.parametrize(("name", "within_deg"), [("patti_b", 4.0), ("thesis_first", 0.5)])
+def test_the_greatest_pressure_that_is_held_heels_her_as_far_as_is_allowed(
+    name: str, within_deg: float
+) -> None:
+    given = vessel(name)
+    windy = RollModel(replace(given.ship, wind_moment_nm=1e4), given.tank)  # has no part in it
+    held_pa = greatest_held_pa(windy, given.pump.max_pressure_pa, math.radians(within_deg))
+    state, _ = left_alone(RollModel(given.ship, given.tank), held_pa)
+    assert abs(math.degrees(state[0])) == pytest.approx(within_deg, rel=4e-3)
+
+
+@pytest.mark.parametrize("softer", [1.0, 0.9, 0.8, 0.7])
+@pytest.mark.parametrize("curve", [1.0, 2.0])
+def test_half_of_it_does_not_capsize_her_even_at_once(softer: float, curve: float) -> None:
+    """Patti-B, and softer ships, from rest: in a step she heels further than in the end."""
+    given = vessel("patti_b")
+    ship = replace(
+        given.ship,
+        stiffness_nm_rad=softer * given.ship.stiffness_nm_rad,
+        restoring_odd_nm=(curve * given.ship.restoring_odd_nm[0],),
+    )
+    model = RollModel(ship, given.tank)
+    half_pa = greatest_held_pa(model, 20e3, righting_range(model).greatest_rad) / 2
+    run = simulate(model, 300.0, pressure_pa=half_pa, record_every=5)
+    assert np.abs(run.state[:, 0]).max() < 0.8 * righting_range(model).vanishing_rad
 
 
 def test_a_ship_rights_herself_as_far_as_her_levers_less_what_the_water_takes() -> None:

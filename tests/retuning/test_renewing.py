@@ -139,15 +139,18 @@ def test_known_waves_bring_a_law_that_is_tried_and_kept() -> None:
     assert np.array_equal(asked.waves.density, estimate().waves.density)  # type: ignore[union-attr]
 
 
-def test_the_share_that_is_allowed_is_that_of_the_law_in_charge(
+def test_every_law_that_may_be_in_charge_is_told_what_is_allowed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    rig = Rig(None)
+    rig = Rig(renewed())
+    rig.renew_until(RetuningState.RETUNED)
+    laws = rig.controller.laws.stepped
+    assert len(laws) == 2
     told: list[float] = []
-    active = rig.controller.laws.active.controller
-    monkeypatch.setattr(active, "allow", told.append)
+    for law in laws:
+        monkeypatch.setattr(law.controller, "allow", told.append)
     rig.controller.allow(0.5)
-    assert told == [0.5]
+    assert told == [0.5, 0.5]
 
 
 def test_the_same_waves_bring_nothing_and_others_a_law() -> None:

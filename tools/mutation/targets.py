@@ -337,10 +337,13 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
         "MonitorThresholds: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
-        "_share_that_heels: heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0]) -> "
+        "_unconfirmed_share: heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0]) -> "
         "heel_rad = abs(np.linalg.solve(stiffness, [1.0, push_n])[0])": (
             "a newton metre heels no ship"
         ),
+        "_unconfirmed_share: least = UNCONFIRMED_SHARE * heel_rad <= "
+        "math.radians(UNCONFIRMED_HEEL_DEG) -> least = UNCONFIRMED_SHARE * heel_rad < "
+        "math.radians(UNCONFIRMED_HEEL_DEG)": _AT_THE_BOUND,
     },
     "utank_hil/runtime/passive_twin.py": {
         "PassiveTwin.__init__: def __init__(self, ship: RollShip, tank: Tank, period_s: float, "

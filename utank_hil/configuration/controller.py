@@ -97,19 +97,26 @@ class ControllerConfig(Section):
         if self.vessel.least_gm_m is not None and self.sea_estimate is None:
             reason = "is not watched without the section sea_estimate: add `sea_estimate: {}`"
             found.append(("vessel.least_gm_m", reason))
+        if self.retuning and self.retuning.roll_limit_rad >= self.safety.roll_limit_rad:
+            reason = (
+                f"is {self.retuning.roll_limit_rad:g} rad, but control ends at "
+                f"{self.safety.roll_limit_rad:g}, safety.roll_limit_rad: set it lower"
+            )
+            found.append(("retuning.roll_limit_rad", reason))
         return found + self._pressure_warnings()
 
     def _pressure_warnings(self) -> list[Problem]:
-        """A pump that could capsize her: no monitor is as quick as a drive that hangs."""
-        most_pa = self.limits.pressure_pa
+        """A pump that could capsize her: no monitor helps against a drive that hangs."""
+        most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
         if self.vessel.pump is None:
             return []
-        held_pa = self.vessel.greatest_held_pa(most_pa)
+        held_pa = self.vessel.greatest_held_pa(most_pa, roll_rad)
         if held_pa == most_pa:
             return []
         reason = (
-            f"is {most_pa / 1e3:.3g} kPa, and more than {held_pa / 1e3:.2g} kPa capsizes her if it "
-            "is held, as by a drive that hangs: lower it, or let a hard-wired stop cut the power"
+            f"is {most_pa / 1e3:.4g} kPa, and over {math.floor(held_pa / 10) / 100:g} kPa takes "
+            f"her beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a drive "
+            "that hangs: lower it here and in the drive, or have a hard-wired stop cut its power"
         )
         return [("limits.pressure_pa", reason)]
 
@@ -155,6 +162,9 @@ class ControllerConfig(Section):
     def _roll_problems(self) -> list[Problem]:
         """The protection against great roll must act while the ship still rights herself."""
         limit_rad, righting = self.safety.roll_limit_rad, self.vessel.righting
+        if righting.greatest_rad < 0.01:
+            reason = "rights herself by hardly any heel with the tank's water: check ship and tank"
+            return [("vessel", reason)]
         if limit_rad < righting.vanishing_rad:
             return []
         reason = (

@@ -95,16 +95,16 @@ class Vessel(Section):
     @property
     def default_safety(self) -> dict[str, float]:
         """Limits of roll and heel, where she rights herself less far than by `SafetyLimits`."""
-        greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
+        greatest_rad = max(0.01, math.floor(100 * self.righting.greatest_rad) / 100)
         most = SafetyLimits()
         return {
             "roll_limit_rad": min(most.roll_limit_rad, greatest_rad),
             "heel_limit_rad": min(most.heel_limit_rad, greatest_rad / 2),
         }
 
-    def greatest_held_pa(self, most_pa: float) -> float:
-        """The greatest pressure up to `most_pa` that does not capsize her if it is held."""
-        return greatest_held_pa(RollModel(self.ship, self.tank), most_pa)
+    def greatest_held_pa(self, most_pa: float, within_rad: float) -> float:
+        """See `utank_hil.dynamics.steady_heel.greatest_held_pa`."""
+        return greatest_held_pa(RollModel(self.ship, self.tank), most_pa, within_rad)
 
     @model_validator(mode="wrap")
     @classmethod

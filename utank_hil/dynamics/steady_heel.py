@@ -43,25 +43,33 @@ class RightingRange(NamedTuple):
 
 def righting_range(model: RollModel) -> RightingRange:
     """The righting range of a ship, without her steady moments."""
-    upright = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
-    push, _ = _at_rest(RollModel(upright, model.tank), _HEELS_RAD, 0.0)
+    push, _ = _at_rest(_upright(model), _HEELS_RAD, 0.0)
     over = np.flatnonzero(push[1:] > 0)
     vanishing_rad = float(_HEELS_RAD[1 + over[0]]) if over.size else math.inf
     before = push[: 1 + over[0]] if over.size else push
     return RightingRange(float(_HEELS_RAD[np.argmin(before)]), vanishing_rad)
 
 
-def greatest_held_pa(model: RollModel, most_pa: float) -> float:
-    """The greatest pressure up to `most_pa` that does not capsize a ship if it is held."""
-    if steady_heel(model, most_pa) is not None:
+def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> float:
+    """The greatest pressure up to `most_pa` that heels a ship by so much at most if it is held.
+
+    Without her steady moments; it may be raised slowly only.
+    """
+    model = _upright(model)
+
+    def is_held(pressure_pa: float) -> bool:
+        heel = steady_heel(model, pressure_pa)
+        return heel is not None and abs(heel.roll_rad) <= within_rad
+
+    if is_held(most_pa):
         return most_pa
     low_pa, high_pa = 0.0, most_pa
     for _ in range(_HALVINGS):
         middle_pa = (low_pa + high_pa) / 2
-        if steady_heel(model, middle_pa) is None:
-            high_pa = middle_pa
-        else:
+        if is_held(middle_pa):
             low_pa = middle_pa
+        else:
+            high_pa = middle_pa
     return low_pa
 
 
@@ -87,6 +95,11 @@ def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None
     share = push[after - 1] / (push[after - 1] - push[after])
     roll_rad = heels[after - 1] + share * (heels[after] - heels[after - 1])
     return SteadyHeel(float(roll_rad), bool(abs(flat_m[after]) > model.coefficients.level_limit))
+
+
+def _upright(model: RollModel) -> RollModel:
+    ship = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
+    return RollModel(ship, model.tank)
 
 
 def _at_rest(

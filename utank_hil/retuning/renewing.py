@@ -108,12 +108,15 @@ class RenewingController(LawExchange):
         self.fallbacks = 0
 
     def allow(self, share: float) -> None:
-        """As of `Plans`, for the law in charge."""
-        self._in_charge.allow(share)
+        """As of `Plans`: every law of the bank, as each may be in charge next."""
+        for law in self.laws.stepped:
+            if isinstance(law.controller, ConstrainedController):
+                law.controller.allow(share)
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement and return the command; see `Controller`."""
-        controller = self._in_charge
+        controller = self.laws.active.controller
+        assert isinstance(controller, ConstrainedController)
         before = controller.fallbacks
         command = super().step(y, reference)
         self.fallbacks += controller.fallbacks - before
@@ -125,12 +128,6 @@ class RenewingController(LawExchange):
         elif self._fresh:
             self._rest_if_losing()
         return command
-
-    @property
-    def _in_charge(self) -> ConstrainedController:
-        controller = self.laws.active.controller
-        assert isinstance(controller, ConstrainedController)
-        return controller
 
     def _rest_if_losing(self) -> None:
         for window in (self._lately, self._record):

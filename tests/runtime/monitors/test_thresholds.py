@@ -67,26 +67,31 @@ def test_coarse_gauges_and_a_low_roof_move_the_thresholds_that_hang_on_them() ->
     assert thresholds_of(low, 0.35, SensorFigures()).level_most_m_s == pytest.approx(1.2)
 
 
-@pytest.mark.parametrize(
-    ("name", "heel_deg", "most", "off"),
-    [("unconfirmed_share", 0.25, 0.25, 3e-3), ("degraded_share", 6.0, 0.5, 0.03)],
-)
-@pytest.mark.parametrize(("times", "pressure_pa"), [(1.0004, 20e3), (1.0, 80e3), (0.4, 200e3)])
-def test_a_pump_that_is_strong_for_her_size_has_less_until_the_water_obeyed_and_degraded(
-    name: str, heel_deg: float, most: float, off: float, times: float, pressure_pa: float
+@pytest.mark.parametrize(("share", "pressure_pa"), [(0.2501, 20e3), (0.25, 80e3), (0.1, 200e3)])
+def test_a_pump_that_is_strong_for_her_size_has_less_than_a_quarter_until_the_water_obeyed(
+    share: float, pressure_pa: float
 ) -> None:
     """Steady heel: K phi = rho g At L h, and 2 g h = P / rho + g L phi."""
-    share = times * most
     push_nm = TANK.reservoir_area_m2 * TANK.width_m * pressure_pa
     free_surface = TANK.density_kg_m3 * G * TANK.reservoir_area_m2 * TANK.width_m**2
-    stiffness = 0.5 * (free_surface + share * push_nm / math.radians(heel_deg))
+    stiffness = 0.5 * (free_surface + share * push_nm / math.radians(0.25))
     plant = replace(
         PLANT,
         ship=replace(PLANT.ship, stiffness_nm_rad=stiffness),
         limits=replace(PLANT.limits, pressure_pa=pressure_pa),
     )
-    found = getattr(thresholds_of(plant, 0.35, SensorFigures()), name)
-    assert found == pytest.approx(min(share, most), rel=off)
+    found = thresholds_of(plant, 0.35, SensorFigures()).unconfirmed_share
+    assert found == pytest.approx(min(share, 0.25), rel=3e-3)
+
+
+def test_degraded_is_half_of_what_takes_her_to_her_roll_limit() -> None:
+    """A ship that stands 0.1 rad at 24 kPa by linear theory, K phi = rho g At L h, of 40 kPa."""
+    push_nm = TANK.reservoir_area_m2 * TANK.width_m * 24e3
+    free_surface = TANK.density_kg_m3 * G * TANK.reservoir_area_m2 * TANK.width_m**2
+    soft = replace(PLANT.ship, stiffness_nm_rad=0.5 * (free_surface + push_nm / 0.1))
+    found = thresholds_of(replace(PLANT, ship=soft), 0.1, SensorFigures()).degraded_share
+    assert found == pytest.approx(0.3, rel=0.05)
+    assert thresholds_of(replace(PLANT, ship=soft), 0.5, SensorFigures()).degraded_share == 0.5
 
 
 def test_sensors_are_as_their_makers_say_within_their_ranges() -> None:

@@ -13,6 +13,8 @@ import numpy as np
 
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.steady_heel import greatest_held_pa
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.parameters import Range, range_problems, refuse
 
@@ -20,8 +22,8 @@ UNCONFIRMED_SHARE: Final = 0.25
 UNCONFIRMED_HEEL_DEG: Final = 0.25
 """Steady heel by a pressure that does little harm, whichever way it presses."""
 DEGRADED_SHARE: Final = 0.5
-DEGRADED_HEEL_DEG: Final = 6.0
-"""Steady heel by a pressure of which nobody knows whether it presses the right way."""
+"""Of the greatest pressure, or of that which would take the ship to her roll limit if it was held:
+nobody knows whether it presses the right way, and a step heels her up to twice as far at first."""
 ZERO_HEEL_DEG: Final = 0.3
 """Steady heel by which motion sensor, gauges and pressure sensor may disagree about the water."""
 
@@ -142,6 +144,8 @@ def thresholds_of(
     roll_s, rate_s = sensors.roll_noise_rad, sensors.roll_rate_noise_rad_s
     # push of a roll of 0.2 degrees RMS, a little less at the water's own frequency
     roll_push_m2_s2 = 0.2 * math.pi / 180 * 0.6 * 9.81 * tank.width_m
+    model = RollModel(plant.ship, tank)
+    held_pa = greatest_held_pa(model, limits.pressure_pa, roll_limit_rad)
     # the noise of 15 s of integrated rate, and of the roll itself
     drift_s = math.hypot(roll_s, rate_s * math.sqrt(0.01 * 7.5))
     return MonitorThresholds(
@@ -168,15 +172,16 @@ def thresholds_of(
         # its inertia is some 7 % of the water's, which 2 rho g accelerates per level
         free_rotor_pa_m=0.1 * 2 * tank.density_kg_m3 * GRAVITY_M_S2,
         pressure_limit_pa=limits.pressure_pa,
-        unconfirmed_share=_share_that_heels(plant, UNCONFIRMED_HEEL_DEG, UNCONFIRMED_SHARE),
-        degraded_share=_share_that_heels(plant, DEGRADED_HEEL_DEG, DEGRADED_SHARE),
+        unconfirmed_share=_unconfirmed_share(plant),
+        degraded_share=DEGRADED_SHARE * held_pa / limits.pressure_pa,
         amplified_roll_rad=math.radians(0.5),
     )
 
 
-def _share_that_heels(plant: DesignPlant, heel_deg: float, most: float) -> float:
-    """The share of the pressure that heels her so far if it is held, or `most` if that is less."""
+def _unconfirmed_share(plant: DesignPlant) -> float:
+    """A quarter, or what heels a ship whose pump is strong for her size by so little."""
     push_n = plant.limits.pressure_pa * plant.tank.reservoir_area_m2
     stiffness = coupled_matrices(plant.ship, plant.tank)[2]
     heel_rad = abs(np.linalg.solve(stiffness, [0.0, push_n])[0])
-    return min(most, float(math.radians(heel_deg) / heel_rad))
+    least = UNCONFIRMED_SHARE * heel_rad <= math.radians(UNCONFIRMED_HEEL_DEG)
+    return UNCONFIRMED_SHARE if least else float(math.radians(UNCONFIRMED_HEEL_DEG) / heel_rad)
