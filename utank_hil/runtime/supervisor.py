@@ -52,7 +52,7 @@ class Supervisor:
     drive_wanted : bool
         Whether the drive should be in operation enabled.
     degraded : bool
-        Whether only half the pressure is allowed.
+        Whether only `MonitorThresholds.degraded_share` of the pressure is allowed.
     raised : Fault
         What was latched in this tick, or refused arming in it; else NONE.
     reset_refused_by : Fault
