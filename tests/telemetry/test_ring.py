@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
 import numpy as np
@@ -301,6 +302,24 @@ def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> Non
         assert foreign.exists()
     finally:
         foreign.unlink()
+
+
+def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two controllers, or two benches: one begins between the other's last word and its unlink."""
+    ring = RingWriter(["a"])
+    close = SharedMemory.close
+
+    def meanwhile(segment: SharedMemory) -> None:
+        monkeypatch.undo()
+        RingWriter(["b"]).close()
+        assert (SHM / ring.name).exists()
+        close(segment)
+
+    monkeypatch.setattr(SharedMemory, "close", meanwhile)
+    ring.close()
+    assert not (SHM / ring.name).exists()
 
 
 @pytest.mark.slow

@@ -286,8 +286,12 @@ class RingReader(Closing):
 
         Check before reading, and stop when it was true and the read returns nothing.
         """
-        alive = _process_start(self.writer_pid) == self._writer_start
-        return bool(self._words[_Word.CLOSED]) or not alive
+        return bool(self._words[_Word.CLOSED]) or not self.writer_lives
+
+    @property
+    def writer_lives(self) -> bool:
+        """Whether the process that owns the segment runs, closed or not."""
+        return _process_start(self.writer_pid) == self._writer_start
 
     def close(self) -> None:
         """Release the memory; idempotent. Returned rows stay valid."""
@@ -355,9 +359,9 @@ def _remove_if_orphaned(name: str) -> None:
     """Unlink a segment of that name if its writer died without unlinking it."""
     try:
         with RingReader(name) as left_over:
-            orphaned = left_over.ended
+            lives = left_over.writer_lives  # one that has closed it is about to unlink it
     except OSError:  # none, no ring, or somebody else's
         return
-    if orphaned:
+    if not lives:
         with contextlib.suppress(OSError):
             os.unlink(_SHM / name)
