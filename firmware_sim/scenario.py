@@ -320,7 +320,7 @@ class Scenario(Section):
         except (ValueError, ArithmeticError, MemoryError) as error:
             return [("sea", f"can't be made: {error}")]
         if not np.isfinite(amplitudes).all():
-            return [("sea", "has waves beyond all scale: check height, period and slope")]
+            return [("sea", "has waves too large to compute: check height, period and slope")]
         waves = self.sea.sea(self.seed)
         steep = wavenumber_rad_m(waves.omega_rad_s) @ waves.amplitude_m
         if np.abs(amplitudes).max() > _NO_MOMENT * self.vessel.ship.stiffness_nm_rad * steep:

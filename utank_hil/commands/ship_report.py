@@ -1,7 +1,6 @@
 """What ``utank-hil check`` says of a ship: what ship, tank and pump are to each other."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
-from utank_hil.dynamics.steady_heel import steady_heel
+from utank_hil.dynamics.steady_heel import steady_heel, upright
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.dynamics.valves import added_damping_ratio
 from utank_hil.dynamics.water import water_moments
@@ -100,8 +99,7 @@ def _pump_figures(vessel: Vessel) -> dict[str, Any]:
     if pump is None:
         return {f"pump_{name}": None for name in names}
     pressure_pa = pump.max_pressure_pa
-    upright = replace(vessel.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
-    heel = steady_heel(RollModel(upright, tank), pressure_pa)
+    heel = steady_heel(upright(RollModel(vessel.ship, tank)), pressure_pa)
     flow_m3_s = tank.reservoir_area_m2 * tank.level_limit_m * vessel.ship.natural_frequency_rad_s
     figures = (
         None if heel is None else abs(heel.roll_rad),

@@ -16,6 +16,8 @@ from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
+from utank_hil.dynamics.nonlinear import RollModel
+from utank_hil.dynamics.steady_heel import greatest_held_pa
 from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.estimator import EstimateSettings
 from utank_hil.retuning.record_length import record_problems
@@ -56,21 +58,13 @@ class ControllerConfig(Section):
     sea_estimate: EstimateSettings | None = None
     """How waves and ship are estimated from the motion; without it, they are not."""
 
-    @field_validator("limits", mode="before")
+    @field_validator("limits", "safety", mode="before")
     @classmethod
-    def _as_the_vessel_allows(cls, limits: Any, info: ValidationInfo) -> Any:
+    def _as_the_vessel_allows(cls, given: Any, info: ValidationInfo) -> Any:
         vessel = info.data.get("vessel")
-        if vessel is None or not isinstance(limits, dict):
-            return limits
-        return {**vessel.default_limits, **limits}
-
-    @field_validator("safety", mode="before")
-    @classmethod
-    def _as_the_ship_rights_herself(cls, safety: Any, info: ValidationInfo) -> Any:
-        vessel = info.data.get("vessel")
-        if vessel is None or not isinstance(safety, dict):
-            return safety
-        return {**vessel.default_safety, **safety}
+        if vessel is None or not isinstance(given, dict):
+            return given
+        return {**getattr(vessel, f"default_{info.field_name}"), **given}
 
     @field_validator("bit_rate")
     @classmethod
@@ -110,7 +104,8 @@ class ControllerConfig(Section):
         most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
         if self.vessel.pump is None:
             return []
-        held_pa = self.vessel.greatest_held_pa(most_pa, roll_rad)
+        model = RollModel(self.vessel.ship, self.vessel.tank)
+        held_pa = greatest_held_pa(model, most_pa, roll_rad)
         if held_pa == most_pa:
             return []
         reason = (
@@ -162,9 +157,6 @@ class ControllerConfig(Section):
     def _roll_problems(self) -> list[Problem]:
         """The protection against great roll must act while the ship still rights herself."""
         limit_rad, righting = self.safety.roll_limit_rad, self.vessel.righting
-        if righting.greatest_rad < 0.01:
-            reason = "rights herself by hardly any heel with the tank's water: check ship and tank"
-            return [("vessel", reason)]
         if limit_rad < righting.vanishing_rad:
             return []
         reason = (

@@ -90,7 +90,7 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
         for item in error.errors():
             problems += reader.located(item, content, model)
     except (ArithmeticError, MemoryError, RecursionError) as error:
-        why = f"holds a number beyond all scale, or too many of them: {error}"
+        why = f"holds a number that overflows, or too many of them: {error}"
         problems.append(ConfigProblem(Path(path), "", why))
     if problems:
         raise ConfigError(problems)

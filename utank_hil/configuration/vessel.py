@@ -14,7 +14,7 @@ from utank_hil.configuration.plausibility import vessel_problems, vessel_warning
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
-from utank_hil.dynamics.steady_heel import RightingRange, greatest_held_pa, righting_range
+from utank_hil.dynamics.steady_heel import RightingRange, righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
 from utank_hil.parameters import Problem, Range, refuse
@@ -95,16 +95,12 @@ class Vessel(Section):
     @property
     def default_safety(self) -> dict[str, float]:
         """Limits of roll and heel, where she rights herself less far than by `SafetyLimits`."""
-        greatest_rad = max(0.01, math.floor(100 * self.righting.greatest_rad) / 100)
+        greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
         most = SafetyLimits()
         return {
             "roll_limit_rad": min(most.roll_limit_rad, greatest_rad),
             "heel_limit_rad": min(most.heel_limit_rad, greatest_rad / 2),
         }
-
-    def greatest_held_pa(self, most_pa: float, within_rad: float) -> float:
-        """See `utank_hil.dynamics.steady_heel.greatest_held_pa`."""
-        return greatest_held_pa(RollModel(self.ship, self.tank), most_pa, within_rad)
 
     @model_validator(mode="wrap")
     @classmethod

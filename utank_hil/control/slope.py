@@ -37,5 +37,5 @@ def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
         columns.append((up - down) / (2 * STEP))
     slope = np.column_stack(columns)
     if not np.isfinite(slope).all():
-        raise ValueError("its answer at rest is beyond all scale")
+        raise ValueError("its answer at rest overflows")
     return GainLaw(-slope, controller().sample_time_s)

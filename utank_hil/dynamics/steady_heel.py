@@ -43,7 +43,7 @@ class RightingRange(NamedTuple):
 
 def righting_range(model: RollModel) -> RightingRange:
     """The righting range of a ship, without her steady moments."""
-    push, _ = _at_rest(_upright(model), _HEELS_RAD, 0.0)
+    push, _ = _at_rest(upright(model), _HEELS_RAD, 0.0)
     over = np.flatnonzero(push[1:] > 0)
     vanishing_rad = float(_HEELS_RAD[1 + over[0]]) if over.size else math.inf
     before = push[: 1 + over[0]] if over.size else push
@@ -55,7 +55,7 @@ def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> flo
 
     Without her steady moments; it may be raised slowly only.
     """
-    model = _upright(model)
+    model = upright(model)
 
     def is_held(pressure_pa: float) -> bool:
         heel = steady_heel(model, pressure_pa)
@@ -97,7 +97,8 @@ def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None
     return SteadyHeel(float(roll_rad), bool(abs(flat_m[after]) > model.coefficients.level_limit))
 
 
-def _upright(model: RollModel) -> RollModel:
+def upright(model: RollModel) -> RollModel:
+    """A ship without her steady moments."""
     ship = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
     return RollModel(ship, model.tank)
 
@@ -112,4 +113,5 @@ def _at_rest(
     level_m = np.clip(flat_m, -c.level_limit, c.level_limit)
     still = np.zeros_like(roll_rad)
     states = np.stack([roll_rad, still, level_m, still], axis=-1)
-    return model.derivative(states, pressure_pa, stopped=True)[:, 1], flat_m
+    with np.errstate(all="ignore"):  # levers that overflow
+        return model.derivative(states, pressure_pa, stopped=True)[:, 1], flat_m

@@ -40,9 +40,6 @@ class MatrixLaw:
     def matrices(self):
         return self.model
 
-    def controller(self, washout_share=0.0):
-        raise NotImplementedError
-
 
 def lead_lag(gain, zero=0.9, pole=0.3, sample_time_s=0.1):
     """Gain (1 - zero / z) / (1 - pole / z), its D the gain."""

@@ -8,6 +8,7 @@ container ship does. The limits are wide: they find slips, they do not judge a d
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Final
 
 import numpy as np
 
@@ -26,18 +27,23 @@ from utank_hil.configuration.plausibility.hull import (
     of_weight,
 )
 from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.steady_heel import righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.parameters import Problem
 
 __all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
 
+LEAST_RIGHTING_RAD: Final = 0.01
+"""Below it the figures are wrong: half a degree of heel would capsize the ship."""
+
 
 def vessel_problems(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Problem]:
     """Why a vessel can't be; only the first cause, as the figures that follow from it mislead."""
     for stage in _stages(ship, tank, pump):
-        with np.errstate(all="ignore"):  # beyond all scale is refused by its figure
+        with np.errstate(all="ignore"):  # numbers that overflow are refused by their figure
             found = [(each.key, each.words) for each in stage() if each.refused]
         if found:
             return found
@@ -55,7 +61,10 @@ def vessel_warnings(ship: RollShip, tank: Tank, pump: Pump | None) -> list[Probl
 
 
 def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
-    """Why a ship can't carry a tank: inertia and stability must stay positive with its water."""
+    """Why a ship can't carry a tank: with its water, inertia and stability must stay positive.
+
+    So must the righting moment over some heel.
+    """
     mass, _, stiffness = coupled_matrices(ship, tank)
     water = mass[1, 1] * (tank.width_m / 2) ** 2  # about the ship's axis, as in mass_ratio
     if not (0 < water < mass[0, 0] and np.linalg.det(mass) > 0):
@@ -70,6 +79,13 @@ def tank_problems(ship: RollShip, tank: Tank) -> list[Problem]:
             f"takes all of the ship's stability by its free surface, "
             f"{free_surface_nm_rad(ship, tank):.3g} of {ship.stiffness_nm_rad:.3g} N m/rad: lower "
             "reservoir_area_m2 or width_m"
+        )
+        return [("tank", reason)]
+    greatest_rad = righting_range(RollModel(ship, tank)).greatest_rad
+    if greatest_rad < LEAST_RIGHTING_RAD:
+        reason = (
+            f"leaves a ship whose righting moment is greatest at {greatest_rad:.2g} rad of heel: "
+            "check the ship's righting levers (gz_m with gz_step_rad, or restoring_odd_nm)"
         )
         return [("tank", reason)]
     return []

@@ -29,7 +29,7 @@ class Figure:
     def words(self) -> str:
         """What is wrong, and the remedy."""
         words = self.low if self.value < self.warned_below else self.high
-        return words or "gives a figure beyond all scale"  # of what is not a number
+        return words or "gives a figure that overflows"  # of what is not a number
 
     @property
     def refused(self) -> bool:

@@ -137,7 +137,7 @@ class FuzzyController(ABC):
         """Pressure, shape (1,), for the fuzzy inputs `y`; the target of roll is one number."""
         x = np.minimum(np.maximum(y, -self._reach), self._reach)
         beyond = bool((x != y).any())
-        # the error from the inputs as they are held: a measurement beyond all scale is no reason to
+        # the error from the inputs as they are held: a measurement that overflows is no reason to
         # learn what a float does not hold
         error, rate = float(x[0]), float(x[1])
         if reference is not None:
