@@ -70,6 +70,23 @@ def twin_errors(result: dict[str, Any]) -> Rows:
     ]  # fmt: skip
 
 
+def monitor_costs(result: dict[str, dict[str, float]]) -> Rows:
+    """Processor time of each monitor, the dearest first."""
+    rows = sorted(result.items(), key=lambda item: -item[1]["in_the_loop_us_a_tick"])
+    return [
+        ["monitor", "ticks from call to call", "in the loop, us a tick", "by itself"],
+        *(
+            [
+                name,
+                f"{cost['ticks_between_calls']:.3g}",
+                f"{cost['in_the_loop_us_a_tick']:.2f}",
+                f"{cost['in_a_row_us_a_tick']:.2f}",
+            ]
+            for name, cost in rows
+        ),
+    ]
+
+
 def week(result: dict[str, Any]) -> Rows:
     """What the process took at the beginning, in the middle and at the end of the week."""
     samples = [dict(zip(result["samples"]["head"], row, strict=True))
@@ -89,5 +106,6 @@ TABLES: dict[str, Table] = {
     "false alarms": ("false_alarms", false_alarms),
     "false alarm rates": ("false_alarms", false_alarm_rates),
     "twin errors": ("twin_errors", twin_errors),
+    "monitor costs": ("cost_monitors", monitor_costs),
     "week": ("week", week),
 }

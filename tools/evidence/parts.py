@@ -223,6 +223,12 @@ PARTS = (
         1,
     ),
     Part(
+        "cost_monitors",
+        "python -m tools.benchmarks.monitors --minutes 5 --json",
+        "cost of each monitor in a tick: in the loop, and by itself",
+        1,
+    ),
+    Part(
         "cost_realtime",
         "python -m tools.benchmarks.realtime --seconds 60 --json",
         "lateness of the real-time loop against a bare sleep: alone, under load, while retuning",
