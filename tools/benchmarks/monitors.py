@@ -60,7 +60,7 @@ MONITORS: Final[dict[str, tuple[type, str]]] = {
     "motion samples: spikes, repetition": (MotionGate, "passes"),
     "gauge samples: spikes, standstill": (SpikeGates, "levels_pass"),
     "motion sensor in all": (MotionWatch, "update"),
-    "of it: roll against rate": (RollAgainstRate, "update"),
+    "roll against rate (part of it)": (RollAgainstRate, "update"),
     "senders": (Senders, "update"),
     "tank equation": (TankEquation, "update"),
     "drive follows": (DriveFollowing, "update"),
