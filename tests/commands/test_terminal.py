@@ -1,13 +1,15 @@
-"""Tables on narrow terminals: nothing is cut."""
+"""Tables on narrow terminals: nothing is cut; paths are short."""
 
 import io
+import os
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from utank_hil.commands.terminal import Terminal, new_table
+from utank_hil.commands.terminal import Terminal, new_table, shown
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
 
@@ -59,3 +61,20 @@ def test_what_rich_would_take_for_markup_or_a_picture_is_printed_as_it_is() -> N
     lines = output.getvalue().splitlines()
     assert lines[:2] == [name, f"{name}: {name} on a line that is longer than the terminal"]
     assert output.getvalue().count(name) >= 6
+
+
+@pytest.mark.parametrize(
+    ("here", "said"),
+    [
+        ("/etc/utank-hil", "controller.yaml"),
+        ("/etc", "utank-hil/controller.yaml"),
+        ("/var/log", "/etc/utank-hil/controller.yaml"),
+        # a service's directory is the root, where nobody is who reads its journal
+        ("/", "/etc/utank-hil/controller.yaml"),
+    ],
+)
+def test_a_path_is_said_as_short_as_it_holds(
+    monkeypatch: pytest.MonkeyPatch, here: str, said: str
+) -> None:
+    monkeypatch.setattr(os, "getcwd", lambda: here)
+    assert shown(Path("/etc/utank-hil/controller.yaml")) == said

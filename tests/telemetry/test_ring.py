@@ -322,6 +322,19 @@ def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(
     assert not (SHM / ring.name).exists()
 
 
+def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly() -> None:
+    """systemd-logind removes those of a user who logs out, whatever still runs (RemoveIPC)."""
+    code = """
+import os
+from utank_hil.telemetry.ring import RingWriter
+with RingWriter(["a"]) as writer:
+    os.unlink(f"/dev/shm/{writer.name}")
+    writer.write(bytes(8))
+"""
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+
+
 @pytest.mark.slow
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """

@@ -32,6 +32,7 @@ import os
 import secrets
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
+from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Any, Final
@@ -193,7 +194,10 @@ class RingWriter(Closing):
         del self._words, self._closing  # mapped memory can be released only without views
         self._slots.clear()
         shm.close()
-        shm.unlink()
+        try:
+            shm.unlink()
+        except FileNotFoundError:  # removed by somebody, as by systemd-logind when its user leaves
+            resource_tracker.unregister(f"/{self.name}", "shared_memory")
 
 
 class RingReader(Closing):
