@@ -126,9 +126,10 @@ def main() -> int:
     rows = json.loads(RECORD.read_text(encoding="utf-8"))["result"]["runs"]
     cases = []
     for row in rows:
-        maxima = row["maxima"].get(STATISTIC, [0.0])
-        if max(maxima) >= NEAR:
-            cases.append((row["law"], row["sea"], int(np.argmax(maxima)) + 1))
+        # an hour in which it was never known has None, which becomes NaN
+        maxima = np.array(row["maxima"].get(STATISTIC, [0.0]), dtype=float)
+        if np.nanmax(maxima) >= NEAR:
+            cases.append((row["law"], row["sea"], int(np.nanargmax(maxima)) + 1))
     spawn = get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(options.workers, mp_context=spawn) as pool:
         runs = list(pool.map(compared, cases))
