@@ -63,7 +63,7 @@ def test_of_the_indirect_fuzzy_law_it_is_that_of_its_prior():
     np.testing.assert_allclose(slope(law), expected, rtol=1e-6, atol=1e-3)
 
 
-def test_an_answer_beyond_all_scale_is_refused():
+def test_an_answer_that_overflows_is_refused():
     law = IndirectFuzzy(
         ErrorDynamics(1e150, 0.7, 2.5), RANGES, 1e-200,
         adaptation_f=0.1, adaptation_g=0.1, leakage=0.1,

@@ -72,13 +72,13 @@ MONITORS: Final[dict[str, tuple[type, str]]] = {
 
 
 class Timed:
-    """A method of a class whose calls are timed from now on, and the last of them kept."""
+    """A method of a class whose calls are timed until `restore`, and the last of them kept."""
 
     def __init__(self, owner: type, method: str) -> None:
         self.took_ns: list[int] = []
         self._calls: deque[Callable[[], Any]] = deque(maxlen=AGAIN)
-        self._restore = partial(setattr, owner, method, getattr(owner, method))
         original: Callable[..., Any] = getattr(owner, method)
+        self.restore = partial(setattr, owner, method, original)
 
         def timed(*arguments: Any, **named: Any) -> Any:
             begin_ns = time.perf_counter_ns()
@@ -88,10 +88,6 @@ class Timed:
             return result
 
         setattr(owner, method, timed)
-
-    def restore(self) -> None:
-        """Time no more calls."""
-        self._restore()
 
     def in_the_loop_us(self) -> float:
         """Mean of the calls that nothing held up."""
