@@ -41,7 +41,7 @@ cd {ROOT}
 pivot_root . before
 umount -l /before
 exec env -i container=emulated PATH=/usr/bin:/usr/sbin {SYSTEMD} --unit=ship.target \
-    --log-target=kmsg --show-status=0
+    --log-target=journal-or-kmsg --show-status=0
 """
 
 
@@ -92,7 +92,7 @@ class BootedSystem:
 
     @property
     def journal(self) -> str:
-        """What the service has said."""
+        """What the service has said, and systemd of it."""
         return self.run("journalctl", "--no-pager", "--unit", SERVICE, "--output", "cat")
 
     def wait(self, name: str, value: str, timeout_s: float = 180.0) -> None:

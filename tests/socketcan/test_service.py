@@ -82,11 +82,9 @@ def sail(system: BootedSystem, folder: Path) -> None:
         watcher.wait_in_charge(PRESSURE_PA)
 
         system.run("kill", "-STOP", system.shown("MainPID"))
-        hung_s = time.monotonic()
         watcher.wait(lambda w: w.drive.state is not DriveState.OPERATION_ENABLED, 5.0)
-        system.wait("SubState", "auto-restart", 5.0)
-        assert time.monotonic() - hung_s < 5.0
-        assert system.shown("Result") == "watchdog"
+        system.wait("NRestarts", "1", 5.0)
+        assert "Failed with result 'watchdog'" in system.journal
         starts_again_in_standby(system, watcher, 1)
 
         system.run("kill", "-KILL", system.shown("MainPID"))
