@@ -1,13 +1,15 @@
 """What a watch-keeper sees of a recording, in a browser and in Rerun's own window."""
 
 import re
-from collections.abc import Iterator
+import socket
+import time
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from browsing import Opened, of_color, opened, pixels
+from browsing import PATIENCE_MS, Opened, of_color, opened, pixels
 from PIL import Image
 from playwright.sync_api import Browser
 
@@ -98,9 +100,24 @@ def shown(browser: Browser, recording: Path) -> Iterator[Opened]:
         for name in ("DISPLAY", "WAYLAND_DISPLAY"):
             patch.delenv(name, raising=False)
         viewer = open_viewer(recording)
-    with viewer, opened(browser, f"{viewer.url}{LOOKS}", *SIZES[0]) as seen:
-        seen.page.locator("canvas.visible").wait_for()
-        yield seen
+    with viewer:
+        await_ports(viewer.ports)
+        with opened(browser, f"{viewer.url}{LOOKS}", *SIZES[0]) as seen:
+            seen.page.locator("canvas.visible").wait_for()
+            yield seen
+
+
+def await_ports(ports: Iterable[int]) -> None:
+    """Wait until Rerun listens: on a busy machine that takes longer than to start a browser."""
+    deadline = time.monotonic() + PATIENCE_MS * 1e-3
+    for port in ports:
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port)).close()
+                break
+            except ConnectionRefusedError:
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
 
 
 def settled(seen: Opened) -> np.ndarray:

@@ -1,0 +1,72 @@
+"""Plain lines on standard error, at once, while a loop goes on: of alarms, and of a panel."""
+
+import contextlib
+import os
+import subprocess
+from collections.abc import Iterator
+from typing import Final
+
+from utank_hil.commands.common import fail
+from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.telemetry.event_ring import event_text
+
+_END_S: Final = 10.0
+_STANDARD_ERROR: Final = 2
+
+
+class Lines:
+    """Prints lines through a process of its own.
+
+    A terminal or a journal may be held up, and the loop must not wait for it: it writes into a
+    pipe, and ``cat`` copies from there. A line is left out when the pipe is full.
+
+    Raises
+    ------
+    OSError
+        If the process can't be started.
+    """
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            ["cat"],
+            stdin=subprocess.PIPE,
+            stdout=_STANDARD_ERROR,
+            start_new_session=True,  # Ctrl-C in the terminal does not end it before the last line
+        )
+        assert self._process.stdin is not None
+        self._pipe = self._process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+
+    def tell(self, event: AlarmEvent, start_ns: int) -> None:
+        """Print what becomes of an alarm, with the time since the start; never waits."""
+        self.say(f"{(event.time_ns - start_ns) * 1e-9:8.1f} s {event_text(event)}")
+
+    def say(self, line: str) -> None:
+        """Print a line; never waits."""
+        with contextlib.suppress(OSError):  # the fault is also the last word of the command
+            os.write(self._pipe, f"{line}\n".encode())
+
+    def close(self) -> None:
+        """Have the last line printed; idempotent."""
+        process = self._process
+        if process.stdin is not None and not process.stdin.closed:
+            process.stdin.close()
+            try:
+                process.wait(_END_S)
+            except subprocess.TimeoutExpired:  # the terminal takes nothing
+                process.kill()
+                process.wait()
+
+
+@contextlib.contextmanager
+def printed_lines() -> Iterator[Lines]:
+    """Lines for as long as a loop runs; the command fails where no process can be started."""
+    try:
+        lines = Lines()
+    except OSError as error:
+        fail(f"no process to print on the terminal: {error}", ExitCode.SYSTEM)
+    try:
+        yield lines
+    finally:
+        lines.close()
