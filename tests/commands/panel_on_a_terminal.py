@@ -1,13 +1,15 @@
 """Run `utank-hil panel` on a terminal, arm, and end: by Ctrl-D, or with the terminal closed.
 
-    python panel_on_a_terminal.py ctrl-d | closed
+    python panel_on_a_terminal.py ctrl-d | closed | held
 
 Prints what the panel had sent at its end: how many frames with the arm bit, how many with stop, and
-what the last one asked for.
+what the last one asked for. `held`: prints `stopped` first if a stop came from a terminal that is
+held up, before it was released.
 """
 
 import os
 import pty
+import select
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -26,6 +28,7 @@ from utank_hil.commands import panel
 
 SHIP = Path("configs/ships/thesis_first.yaml")
 CATALOGUE = load_catalogue()
+WAIT_S = 5.0
 
 
 class Controller:
@@ -43,6 +46,8 @@ class Controller:
         order = self._orders.accept(frame) if frame.can_id == self._orders.can_id else None
         if order is not None:
             self.heard.append(order)
+            if order.stop and how == "held":
+                os.write(STOPPED, b"stopped")
 
     def receive(self) -> Sequence[Frame]:
         self._reads += 1
@@ -72,6 +77,7 @@ def wait_for(words: str, times: int = 1) -> None:
 
 how = sys.argv[1]
 reading, RESULT = os.pipe()
+hearing, STOPPED = os.pipe()
 child, terminal = pty.fork()
 if child == 0:
     panel.SocketCanPort = Controller  # type: ignore[attr-defined]
@@ -86,6 +92,11 @@ wait_for("arm", times=2)  # the terminal's echo is the first
 time.sleep(0.1)  # a frame with it has left
 if how == "closed":
     os.close(terminal)
+elif how == "held":
+    os.write(terminal, b"\x13help\nstop\n")
+    if select.select([hearing], [], [], WAIT_S)[0]:
+        print(os.read(hearing, 7).decode())
+    os.write(terminal, b"\x11quit\n")
 else:
     os.write(terminal, b"\x04")
 print(os.read(reading, 1000).decode())

@@ -10,7 +10,7 @@ class QuietBus:
 
     others = 0
 
-    def __init__(self, channel: str) -> None:
+    def __init__(self, channel: str, can_ids: object = None) -> None:
         pass
 
     def send(self, frame: Frame) -> None:

@@ -15,6 +15,8 @@ from typer.testing import CliRunner
 from utank_hil.canbus import Fault, Mode
 from utank_hil.cli import app
 from utank_hil.commands import commission as commissioning
+from utank_hil.commands import lines
+from utank_hil.commands import panel as operating
 from utank_hil.commands import run as module
 from utank_hil.commands.exit_codes import ExitCode
 
@@ -68,16 +70,23 @@ def test_run_that_the_system_refuses_memory_is_started_again(
     assert str(int(ExitCode.SYSTEM)) not in line.partition("=")[2].split()
 
 
-def test_commission_that_is_refused_a_process_can_be_started_again(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["commission", str(GPC), "--bus", "any0", "--record", "{}/record.json"],
+        ["panel", "configs/ships/thesis_first.yaml", "--bus", "any0"],
+    ],
+)
+def test_a_command_that_is_refused_a_process_can_be_started_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str]
 ) -> None:
     def refuse() -> None:
         raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
 
     monkeypatch.setattr(commissioning, "SocketCanPort", QuietBus)
-    monkeypatch.setattr(commissioning, "AlarmLines", refuse)
-    words = ["commission", str(GPC), "--bus", "any0", "--record", str(tmp_path / "record.json")]
-    result = CliRunner().invoke(app, words)
+    monkeypatch.setattr(operating, "SocketCanPort", QuietBus)
+    monkeypatch.setattr(lines, "Lines", refuse)
+    result = CliRunner().invoke(app, [word.format(tmp_path) for word in words])
     assert result.exit_code == ExitCode.SYSTEM
     assert "Resource temporarily unavailable" in result.stderr
     assert not list(tmp_path.iterdir())

@@ -150,6 +150,16 @@ def test_the_command_sends_its_stop_before_it_ends_with_its_terminal(how: str) -
     assert (mode, armed) == ("STANDBY", "False")
 
 
+@pytest.mark.slow
+def test_a_terminal_that_is_held_up_holds_no_stop_back() -> None:
+    """Ctrl-S, and it shows nothing until Ctrl-Q: what is said of the stop would wait for that."""
+    script = Path(__file__).with_name("panel_on_a_terminal.py")
+    done = subprocess.run(
+        [sys.executable, script, "held"], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.split()[0] == "stopped"
+
+
 def test_a_reset_that_is_refused_is_said_with_what_lasts(table: Table) -> None:
     for refused in (True, False):
         table.hear(Mode.FAULT, Fault.MOTION_SILENT)

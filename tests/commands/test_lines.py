@@ -1,4 +1,4 @@
-"""The lines that `run` prints of its alarms."""
+"""The lines that are printed while a loop goes on."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ import time
 import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode
-from utank_hil.commands.alarm_lines import AlarmLines
+from utank_hil.commands.lines import Lines
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.faults import FAULTS
 
@@ -21,7 +21,7 @@ def event(
 
 
 def test_an_alarm_is_one_line_with_mode_words_and_remedy(capfd) -> None:
-    lines = AlarmLines()
+    lines = Lines()
     for state in (*AlarmState, None):
         lines.tell(event(Fault.MOTION_SILENT, state), START_NS)
     lines.close()
@@ -38,13 +38,13 @@ def test_an_alarm_is_one_line_with_mode_words_and_remedy(capfd) -> None:
 
 def test_what_ends_the_command_does_not_end_it_before_the_last_line(capfd) -> None:
     """Ctrl-C, and a terminal that is closed, go to all of a session."""
-    lines = AlarmLines()
+    lines = Lines()
     assert os.getsid(lines._process.pid) == lines._process.pid != os.getsid(0)
     lines.close()
 
 
 def test_it_is_printed_at_once(capfd) -> None:
-    lines = AlarmLines()
+    lines = Lines()
     lines.tell(event(Fault.DRIVE_FAULT), START_NS)
     told, deadline = "", time.monotonic() + 20
     while "DRIVE_FAULT" not in told:
@@ -56,7 +56,7 @@ def test_it_is_printed_at_once(capfd) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
 def test_a_terminal_that_is_held_up_or_gone_never_stops_the_loop(capfd, number: int) -> None:
-    lines = AlarmLines()
+    lines = Lines()
     os.kill(lines._process.pid, number)
     for _ in range(2000):  # over twice what the pipe holds
         lines.tell(event(Fault.DRIVE_FAULT), START_NS)

@@ -14,6 +14,7 @@ from utank_hil.cli import app
 from utank_hil.commands import run as module
 from utank_hil.commands import service_manager
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.lines import Lines
 from utank_hil.commands.service_manager import ServiceManager
 
 GPC = Path("configs/controllers/gpc.yaml")
@@ -152,13 +153,13 @@ def test_an_error_in_the_loop_ends_the_watchdog_before_its_traceback(
             return super().receive()
 
     told: list[list[str]] = []
-    close = module.AlarmLines.close
+    close = Lines.close
 
-    def closing(lines: module.AlarmLines) -> None:
+    def closing(lines: Lines) -> None:
         told.append(messages(manager))
         close(lines)
 
-    monkeypatch.setattr(module.AlarmLines, "close", closing)
+    monkeypatch.setattr(Lines, "close", closing)
     monkeypatch.setattr(module, "SocketCanPort", Broken)
     for name, value in environment(manager).items():
         monkeypatch.setenv(name, value)
@@ -190,7 +191,7 @@ def test_ready_is_told_when_nothing_but_the_loop_is_left_to_begin(
             pass
 
     before = (
-        *("SocketCanPort", "RunRecording", "retuner_process", "AlarmLines"),
+        *("SocketCanPort", "RunRecording", "retuner_process", "printed_lines"),
         *("build_controller_node", "real_time_scheduling"),
     )
     monkeypatch.setattr(module, "SocketCanPort", QuietBus)

@@ -10,10 +10,10 @@ from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
-from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.commissioning_record import make_record, record_path, write_record
 from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
 from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.retuning.law_exchange import RetuningEvent
@@ -63,11 +63,7 @@ def commission(
             fail(error, ExitCode.NO_BUS)
         stack.callback(port.close)
         stop = stack.enter_context(stop_on_signals())
-        try:
-            lines = AlarmLines()
-        except OSError as error:
-            fail(f"no process to print on the terminal: {error}", ExitCode.SYSTEM)
-        stack.callback(lines.close)
+        lines = stack.enter_context(printed_lines())
 
         def tell(event: RetuningEvent | AlarmEvent, start_ns: int) -> None:
             if not isinstance(event, AlarmEvent):
@@ -114,11 +110,11 @@ class Guide:
     Parameters
     ----------
     node : CommissioningNode
-    lines : AlarmLines
+    lines : Lines
         Where it is said.
     """
 
-    def __init__(self, node: CommissioningNode, lines: AlarmLines) -> None:
+    def __init__(self, node: CommissioningNode, lines: Lines) -> None:
         self._node = node
         self._lines = lines
         self._stage: Stage | None = None

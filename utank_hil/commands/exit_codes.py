@@ -44,7 +44,7 @@ class ExitCode(IntEnum):
     )
     NO_BUS = (
         3,
-        "`run`, `commission`, `panel`, `bench`, `firmware-sim`",
+        "`run`, `commission`, `panel`, `bench`, `faults`, `firmware-sim`",
         "The CAN interface can't be opened.",
     )
     BUS_LOST = (
@@ -61,7 +61,7 @@ class ExitCode(IntEnum):
     )
     SYSTEM = (
         7,
-        "`run`, `commission`, `bench`, `faults`",
+        "`run`, `commission`, `panel`, `bench`, `faults`",
         "The system refused what the command needs, such as a process or shared memory, or a "
         "process of it was killed. `bench` and `faults` keep what there is. Starting again may "
         "help.",

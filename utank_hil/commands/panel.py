@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from utank_hil.canbus import SocketCanPort, Station, load_catalogue
 from utank_hil.commands.common import Duration, fail, load
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.keyboard import HELP, Keyboard
-from utank_hil.commands.terminal import notes
+from utank_hil.commands.lines import printed_lines
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.runtime import RealTimeLoop, stop_on_signals
 from utank_hil.runtime.panel import OperatorPanel
@@ -48,14 +49,12 @@ def panel(
         port = SocketCanPort(bus, can_ids=node.hears)
     except OSError as error:
         fail(error, ExitCode.NO_BUS)
-    notes.say(HELP)
-    descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdin is None else sys.stdin.fileno()
-    keyboard = Keyboard(node, descriptor, notes.say, terminal=os.isatty(descriptor))
-    try:
-        with stop_on_signals() as signalled:
-            RealTimeLoop([node], port).run(
-                lambda: keyboard.look(time.monotonic_ns(), signalled=signalled()),
-                None if duration is None else round(duration * 1e9),
-            )
-    finally:
-        port.close()
+    # a terminal that is held up is not to hold a stop back
+    with closing(port), printed_lines() as lines, stop_on_signals() as signalled:
+        lines.say(HELP)
+        descriptor = os.open(os.devnull, os.O_RDONLY) if sys.stdin is None else sys.stdin.fileno()
+        keyboard = Keyboard(node, descriptor, lines.say, terminal=os.isatty(descriptor))
+        RealTimeLoop([node], port).run(
+            lambda: keyboard.look(time.monotonic_ns(), signalled=signalled()),
+            None if duration is None else round(duration * 1e9),
+        )

@@ -15,13 +15,13 @@ import typer
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
-from utank_hil.commands.alarm_lines import AlarmLines
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
 from utank_hil.commands.common import Duration, Json, View, fail, load, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
+from utank_hil.commands.lines import printed_lines
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.commands.stamps import claimed_files
@@ -118,7 +118,7 @@ def run(
         if view:
             _show(stack)
         retuner, estimating = _desks(stack, loaded)
-        alarms = _alarm_lines(stack)
+        alarms = stack.enter_context(printed_lines())
 
         def announce(event: Event, start_ns: int) -> None:
             if isinstance(event, AlarmEvent):
@@ -296,15 +296,6 @@ def _desks(stack: ExitStack, loaded: ControllerConfig) -> tuple[Desk | None, Des
     if any(desk is not None and not desk.alive for desk in desks):
         notes.say("nothing will be retuned or estimated", red="the retuner did not start:")
     return desks
-
-
-def _alarm_lines(stack: ExitStack) -> AlarmLines:
-    try:
-        alarms = AlarmLines()
-    except OSError as error:
-        fail(f"no process to print alarms: {error}", ExitCode.SYSTEM)
-    stack.callback(alarms.close)
-    return alarms
 
 
 def _as_json(
