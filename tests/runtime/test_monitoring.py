@@ -254,6 +254,23 @@ def test_long_gaps_that_keep_the_water_from_being_judged_are_found(age: str) -> 
     assert table.monitors.confirmed
 
 
+@pytest.mark.parametrize("every_s", [0.3, 0.9])
+def test_measurements_that_are_never_fresh_at_once_are_found_as_gaps(every_s: float) -> None:
+    table = Table()
+    moved(table, ROLLING, 12.0)
+    assert table.monitors.confirmed
+    turns = {
+        "tank_age_ms": lambda time_s: 1000 * (time_s % every_s),
+        "pump_age_ms": lambda time_s: 1000 * ((time_s + every_s / 2) % every_s),
+    }
+    assert not moved(table, ROLLING, 0.9 * T, **turns)
+    assert table.monitors.confirmed
+    assert Finding.UNWATCHED in moved(table, ROLLING, 0.3 * T, **turns)
+    assert not table.monitors.confirmed
+    assert Finding.UNWATCHED_LONG not in moved(table, ROLLING, 1.6 * T, **turns)
+    assert Finding.UNWATCHED_LONG in moved(table, ROLLING, 0.4 * T, **turns)
+
+
 def test_a_sensor_that_is_silent_for_good_is_not_a_gap() -> None:
     table = Table()
     moved(table, ROLLING, 12.0)

@@ -44,6 +44,7 @@ SPARE_MS: Final = 30.0
 STALE_MS: Final = 100.0
 """Older measurements are a gap, after which a comparison begins anew."""
 SILENT_S: Final = 1.0
+"""A longer silence is judged by its own row of the fault table."""
 BACKLOG_NS: Final = 200_000_000
 """What is received first may have waited in the interface's queue, and be old."""
 GAP_PERIODS: Final = 0.05
@@ -145,7 +146,8 @@ class Monitors:
         self._frames_per_s = bit_rate / MEAN_FRAME_BITS
         self._senders = Senders((), self._frames_per_s)
         self._phase = 0
-        self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = 0
+        self._last_ns = self._motion_ns = self._senders_ns = 0
+        self._round_ns = self._looked_ns = 0
         self._begun = False
         self._judges_from_ns = 0
         self._longest_gap_s = max(GAP_PERIODS * thresholds.roll_period_s, LATE_ROUND_S)
@@ -304,7 +306,8 @@ class Monitors:
         """Count time, and frames, from the first tick on: the clock may be that of the machine."""
         self._begun = True
         self._judges_from_ns = now_ns + BACKLOG_NS
-        self._last_ns = self._motion_ns = self._round_ns = self._senders_ns = now_ns - TICK_NS
+        self._last_ns = self._motion_ns = self._senders_ns = now_ns - TICK_NS
+        self._round_ns = self._looked_ns = now_ns - TICK_NS
         self._senders.begin(inbox.foreign)
 
     def _look_at_motion(self, now_ns: int, inbox: Inbox, seen: Observations) -> None:
@@ -384,6 +387,7 @@ class Monitors:
             self._level_stuck.restart()
             self._of_level = 0
         oldest_ms = max(seen.motion_age_ms, seen.tank_age_ms, seen.pump_age_ms)
+        self._note_watch(now_ns, elapsed_s, oldest_ms)
         if oldest_ms > STALE_MS:
             return
         self._round_ns = now_ns
@@ -399,7 +403,9 @@ class Monitors:
         )
         self._used.water = water
         wrong = water or self._used.watch.found & _MOTION_SIGN
-        self._note_watch(equation, elapsed_s, sound=not wrong)
+        if equation.settled:
+            self._unwatched_s, self._of_watch = 0.0, 0
+        self.confirmed = not wrong and (self.confirmed or equation.obeyed)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
             return
@@ -413,19 +419,20 @@ class Monitors:
             )
         self._leave_accused(inbox, motions, seen, spare)
 
-    def _note_watch(self, equation: TankEquation, elapsed_s: float, *, sound: bool) -> None:
+    def _note_watch(self, now_ns: int, elapsed_s: float, oldest_ms: float) -> None:
         """Note for how long, with measurements that come, nothing was told by the water."""
         shortest_s = UNWATCHED_PERIODS * self.thresholds.roll_period_s
         longest_s = LONG_PERIODS * self.thresholds.roll_period_s
         # of a silence, which others judge, no more counts than of a gap
-        counted_s = min(elapsed_s, SILENT_S)
-        self._unwatched_s = 0.0 if equation.settled else self._unwatched_s + counted_s
+        if oldest_ms <= SILENT_S * 1e3 and not self._used.equation.settled:
+            self._unwatched_s += min((now_ns - self._looked_ns) * 1e-9, SILENT_S)
+        self._looked_ns = now_ns
         unwatched = self._unwatched_s > shortest_s
         self._of_watch = 0
         if unwatched:
             self._of_watch = _UNWATCHED_LONG if self._unwatched_s > longest_s else _UNWATCHED
-        known = self.confirmed and not unwatched and elapsed_s <= shortest_s
-        self.confirmed = sound and (known or equation.obeyed)
+        if unwatched or elapsed_s > shortest_s:
+            self.confirmed = False
 
 
 def _turn(watch: MotionWatch, rate_rad_s: float, heard_ns: int, elapsed_s: float) -> None:
