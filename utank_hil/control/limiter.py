@@ -108,25 +108,29 @@ class CommandLimiter:
     def _permitted_pa(
         self, desired_pa: float, level_m: float, rate_m_s: float, share: float
     ) -> float:
-        """Within pressure, level and power limits; the barrier brakes with the share, too."""
+        """Within pressure, level and power limits."""
         most = self._limits.pressure_pa * share
         flow_m3_s = self._area_m2 * abs(rate_m_s)
         if flow_m3_s == 0:  # that of the smallest rate is, too
             return min(max(desired_pa, -most), most)
         way = math.copysign(1.0, rate_m_s)  # seen in the direction in which the water moves
         power_pa = self._limits.power_w / flow_m3_s
-        high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s)), power_pa)
+        high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s), most), power_pa)
         return way * max(min(way * desired_pa, high), -most)
 
-    def _barrier_pa(self, level_m: float, rate_m_s: float) -> float:
-        """Greatest pressure for water rising at `rate_m_s` > 0 towards the positive limit."""
+    def _barrier_pa(self, level_m: float, rate_m_s: float, most_pa: float) -> float:
+        """Greatest pressure for water rising at `rate_m_s` > 0 towards the positive limit.
+
+        It reckons with no more than `most_pa` for braking: a pump that is held to a share of its
+        pressure has to begin earlier.
+        """
         limits = self._limits
         level_m += rate_m_s * limits.lookahead_s
         room_m = limits.level_m - level_m
         if room_m <= 1e-3:
-            return -limits.pressure_pa
+            return -most_pa
         swing_m = rate_m_s / self._frequency_rad_s
         touch_m = (limits.level_m**2 - level_m**2 - swing_m**2) / (2 * room_m)
-        brake_pa = limits.brake_share * limits.pressure_pa
+        brake_pa = limits.brake_share * most_pa
         allowed = -brake_pa + limits.sharpness * (self._stiffness_pa_m * touch_m + brake_pa)
-        return min(max(allowed, -limits.pressure_pa), limits.pressure_pa)
+        return min(max(allowed, -most_pa), most_pa)
