@@ -60,8 +60,8 @@ class ValveBench(ControllerBench):
         self.valve = valve
         self.opening = valve.fail_opening
         self.state: ValveState | None = ValveState.FAIL_POSITION
-        self.fault = ValveFault.NONE
-        self.moves = self.reports = self.echoes = self.beats = True
+        self.fault: ValveFault | None = ValveFault.NONE
+        self.moves = self.reports = self.echoes = self.beats = self.hears = True
         self.told: list[ValveCommand] = []
         super().__init__(
             law=ToyValveLaw(),
@@ -104,7 +104,7 @@ class ValveBench(ControllerBench):
                 self.told.append(command)
                 if self.echoes:
                     self._echo = self._valve_commands.counter
-                if self.fault is ValveFault.NONE:
+                if self.fault is ValveFault.NONE and self.hears:
                     following = command.control is ValveControl.FOLLOW
                     self.state = ValveState.FOLLOWING if following else ValveState.FAIL_POSITION
 
@@ -170,7 +170,10 @@ def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressur
         (Fault.VALVE_SILENT, 90, {"opening": math.nan, "moves": False}),
         (Fault.VALVE_SILENT, 140, {"echoes": False}),
         (Fault.VALVE_FAULT, 40, {"state": ValveState.FAULT, "fault": ValveFault.STUCK}),
-        (Fault.VALVE_FAULT, 140, {"state": ValveState.FAIL_POSITION, "fault": ValveFault.SUPPLY}),
+        (Fault.VALVE_FAULT, 40, {"state": ValveState.FAIL_POSITION, "fault": ValveFault.SUPPLY}),
+        (Fault.VALVE_FAULT, 140, {"state": ValveState.FAIL_POSITION, "hears": False}),
+        (Fault.VALVE_FAULT, 40, {"fault": ValveFault.POSITION_SENSOR}),
+        (Fault.VALVE_FAULT, 40, {"fault": None}),
         (Fault.VALVE_NOT_FOLLOWING, 340, {"opening": 0.5, "moves": False}),
     ],
 )

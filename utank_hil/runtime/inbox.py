@@ -27,6 +27,7 @@ from utank_hil.canbus import (
     SensorTank,
     Station,
     Switch,
+    ValveFault,
     ValveState,
     ValveStatus,
 )
@@ -103,8 +104,8 @@ class Inbox:
         Electric power the drive takes.
     valve_opening : float
         As the valve last measured it, at `valve_ns`; 1, open, before and where there is none.
-    valve_state : ValveState or None
-        State the valve last reported; the echo of a new command came at `valve_echo_ns`.
+    valve_state, valve_fault : ValveState or None, ValveFault or None
+        As the valve last reported; the echo of a new command came at `valve_echo_ns`.
     stations : Stations
         What the operators want.
     second_strange_ns : int
@@ -202,6 +203,7 @@ class Inbox:
         self.high_level = False
         self.valve_opening = 1.0
         self.valve_state: ValveState | None = None
+        self.valve_fault: ValveFault | None = ValveFault.NONE
         self.valve_ns = self.valve_echo_ns = NEVER_HEARD_NS
         self._valve_echo: int | None = None
         self.drive_state = None if pump else _ENABLED
@@ -352,6 +354,7 @@ class Inbox:
 
     def _on_valve(self, status: ValveStatus, now_ns: int) -> None:
         self.valve_state = status.state
+        self.valve_fault = status.fault
         if math.isfinite(status.opening):
             self.valve_opening, self.valve_ns = status.opening, now_ns
         if status.command_echo is not None and status.command_echo != self._valve_echo:

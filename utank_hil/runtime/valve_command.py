@@ -8,6 +8,7 @@ from utank_hil.canbus import (
     SensorTank,
     ValveCommand,
     ValveControl,
+    ValveFault,
     ValveState,
 )
 from utank_hil.dynamics.tank import Tank
@@ -21,6 +22,7 @@ from utank_hil.tick import TICK_S
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _FOLLOWING: Final = ValveState.FOLLOWING
 _FAULT: Final = ValveState.FAULT
+_NO_FAULT: Final = ValveFault.NONE
 STALE_MS: Final = 100.0
 """Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
 
@@ -81,7 +83,7 @@ class ValveCommander:
         """Set what concerns the valve in `seen`, once a tick."""
         seen.valve_age_ms = (now_ns - inbox.valve_ns) / MILLISECOND_NS
         seen.valve_echo_age_ms = (now_ns - inbox.valve_echo_ns) / MILLISECOND_NS
-        seen.valve_fault = inbox.valve_state is _FAULT
+        seen.valve_fault = _reports_fault(inbox)
         if not self._following or inbox.valve_state is _FOLLOWING:
             self._followed_ns = now_ns
         seen.valve_out_ms = (now_ns - self._followed_ns) / MILLISECOND_NS
@@ -98,7 +100,7 @@ class ValveCommander:
     def frame(self, inbox: Inbox, *, follow: bool) -> Frame:
         """Return the next command."""
         control = ValveControl.FOLLOW if follow else ValveControl.FAIL_POSITION
-        if self._resets_left and inbox.valve_state is _FAULT:
+        if self._resets_left and _reports_fault(inbox):
             control = ValveControl.RESET
             self._resets_left -= 1
         else:
@@ -106,3 +108,7 @@ class ValveCommander:
         self._following = control is ValveControl.FOLLOW
         self._told = self._asked if self._following else self._valve.fail_opening
         return self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
+
+
+def _reports_fault(inbox: Inbox) -> bool:
+    return inbox.valve_state is _FAULT or inbox.valve_fault is not _NO_FAULT
