@@ -22,6 +22,8 @@ from utank_hil.tick import TICK_NS
 EDGE_NS = 500_000_000
 """How long an edge-triggered button stays pressed: longer than two lost messages. So long the arm
 bit is taken back, too, before it is set again."""
+RAMP_NS = 1_100_000_000
+"""How long stop is held in FAULT: the ramp of a fault, which a stop cuts, may last a second."""
 SILENT_NS = 300_000_000
 """After so long without a status no controller is heard."""
 _UNDER_POWER = (Mode.ACTIVE, Mode.PASSIVE, None)
@@ -73,8 +75,8 @@ class TimedAction:
 class OperatorPanel:
     """Sends OPERATOR_CMD in its cycle of the catalogue, and on change.
 
-    Stop is held until the controller answers with a mode without power, and for `EDGE_NS` at least.
-    Until then arming is refused.
+    Stop is held until the controller answers with a mode without power, and for `EDGE_NS` at least,
+    `RAMP_NS` in FAULT. Until then arming is refused.
 
     Parameters
     ----------
@@ -175,7 +177,8 @@ class OperatorPanel:
             return
         self.status, self.heard_ns = status, now_ns
         # an earlier one may have been on its way when stop was pressed
-        if now_ns - self._stopped_ns >= EDGE_NS and status.mode not in _UNDER_POWER:
+        held_ns = RAMP_NS if status.mode is Mode.FAULT else EDGE_NS
+        if now_ns - self._stopped_ns >= held_ns and status.mode not in _UNDER_POWER:
             self.stopping = False
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
