@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 from itertools import count
 
 import pytest
-from controller_bench import CATALOGUE, ControllerBench
+from controller_bench import CATALOGUE, VESSEL, ControllerBench
 
-from utank_hil.canbus import Frame, Quality, SensorTank, Switch
+from utank_hil.canbus import Frame, Quality, SensorPump, SensorTank, Switch
 from utank_hil.tick import TICK_NS
 
 RATE_M_S = 0.5
@@ -83,3 +83,17 @@ def test_frames_that_come_a_tick_late_or_two_at_once(late_of: int) -> None:
         return frames
 
     assert worst_rate_error(change, always_good) < 0.1
+
+
+def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago() -> None:
+    bench = ControllerBench()
+    bench.pump = SensorPump(20e3, 0.0, Quality.GOOD)
+    bench.run(200)
+    bench.silent = {SensorPump}
+    bench.run(500)
+    settled_m_s = bench.level.rate_m_s
+    bench.silent = {SensorPump, SensorTank}
+    bench.run(400)
+    pushed_m_s = 20e3 * 0.4 / (VESSEL.tank.density_kg_m3 * VESSEL.tank.effective_length_m)
+    assert bench.pressure_pa == 0
+    assert abs(bench.level.rate_m_s - settled_m_s) < 0.1 * pushed_m_s

@@ -48,6 +48,8 @@ from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 NANOSECONDS: Final = 1e-9
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
+FRESH_PRESSURE_NS: Final = 100_000_000
+"""In the place of an older pressure the level is predicted with the command."""
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
@@ -358,7 +360,9 @@ class ControllerNode:
         """Level and its rate from measurements, or from the model while one is missing."""
         inbox, level = self.inbox, self._level
         cycles = inbox.tank_cycles - self._observed_cycles
-        pressure_pa = inbox.pressure_pa
+        # the last pressure that was measured may have ended long ago
+        fresh = now_ns - inbox.pump_ns <= FRESH_PRESSURE_NS
+        pressure_pa = inbox.pressure_pa if fresh else self.command_pa
         if self._valve is not None:
             pressure_pa -= self._valve.held_pa(inbox, level.rate_m_s)
         if cycles:
