@@ -50,9 +50,9 @@ TRIAL_PATIENCE: Final = 1.5
 MOST_EVENTS: Final = 1000
 """That are kept: two days of a retuning every three minutes."""
 RETRY_NS: Final = 600_000_000_000
+"""Least time to the next exchange without an order after one that failed, or was undone."""
 BUSY_NS: Final = 30_000_000_000
 """A retuner without a sign of life may be busy with an estimate for so long."""
-"""Least time to the next exchange without an order after one that failed, or was undone."""
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (

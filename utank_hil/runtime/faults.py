@@ -30,7 +30,7 @@ class Reaction(Enum):
     HALVE = "half the pressure"
     """Judged while active; not latched."""
     REFUSE = "arming refused"
-    """Judged when arming begins."""
+    """Judged when arming begins and until ACTIVE; not latched."""
     GIVE_UP = "arming given up"
     """Judged while the drive is being enabled."""
     WARN = "none"

@@ -13,7 +13,7 @@ so many of the changes are counted all the same.
 CAN loses no frame: what disturbs it, it sends again. A gateway, or a slow receiver, may. Single
 frames do no harm, but two pump commands in succession let the drive's timeout of 50 ms go: once in
 five hours at random losses of 0.1 %, in three minutes at 1 %. Four motion frames, at which their
-age ends the run, are lost once in eleven days at 1 %. What is lost above 0.1 % of a message's
+age may end the run, are lost once in eleven days at 1 %. What is lost above 0.1 % of a message's
 frames is summed; with five too many people are to know. So they are of a node that sends fewer than
 0.75 a cycle for two seconds, with a counter that misses none.
 """
