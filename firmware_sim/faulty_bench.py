@@ -85,7 +85,6 @@ class FaultyBench:
         self.nodes = {node.name: FaultyNode(node) for node in self.ship.nodes}
         self.nodes["controller"] = self._controller
         self.bus = FaultyBus(config.bit_rate, seed)
-        self._joined: list[Node] = []
         self.lockstep = Lockstep(list(self.nodes.values()), self.bus, trace)
 
     def _new_controller(self) -> Node:
@@ -109,10 +108,8 @@ class FaultyBench:
         self._controller.node = self._new_controller()
 
     def join(self, nodes: Sequence[Node]) -> None:
-        """Have more nodes on the bus from now on, which must be a time at which all are due."""
-        self._joined += nodes
-        every = [*self.nodes.values(), *self._joined]
-        self.lockstep = Lockstep(every, self.bus, self._trace, self.lockstep.now_ns)
+        """Have more nodes on the bus from now on."""
+        self.lockstep.join(nodes)
 
     def place(self, faults: Sequence[AnyFault]) -> None:
         """Place faults, whose times count from now."""

@@ -30,6 +30,7 @@ def _fault_name(name: str) -> str:
 FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
+StatusFlag = Literal["alarm", "degraded", "saturated"]
 Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]
 REACTIONS: Final[dict[Reaction, str]] = {
     "stop": "zero pressure at once, latched",
@@ -138,6 +139,12 @@ class Row(Section):
         stop and within 1,040 ms of the beginning of a ramp.
     codes : tuple of str
         Faults that it may be called.
+    alarms : tuple of str
+        Faults that have to be alarms as well.
+    flags : tuple of str
+        Of CTRL_STATUS that have to be set.
+    unheard : bool
+        The fault keeps the controller's frames from the bus: what they say is not judged.
     may_end : tuple of str
         Faults in which a run may end later than `followed_s`, in the minutes of the roll.
     hardwired_stop : bool
@@ -169,6 +176,9 @@ class Row(Section):
     halved_within_ms: Positive | None = None
     zero_within_ms: Positive | None = None
     codes: tuple[FaultName, ...] = ()
+    alarms: tuple[FaultName, ...] = ()
+    flags: tuple[StatusFlag, ...] = ()
+    unheard: bool = False
     may_end: tuple[FaultName, ...] = ()
     hardwired_stop: bool = False
     counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]

@@ -48,7 +48,8 @@ def _do(setup_name: str, seed: int, rows: list[Row], first: bool) -> list[Outcom
         _laws[setup_name] = build_law(setup.config)
     sea = Sea(
         ours.campaign, setup, _laws[setup_name], seed, ours.window,
-        recorded=ours.recorded and first, stopped=lambda: bool(ours.stop.value),
+        recorded=ours.recorded and first, patient=first,
+        stopped=lambda: bool(ours.stop.value),
     )  # fmt: skip
     outcomes = []
     with suppress(InterruptedError):

@@ -13,11 +13,11 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final, TypeVar, cast, get_args
 
 import numpy as np
 
-from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
+from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFlag
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
@@ -40,6 +40,11 @@ SAMPLE_TICKS: Final = 5
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 _LOOK_S: Final = 0.1
+REARMED_S: Final = 20.0
+"""For so long after the fault the first sea of a campaign sees whether anything arms again."""
+COMMANDS_NS: Final = 40_000_000
+"""Two cycles of PUMP_CMD."""
+FLAGS: Final = get_args(StatusFlag)
 RECORDED_S: Final = 10.0
 """Before the fault."""
 
@@ -68,6 +73,16 @@ class Outcome:
     ----------
     mode, code : str
         In the end, and the fault that was latched or shown.
+    shown : str
+        Mode and fault in the last CTRL_STATUS of the controller.
+    told : tuple of str
+        Faults that it sent in ALARM since the fault.
+    flags : tuple of str
+        Of CTRL_STATUS that were set since.
+    commanded_ms : float
+        When it last sent a pressure other than zero, at the latest when the bus was followed last.
+    beyond_share_pa : float
+        How far its commands went beyond half the pressure while it said `degraded`.
     refused : int
         Commands that the drive refused.
     steepest_pa_s : float
@@ -93,6 +108,11 @@ class Outcome:
     code: str = ""
     was_active: bool = False
     armed_again: bool = False
+    shown: str = ""
+    told: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+    commanded_ms: float = 0.0
+    beyond_share_pa: float = 0.0
     refused: int = 0
     steepest_pa_s: float = 0.0
     roll_variance: float = math.nan
@@ -143,6 +163,8 @@ class Sea:
         Of the setup's controller.
     recorded : bool
         Whether the outcomes hold recordings.
+    patient : bool
+        Whether the bench goes on for `REARMED_S` where the pump is off.
     stopped : callable
         Whether to end early, with an `InterruptedError`.
     """
@@ -156,11 +178,13 @@ class Sea:
         window: Window,
         *,
         recorded: bool = False,
+        patient: bool = False,
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         self._stopped = stopped
         self._campaign, self._setup, self._law = campaign, setup, law
         self._seed, self._window, self._recorded = seed, window, recorded
+        self._patient = patient
         self._fault_s = campaign.fault_at_s(seed)
         self._fault_ns = round(self._fault_s * SECOND_NS)
         self._underway = self._start()
@@ -200,6 +224,7 @@ class Sea:
         longest_s = max(
             self._window.stopped_s,
             self._window.running_s,
+            REARMED_S if self._patient else 0.0,
             *(max(row.followed_s, row.roll_window_s or 0.0) for row in rows),
         )
         for enabled in (False, True):
@@ -253,26 +278,39 @@ class Sea:
         bench, log = underway.bench, underway.log
         start_ns = bench.lockstep.now_ns
         refused = bench.ship.refused_commands
-        watch = Watch(bench, row.operator, row.counts_from, row.codes)
+        watch = Watch(
+            bench,
+            row.operator,
+            row.counts_from,
+            row.codes,
+            row.within_ms,
+            self._degraded_most(bench),
+        )
         bench.place(row.faults)
         bench.join([watch])
         watched_ns = start_ns + round(row.followed_s * SECOND_NS)
         bench.run(watched_ns)
-        stopped = not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
+        alone_ns = watched_ns
+        if self._patient and self._stopped_at(bench):
+            alone_ns = max(watched_ns, start_ns + round(REARMED_S * SECOND_NS))
+            bench.run(alone_ns)
+        stopped = self._stopped_at(bench)
         outcome = self._measured(row, watch, log, start_ns)
         outcome.refused = bench.ship.refused_commands - refused
         window_s = self._window.stopped_s if stopped else self._window.running_s
-        window_s = max(row.roll_window_s or window_s, row.followed_s)
+        window_s = max(row.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
         end_ns = start_ns + round(window_s * SECOND_NS)
         rolls = _Moments(watch)
         if stopped:
-            rolls.add_ship_alone(bench, watched_ns, end_ns)
-        elif end_ns > watched_ns:
+            rolls.add_ship_alone(bench, alone_ns, end_ns)
+        elif end_ns > alone_ns:
             bench.run(end_ns)
             rolls = _Moments(watch)
             outcome.armed_again |= watch.armed_again
             outcome.code = watch.code.name
         outcome.mode = bench.node.mode.name
+        outcome.beyond_share_pa = watch.beyond_share_pa
+        _note_what_was_said(outcome, log, start_ns)
         outcome.roll_variance, outcome.window_s = rolls.variance, window_s
         passive = self._passive[self._pump_enabled(bench)]
         valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
@@ -290,6 +328,17 @@ class Sea:
             first_s = (start_ns / SECOND_NS) - RECORDED_S
             outcome.rows = np.array([each for each in underway.recorder.rows if each[0] >= first_s])
         return outcome
+
+    def _degraded_most(self, bench: FaultyBench) -> tuple[float, int]:
+        """What is allowed while the pressure is halved, and the time to come down to it."""
+        monitors, limits = bench.node.monitors, self._setup.config.limits
+        share = 1.0 if monitors is None else monitors.thresholds.degraded_share
+        ramp_s = (1 - share) * limits.pressure_pa / limits.rate_pa_s
+        return share * limits.pressure_pa, round(ramp_s * SECOND_NS) + COMMANDS_NS
+
+    def _stopped_at(self, bench: FaultyBench) -> bool:
+        """Whether nothing is in charge of the water any more."""
+        return not self._pump_enabled(bench) and bench.node.mode is not Mode.ACTIVE
 
     def _pump_enabled(self, bench: FaultyBench) -> bool:
         return bench.ship.drive is not None and bench.ship.drive.enabled
@@ -318,8 +367,19 @@ class Sea:
             watch.code.name,
             watch.active_ns is not None,
             watch.armed_again,
+            commanded_ms=after(log.commanded_until(start_ns)) or 0.0,
             steepest_pa_s=log.steepest_pa_s(start_ns),
         )
+
+
+def _note_what_was_said(outcome: Outcome, log: BusLog, start_ns: int) -> None:
+    """What others on the bus could know of the controller since the fault."""
+    shown = [status for time_ns, status in log.shown if time_ns >= start_ns]
+    if shown and shown[-1].mode is not None and shown[-1].fault is not None:
+        outcome.shown = f"{shown[-1].mode.name} {shown[-1].fault.name}"
+    told = {fault.name for time_ns, fault in log.told if time_ns >= start_ns}
+    outcome.told = tuple(sorted(told))
+    outcome.flags = tuple(flag for flag in FLAGS if any(getattr(s, flag) for s in shown))
 
 
 class _Moments:

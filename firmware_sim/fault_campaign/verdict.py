@@ -12,12 +12,19 @@ from utank_hil.runtime.panel import Action
 
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""
+CUT_MS: Final = 100.0
+"""The same of a fault that only ever stops: a ramp that began in its place would take longer."""
 RAMP_ZERO_MS: Final = 1040.0
 """And after a ramp began: a second, a cycle of the command and a tick of the drive."""
 STOPS: Final = {
     row.code.name
     for row in FAULTS
     if any(condition.reaction is Reaction.STOP for condition in row.conditions)
+}
+ONLY_STOPS: Final = {
+    row.code.name
+    for row in FAULTS
+    if all(condition.reaction is Reaction.STOP for condition in row.conditions)
 }
 RATE_SHARE: Final = 1.001
 ALARM_MS: Final = 100.0
@@ -86,7 +93,7 @@ class Result:
             "wire": self.wire,
             "roll_ratio": None if math.isnan(self.roll_ratio) else round(self.roll_ratio, 6),
             "roll_limit": self.row.roll_limit,
-            "roll_window_s": self.window_s,
+            "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
             "seeds": len(self.outcomes),
             "recording": self.recording or None,
         }
@@ -160,6 +167,8 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
         return row.zero_within_ms
     if row.reaction != "stop":
         return found_ms + RAMP_ZERO_MS
+    if outcome.code in ONLY_STOPS:
+        return found_ms + CUT_MS
     if outcome.code not in STOPS:
         found_ms = max(found_ms, row.within_ms or 0.0)
     return found_ms + STOP_ZERO_MS
@@ -186,15 +195,17 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         halved = [each for each in (outcome.halved_ms, outcome.found_ms) if each is not None]
         if not halved or min(halved) > row.halved_within_ms:
             yield f"pressure not halved within {row.halved_within_ms:.0f} ms"
-    if latched and found_ms is not None and outcome.mode == "ACTIVE":
-        yield "in charge again in the end"
-    elif latched and outcome.mode != "FAULT" and _is_reset(row):
-        yield f"reset while its cause lasts, to {outcome.mode}"
-    if latched and found_ms is not None and not row.hardwired_stop:
+    if latched and outcome.found_ms is not None and outcome.mode != "FAULT":
+        by = "reset while its cause lasts" if _is_reset(row) else "not latched: ended"
+        yield f"{by} in {outcome.mode}"
+    yield from _unsaid(row, outcome)
+    limit_ms = _zero_limit_ms(row, outcome) if latched else None
+    if limit_ms is not None:
         zero_ms = math.inf if outcome.zero_ms is None else outcome.zero_ms
-        limit_ms = _zero_limit_ms(row, outcome)
-        if limit_ms is not None and zero_ms > limit_ms:
+        if not row.hardwired_stop and zero_ms > limit_ms:
             yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
+        if not row.unheard and outcome.commanded_ms > limit_ms:
+            yield f"pressure commanded until {outcome.commanded_ms:.0f} ms, {limit_ms:.0f} allowed"
     ended_late = outcome.found_ms is None and outcome.code in row.may_end
     in_charge = outcome.mode == "ACTIVE" or ended_late
     if row.reaction in ("halve", "alarm", "note", "none") and not in_charge:
@@ -207,7 +218,8 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         yield "was not in charge before"
     if outcome.armed_again:
         yield "armed again by itself"
-    if row.codes and outcome.code not in row.codes and not _named_in_time(row, outcome):
+    beside = not latched and _named_in_time(row, outcome)
+    if row.codes and outcome.code not in row.codes and not beside:
         yield f"called {outcome.code}"
     limits = setup.config.limits
     if row.reaction != "stop" and outcome.steepest_pa_s > RATE_SHARE * limits.rate_pa_s:
@@ -216,3 +228,27 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         yield f"the drive refused {outcome.refused} commands"
     if not outcome.wire and row.faults:
         yield "the fault did not reach the bus"
+
+
+def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
+    """What CTRL_STATUS, ALARM and PUMP_CMD did not say, or not rightly."""
+    latched = row.reaction in ("stop", "ramp")
+    if outcome.beyond_share_pa > 0:
+        yield f"commanded {outcome.beyond_share_pa:.0f} Pa more than it may while degraded"
+    if row.unheard:
+        return
+    if latched and outcome.found_ms is not None:
+        if outcome.shown != f"FAULT {outcome.code}":
+            yield f"CTRL_STATUS shows {outcome.shown or 'nothing'} in the end"
+        if outcome.code not in outcome.told:
+            yield f"no alarm {outcome.code} was sent"
+    named = {*row.codes, *row.alarms} & set(outcome.told)
+    if row.reaction in ("alarm", "halve") and row.codes and not named:
+        yield "no alarm with its name was sent"
+    for name in row.alarms:
+        if name not in outcome.told:
+            yield f"no alarm {name} was sent"
+    halves = row.reaction == "halve" or row.halved_within_ms is not None
+    for flag in (*row.flags, *(["degraded"] if halves else [])):
+        if flag not in outcome.flags:
+            yield f"CTRL_STATUS never said {flag}"

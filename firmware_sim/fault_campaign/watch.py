@@ -1,11 +1,21 @@
 """What happens on the bench after a fault: a node that looks on, and a log of the bus."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from itertools import pairwise, zip_longest
 from typing import Any
 
 from firmware_sim.faulty_bench import FaultyBench
-from utank_hil.canbus import Fault, Frame, Mode, PumpCommand, load_catalogue
+from utank_hil.canbus import (
+    Alarm,
+    ControllerStatus,
+    Fault,
+    Frame,
+    Mode,
+    PumpCommand,
+    load_catalogue,
+)
+from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.supervisor import Demand
@@ -15,18 +25,24 @@ Heard = tuple[int, int, bytes]
 """Time, identifier and data of a frame on the bus."""
 
 _COMMANDS = load_catalogue().codec(PumpCommand)
+_STATUS = load_catalogue().codec(ControllerStatus)
+_ALARMS = load_catalogue().codec(Alarm)
 ROUNDING_PA = 8.0
 JITTER_S = 0.002
 
 
 class BusLog:
-    """Every frame on the bus, and the controller's pump commands.
+    """Every frame on the bus, and what the controller commanded and said.
 
     Attributes
     ----------
     frames : list
     commands : list of tuple of (int, float, bool)
         Time, pressure, and whether the pressure was to be cut.
+    shown : list of tuple of (int, ControllerStatus)
+        CTRL_STATUS.
+    told : list of tuple of (int, Fault)
+        Alarms that ALARM carried.
     node : ControllerNode
         Whose commands they are; to be set before the first frame.
     """
@@ -36,15 +52,32 @@ class BusLog:
     def __init__(self) -> None:
         self.frames: list[Heard] = []
         self.commands: list[tuple[int, float, bool]] = []
+        self.shown: list[tuple[int, ControllerStatus]] = []
+        self.told: list[tuple[int, Fault]] = []
 
     def __call__(self, time_ns: int, sender: str, frame: Frame) -> None:
         """Take a frame."""
         self.frames.append((time_ns, frame.can_id, frame.data))
-        if sender == "controller" and frame.can_id == _COMMANDS.can_id and len(frame.data) == 8:
+        if sender != "controller" or len(frame.data) != FRAME_BYTES:
+            return
+        if frame.can_id == _COMMANDS.can_id:
             command = _COMMANDS.decode(frame.data)
             if command is not None:
                 cut = self.node.supervisor.demand is Demand.ZERO
                 self.commands.append((time_ns, command.pressure_pa, cut))
+        elif frame.can_id == _STATUS.can_id:
+            status = _STATUS.decode(frame.data)
+            if status is not None:
+                self.shown.append((time_ns, status))
+        elif frame.can_id == _ALARMS.can_id:
+            alarm = _ALARMS.decode(frame.data)
+            if alarm is not None and alarm.code:
+                self.told.append((time_ns, alarm.code))
+
+    def commanded_until(self, since_ns: int) -> int:
+        """When the last command was sent that was not zero."""
+        pressed = [time_ns for time_ns, pressure_pa, _ in self.commands if abs(pressure_pa) > 0]
+        return max([since_ns, *pressed])
 
     def steepest_pa_s(self, since_ns: int) -> float:
         """Greatest rate of the commands, but of a cut, rounding taken off."""
@@ -81,6 +114,10 @@ class Watch:
         As in `Row`.
     codes : collection of str
         As in `Row`.
+    within_ms : float, optional
+        As in `Row`.
+    degraded_most : tuple of (float, int)
+        Pressure that is allowed while the pressure is halved, and in how many ns it is reached.
 
     Attributes
     ----------
@@ -88,13 +125,16 @@ class Watch:
         When the controller was first in charge; latched a fault; halved the pressure; rejected,
         missed or discarded anything; raised an alarm of `codes`.
     over_ns : int or None
-        When what `counts_from` asks for was first so, or last became so for the pressure.
+        When what `counts_from` asks for was first so; for the pressure, when it first became so and
+        stayed so until found, or for as long as the row gives time.
     pressed_ns : int
         When the drive's set-point last was not zero, or the valve last followed.
     code : Fault
         First one that was latched; while none is, what is shown.
     armed_again : bool
         In charge once more after a fault.
+    beyond_share_pa : float
+        How far the drive's set-point went beyond `degraded_most`.
     roll_sum, roll_square, samples : float
         Of the true roll, every tick.
     """
@@ -109,8 +149,11 @@ class Watch:
         operator: Iterable[TimedAction] = (),
         counts_from: Mapping[Any, float] | None = None,
         codes: Collection[str] = (),
+        within_ms: float | None = None,
+        degraded_most: tuple[float, int] = (math.inf, 0),
     ) -> None:
         self._bench = bench
+        self._within_ns = math.inf if within_ms is None else within_ms * 1e6
         self._script = sorted(operator, key=lambda timed: timed.time_s)
         self._start_ns: int | None = None
         self._counts_from = dict(counts_from or {})
@@ -126,6 +169,9 @@ class Watch:
         self.pressed_ns = now_ns - TICK_NS
         self.code = Fault.NONE
         self.armed_again = self._waited = False
+        self._degraded_most = degraded_most
+        self._degraded_ns: int | None = None
+        self.beyond_share_pa = 0.0
         self.roll_sum = self.roll_square = 0.0
         self.samples = 0
 
@@ -167,6 +213,7 @@ class Watch:
                 self.active_ns = now_ns
             if self.halved_ns is None and supervisor.degraded:
                 self.halved_ns = now_ns
+        self._look_at_share(now_ns, degraded=mode is Mode.ACTIVE and supervisor.degraded)
         if self.found_ns is None and (node.fault is not Fault.NONE or self._waited):
             self.code = node.fault
         self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
@@ -186,11 +233,25 @@ class Watch:
         roll = ship.plant.roll_rad
         for name, limit in self._counts_from.items():
             if self._apart(name) <= limit:
-                if name == "pressure_pa" and self.found_ns is None:
-                    self.over_ns = None  # a pump may cross its set-point
+                # a pump may cross its set-point; what was there for long was to be found
+                long = self.over_ns is not None and now_ns - self.over_ns > self._within_ns
+                if name == "pressure_pa" and self.found_ns is None and not long:
+                    self.over_ns = None
             elif self.over_ns is None:
                 self.over_ns = now_ns
         self.roll_sum += roll
         self.roll_square += roll * roll
         self.samples += 1
         return ()
+
+    def _look_at_share(self, now_ns: int, *, degraded: bool) -> None:
+        """Note by how much the drive was asked for more than half the pressure allows."""
+        drive, (most_pa, within_ns) = self._bench.ship.drive, self._degraded_most
+        if not degraded or drive is None:
+            self._degraded_ns = None
+            return
+        if self._degraded_ns is None:
+            self._degraded_ns = now_ns
+        if now_ns - self._degraded_ns > within_ns:
+            beyond_pa = abs(drive.setpoint_pa) - most_pa - ROUNDING_PA
+            self.beyond_share_pa = max(self.beyond_share_pa, beyond_pa)

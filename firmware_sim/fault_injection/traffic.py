@@ -15,7 +15,7 @@ from firmware_sim.fault_injection.fault import (
     NodeName,
 )
 from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
-from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span
+from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.canbus import Frame, Station, load_catalogue
@@ -190,7 +190,9 @@ class _Sender:
         self.period_ns = codec.cycle_ns or 10_000_000
         self._once = not codec.cycle_ns
         self._span, self._codec = span, codec
-        self._counter = fault.counter
+        self._counter = fault.ahead - 1
+        self._ahead = fault.ahead
+        self.heard = Spoiled(Span(-NEVER_NS), self._follow, codec.can_id)
         hints = kind.__annotations__
         self._message = kind(
             **{field: value_of(hints[field], value) for field, value in fault.values.items()}
@@ -199,6 +201,12 @@ class _Sender:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Hear nothing."""
+
+    def _follow(self, frame: Frame, after_s: float) -> Iterable[Frame]:  # noqa: ARG002
+        """Note the counter of a frame of the real sender, up to the first one of its own."""
+        if not self._done and self._codec.protected and len(frame.data) > 1:
+            self._counter = frame.data[1] + self._ahead - 1
+        return (frame,)
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Send."""
@@ -215,8 +223,8 @@ class Impostor(Fault):
     kind: Literal["impostor"]
     message: AnyMessageName
     values: dict[str, float | bool | str | None]
-    counter: Annotated[int, Field(ge=0, le=15)] = 0
-    """Of the last frame before its first one."""
+    ahead: Annotated[int, Field(ge=0, le=15)] = 1
+    """By so much the counter of its first frame is ahead of that of the real one before."""
 
     @model_validator(mode="after")
     def _known_values(self) -> "Impostor":
@@ -234,7 +242,11 @@ class Impostor(Fault):
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Join the bus."""
-        bench.joining.append(_Sender(f"impostor {len(bench.joining)}", self, span))
+        sender = _Sender(f"impostor {len(bench.joining)}", self, span)
+        real = bench.nodes.get(NODE_OF.get(load_catalogue().named(self.message).source, ""))
+        if real is not None:
+            real.spoiled.append(sender.heard)
+        bench.joining.append(sender)
 
 
 class SecondPanel(Fault):

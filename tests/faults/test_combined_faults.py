@@ -105,7 +105,7 @@ def faults_of(message: str, node: str) -> dict[str, dict[str, Strategy]]:
         "gateway": {
             "does": st.sampled_from(["loses", "doubles", "changes", "swaps"]), "share": SHARE
         },
-        "impostor": {"values": st.fixed_dictionaries(values), "counter": st.integers(0, 15)},
+        "impostor": {"values": st.fixed_dictionaries(values), "ahead": st.integers(0, 15)},
     }  # fmt: skip
     if not numbers:
         for kind in ("offset", "scale", "drift", "noise", "spikes", "sign", "late"):

@@ -82,6 +82,19 @@ class NodeGroup:
         self._due_ns = [now_ns] * len(self._nodes)
         self.next_tick_ns = now_ns
 
+    def joined_by(self, nodes: Sequence[Node], now_ns: int) -> "NodeGroup":
+        """The group with more nodes: these are due now, the others when they were to be.
+
+        Raises
+        ------
+        ValueError
+            As of a new group.
+        """
+        group = NodeGroup([*self._nodes, *nodes])
+        group._due_ns = [*self._due_ns, *([now_ns] * len(nodes))]
+        group.next_tick_ns = now_ns
+        return group
+
     def tick(self, now_ns: int, send: Send) -> None:
         """Tick every due node once and pass its frames to `send`.
 

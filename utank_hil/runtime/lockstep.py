@@ -41,9 +41,6 @@ class Lockstep:
         By default a new one of 250 kbit/s.
     trace : callable, optional
         Receives every frame before the nodes do, like a logger on the bus.
-    start_ns : int
-        Other than 0 to go on with a bus that is there already, and with more nodes. Those that were
-        there must come first, in their order, and be due now.
 
     Attributes
     ----------
@@ -63,13 +60,21 @@ class Lockstep:
         nodes: Sequence[Node],
         bus: Bus | None = None,
         trace: Trace | None = None,
-        start_ns: int = 0,
     ) -> None:
         self._group = NodeGroup(nodes)
-        self._group.start(start_ns)
         self._trace = trace
         self.bus: Bus = SimulatedBus() if bus is None else bus
-        self.now_ns = start_ns
+        self.now_ns = 0
+
+    def join(self, nodes: Sequence[Node]) -> None:
+        """Have more nodes on the bus from now on, after the others; those keep their cycles.
+
+        Raises
+        ------
+        ValueError
+            If a name comes twice, or a period is not positive.
+        """
+        self._group = self._group.joined_by(nodes, self.now_ns)
 
     def run_until(self, time_ns: int) -> None:
         """Run every event before `time_ns`.
