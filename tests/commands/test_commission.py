@@ -204,14 +204,16 @@ def test_a_record_is_on_the_disk_before_it_takes_the_place_of_the_one_before(
 
     def fsync(descriptor: int) -> None:
         written = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
-        on_disk.append((written.parent, written.read_text(), path.read_text()))
+        content = written.name if written.is_dir() else written.read_text()
+        on_disk.append((written.parent, content, path.read_text()))
 
     monkeypatch.setattr(os, "fsync", fsync)
     with path.open() as read_meanwhile:
         write_record(path, {"passed": False})
         assert read_meanwhile.read() == before
     # in the same folder: what takes the place of another in one step is on the same disk
-    assert on_disk == [(file.parent, path.read_text(), before)]
+    after, folder = path.read_text(), file.parent
+    assert on_disk == [(folder, after, before), (folder.parent, folder.name, after)]
     assert json.loads(path.read_text()) == {"passed": False}
 
 
@@ -295,6 +297,27 @@ def test_ended_before_the_end_it_writes_nothing(
     result = commission(monkeypatch, Short, file)
     assert result.exit_code == ExitCode.INTERRUPTED
     assert not record_path(file).exists()
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_the_record_before_is_void_whatever_hinders_the_new_one(
+    file: Path, monkeypatch: pytest.MonkeyPatch, *, full: bool
+) -> None:
+    class Stopped(AtTheQuay):
+        script = (*AtTheQuay.script, TimedAction(24.0, Action.STOP))
+
+    def fails(*_: object) -> None:
+        raise OSError(28, "No space left on device") if full else ZeroDivisionError("a defect")
+
+    assert commission(monkeypatch, AtTheQuay, file).exit_code == ExitCode.OK
+    assert reason(file) == ""
+    monkeypatch.setattr(module, "write_record" if full else "make_record", fails)
+    result = commission(monkeypatch, Stopped, file)
+    assert "there is no record" in reason(file)
+    if full:
+        assert result.exit_code == ExitCode.USAGE
+        assert "ended early: Disarmed before the end." in result.stdout
+        assert "can't be written: No space left on device" in result.stderr
 
 
 def test_stopped_by_the_operator_it_is_not_passed(

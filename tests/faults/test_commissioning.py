@@ -22,6 +22,7 @@ from utank_hil.canbus import (
     Mode,
     PumpCommand,
     SensorMotion,
+    SensorPump,
     SensorTank,
     Switch,
 )
@@ -142,6 +143,14 @@ def test_a_pump_that_turns_the_other_way_is_weak_or_stalled_is_named(
     found = failed(commissioned(NAVAL, spoil={"controller": altered(PumpCommand, wrong)}))
     assert word in found.pop("pressure")
     assert bool(found) is (factor == 0.0)
+
+
+def test_a_pressure_sensor_that_sends_nothing_but_zero_is_named() -> None:
+    def dead(pump: SensorPump) -> SensorPump:
+        return pump._replace(pressure_pa=0.0)
+
+    found = failed(commissioned(NAVAL, spoil={"sensors": altered(SensorPump, dead)}))
+    assert "no pressure" in found["pressure"]
 
 
 def test_another_tank_and_another_loading_fail_by_their_periods() -> None:

@@ -10,7 +10,12 @@ from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
-from utank_hil.commands.commissioning_record import make_record, record_path, write_record
+from utank_hil.commands.commissioning_record import (
+    make_record,
+    record_path,
+    remove_record,
+    write_record,
+)
 from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.lines import Lines, printed_lines
@@ -90,17 +95,25 @@ def commission(
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
         fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)
+    # the last commissioning counts: what came of the one before is void, whatever happens now
+    unwritten = ""
+    try:
+        remove_record(path)
+    except OSError as error:
+        unwritten = f"{path}: the record before can't be removed: {error.strerror}; remove it"
     made = make_record(loaded, config, channel, node.checks(), node.ended)
     try:
         write_record(path, made)
     except OSError as error:
-        fail(f"{path}: the record can't be written: {error.strerror}")
+        unwritten = f"{path}: the record can't be written: {error.strerror}"
     # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
     with suppress(OSError, SystemExit):
         if json_:
             print_json({**made, "record": str(path)})
         else:
             _print(made, path, config)
+    if unwritten:
+        fail(unwritten)
     raise typer.Exit(ExitCode.OK if made["passed"] else ExitCode.REFUSED)
 
 

@@ -101,6 +101,28 @@ def write_record(path: Path, record: dict[str, Any]) -> None:
         except BaseException:
             os.unlink(file.name)
             raise
+    _sync(path.parent)
+
+
+def remove_record(path: Path) -> None:
+    """Remove a record, if there is one, also in case of a power cut.
+
+    Raises
+    ------
+    OSError
+        If it can't be removed.
+    """
+    path.unlink(missing_ok=True)
+    _sync(path.parent)
+
+
+def _sync(folder: Path) -> None:
+    """Bring what a folder holds to the disk: a file's own sync does not."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: Path | None) -> str:

@@ -84,8 +84,11 @@ def judge_pulses(
     water_kg_m = plant.tank.density_kg_m3 * plant.tank.reservoir_area_m2
     push = -(mass[1, 0] * roll[_BEND] + stiffness[1, 0] * roll[_VALUE]) / water_kg_m
     pushed = pressure[_VALUE] / plant.tank.density_kg_m3
+    # a pressure of nothing but zero fits any water: there is then no equation
     fits = [
-        _least_squares([*gauge, -push], pushed) if _moves(gauge, plan.level_m) else None
+        _least_squares([*gauge, -push], pushed)
+        if _moves(gauge, plan.level_m) and pushed.any()
+        else None
         for gauge in (port, starboard)
     ]
     gauges = [0.0 if fit is None else 2 * GRAVITY_M_S2 / float(fit[_VALUE]) for fit in fits]
