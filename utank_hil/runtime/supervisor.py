@@ -21,6 +21,8 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 _ACTIVE: Final = Mode.ACTIVE
 _NO_FAULT: Final = Fault.NONE
 DISARMED_ZERO_WITHIN_MS: Final = 1000
+PASSIVE_WITHIN_NS: Final = 2_000_000_000
+"""So long PASSIVE that was asked for, and can't be entered yet, is due."""
 """When the pressure is cut after disarming, even if the ramp has not come to its end."""
 RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
@@ -69,7 +71,7 @@ class Supervisor:
         self.raised = self.reset_refused_by = Fault.NONE
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
-        self._passive_due = False
+        self._passive_until_ns = 0
         self._begin_noting(0)
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
@@ -84,9 +86,12 @@ class Supervisor:
         if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
             return
-        # asked for once, it is due until it is there or something else is asked for
-        asked = (seen.passive_edge or self._passive_due) and self.mode is not Mode.PASSIVE
-        self._passive_due = asked and seen.requested_mode is Mode.PASSIVE and not seen.stop
+        # asked for once, it is due until it is there, or something else is asked for, or it is old
+        if seen.passive_edge:
+            self._passive_until_ns = now_ns + PASSIVE_WITHIN_NS
+        asked = now_ns < self._passive_until_ns and self.mode is not Mode.PASSIVE
+        if not asked or seen.requested_mode is not Mode.PASSIVE or seen.stop:
+            self._passive_until_ns = 0
         if self.mode is Mode.FAULT:
             self._while_faulted(seen, now_ns)
         else:
@@ -161,7 +166,7 @@ class Supervisor:
             if not ramping:
                 self._disarm(Mode.STANDBY)
         # an old order says nothing of now
-        elif self._passive_due and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms:
+        elif self._passive_until_ns and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms:
             self._disarm(Mode.PASSIVE)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:
