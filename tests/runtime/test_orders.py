@@ -50,6 +50,16 @@ def test_stop_and_disarm_are_heard_once_from_any_intact_frame(lost: int) -> None
         assert wishes.armed
 
 
+@pytest.mark.parametrize("mode", [*(mode for mode in Mode if mode is not Mode.ACTIVE), None])
+@pytest.mark.parametrize("lost", [0, 5])
+def test_another_mode_disarms_from_any_intact_frame(lost: int, mode: Mode | None) -> None:
+    line = Line()
+    line.say()
+    assert line.orders.take().armed
+    line.say(lost=lost, mode_request=mode)
+    assert not line.orders.take().armed
+
+
 def test_what_is_pressed_in_the_first_frame_is_no_edge() -> None:
     line = Line()
     line.say(arm=True, reset=True, retune=True, undo=True)

@@ -37,6 +37,7 @@ class Wishes(NamedTuple):
 
 
 _NOTHING: Final = RetuningOrder()
+_ACTIVE: Final = Mode.ACTIVE
 _PASSIVE: Final = Mode.PASSIVE
 # a NamedTuple's own constructor takes twice the time
 _new: Final = tuple.__new__
@@ -92,8 +93,8 @@ class Orders:
             self.news = True
             self._stop_heard |= heard.stop
             # where it was not pressed before, what is pressed later in the tick counts
-            released = self.last is None or self.last.arm
-            self._disarm_heard |= released and not heard.arm
+            before = self.last is None or _arms(self.last)
+            self._disarm_heard |= before and not _arms(heard)
         return order
 
     def begin_anew(self) -> None:
@@ -165,3 +166,8 @@ class Orders:
         """Return the codes of the alarms that were accepted since the last call; None for all."""
         accepted, self._accepted = self._accepted, []
         return accepted
+
+
+def _arms(order: OperatorCommand) -> bool:
+    """Whether it asks for the law; any other mode disarms, too."""
+    return order.arm and order.mode_request is _ACTIVE
