@@ -31,6 +31,8 @@ _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 
 MOST_PRESSURE_PA: Final = 250e3
 """What PUMP_CMD can ask for: the codec cuts what is more, and the controller would not know."""
+LEAST_PAUSE_S: Final = 600.0
+"""Least time between two scheduled retunings."""
 MOST_PULSES_S: Final = 3600.0
 """Longest identification: the pulses and the record are kept in memory."""
 
@@ -188,6 +190,16 @@ class ControllerConfig(Section):
                     f"most, got {shortest_s:g} and {longest_s:g}",
                 )
             )
+        if settings.every_s is not None and settings.every_s < LEAST_PAUSE_S:
+            reason = (
+                f"must be {LEAST_PAUSE_S:g} or more, got {settings.every_s:g}: during the pulses, "
+                "and for six roll periods after, no law is compared with the passive ship"
+            )
+            problems.append(("every_s", reason))
+        highest_rad_s = math.pi / period_s
+        if settings.excitation.band[1] >= highest_rad_s:
+            reason = f"must stay below {highest_rad_s:.3g}, half of the law's sampling"
+            problems.append(("excitation.band_rad_s", reason))
         if settings.identification_s > MOST_PULSES_S:
             reason = f"must be {MOST_PULSES_S:g} at most, got {settings.identification_s:g}"
             problems.append(("identification_s", reason))

@@ -87,7 +87,8 @@ class RetuningSettings:
     roll_limit_rad : float
         Roll at which an identification is aborted; at most the largest of `SafetyLimits`.
     every_s : float or None
-        Time between two scheduled retunings; None: no schedule.
+        Time from the end of a retuning to the next scheduled one, in a controller's file 600 s or
+        more; None: no schedule.
     change_factor : float or None
         Retune when the ship that the motion tells differs from the law's by this factor in roll
         period, or in the root of the stiffness (`ChangeMonitor`); None: not monitored.
