@@ -27,6 +27,8 @@ ONLY_STOPS: Final = {
     if all(condition.reaction is Reaction.STOP for condition in row.conditions)
 }
 RATE_SHARE: Final = 1.001
+STATUS_MS: Final = 200.0
+"""Two cycles of CTRL_STATUS: what is so for less need not be in one."""
 ALARM_MS: Final = 100.0
 """The list of alarms is renewed, and looked at, ten times a second."""
 
@@ -248,7 +250,14 @@ def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
     for name in row.alarms:
         if name not in outcome.told:
             yield f"no alarm {name} was sent"
-    halves = row.reaction == "halve" or row.halved_within_ms is not None
+    halves = row.reaction == "halve" or (row.halved_within_ms is not None and _halved_long(outcome))
     for flag in (*row.flags, *(["degraded"] if halves else [])):
         if flag not in outcome.flags:
             yield f"CTRL_STATUS never said {flag}"
+
+
+def _halved_long(outcome: Outcome) -> bool:
+    """Whether the pressure was halved for long enough, before the fault was latched, to be said."""
+    if outcome.halved_ms is None:
+        return False
+    return outcome.found_ms is None or outcome.found_ms - outcome.halved_ms > STATUS_MS

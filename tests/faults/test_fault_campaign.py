@@ -234,6 +234,15 @@ def test_what_the_bus_was_not_told_fails_the_row(
     assert [words in why for why in wrong.problems] == [True]
 
 
+@pytest.mark.parametrize(("halved_ms", "passed"), [(799.0, False), (800.0, True), (None, True)])
+def test_what_was_halved_for_less_than_two_cycles_need_not_be_in_a_status(
+    halved_ms: float | None, *, passed: bool
+) -> None:
+    latched = replace(GOOD, code="VOLUME", found_ms=1000.0, zero_ms=1200.0, halved_ms=halved_ms)
+    assert verdict("naval-level-offset", replace(said("naval-level-offset", latched), flags=())
+                   ).passed is passed  # fmt: skip
+
+
 def test_where_the_bus_is_full_nothing_is_asked_of_what_was_said() -> None:
     full = replace(GOOD, code="BUS_OVERLOAD", found_ms=800.0, zero_ms=820.0)
     assert verdict("flood-by-known-identifier", full).passed
