@@ -192,6 +192,14 @@ def test_a_valve_that_fails_ends_at_its_fail_position_and_at_zero_pressure(
     assert bench.pressure_pa == 0
 
 
+def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault() -> None:
+    bench = ValveBench()
+    bench.reports = False
+    bench.run(500)
+    assert not bench.node.seen.valve_fault
+    assert bench.node.fault is Fault.VALVE_SILENT
+
+
 @pytest.mark.parametrize("silent", ["motion", "tank"])
 def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(silent: str) -> None:
     bench = throttling()
