@@ -97,3 +97,17 @@ def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago() -> N
     pushed_m_s = 20e3 * 0.4 / (VESSEL.tank.density_kg_m3 * VESSEL.tank.effective_length_m)
     assert bench.pressure_pa == 0
     assert abs(bench.level.rate_m_s - settled_m_s) < 0.1 * pushed_m_s
+
+
+@pytest.mark.parametrize(("age_ns", "pressure_pa"), [(100_000_000, 7e3), (100_000_001, 0.0)])
+def test_a_pressure_counts_for_a_tenth_of_a_second(
+    age_ns: int, pressure_pa: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = ControllerBench()
+    bench.run(200)
+    predicted: list[float] = []
+    monkeypatch.setattr(type(bench.level), "predict", lambda _, each: predicted.append(each))
+    later_ns, inbox = bench.now_ns + 10**9, bench.node.inbox
+    inbox.pressure_pa, inbox.pump_ns = 7e3, later_ns - age_ns
+    bench.node._estimate(later_ns)
+    assert predicted == [pressure_pa]
