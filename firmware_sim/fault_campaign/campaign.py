@@ -30,7 +30,7 @@ def _fault_name(name: str) -> str:
 FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
-StatusFlag = Literal["alarm", "degraded", "saturated"]
+StatusFlag = Literal["degraded", "saturated"]
 Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]
 REACTIONS: Final[dict[Reaction, str]] = {
     "stop": "zero pressure at once, latched",

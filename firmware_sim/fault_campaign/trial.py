@@ -82,7 +82,7 @@ class Outcome:
     commanded_ms : float
         When it last sent a pressure other than zero, at the latest when the bus was followed last.
     beyond_share_pa : float
-        How far its commands went beyond half the pressure while it said `degraded`.
+        How far the drive's set-point went beyond half the pressure while the pressure was halved.
     refused : int
         Commands that the drive refused.
     steepest_pa_s : float

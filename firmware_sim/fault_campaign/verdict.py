@@ -8,7 +8,6 @@ from typing import Any, Final
 from firmware_sim.fault_campaign.campaign import Row, Setup
 from firmware_sim.fault_campaign.trial import Outcome
 from utank_hil.runtime.faults import FAULTS, Reaction
-from utank_hil.runtime.panel import Action
 
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""
@@ -134,10 +133,6 @@ def judged(row: Row, setup: Setup, requirement: str, outcomes: Sequence[Outcome]
     )
 
 
-def _is_reset(row: Row) -> bool:
-    return any(order.action is Action.RESET for order in row.operator)
-
-
 def _worst(times_ms: Sequence[float | None]) -> float | None:
     known = [each for each in times_ms if each is not None]
     return round(max(known), 3) if known and len(known) == len(times_ms) else None
@@ -198,8 +193,7 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
         if not halved or min(halved) > row.halved_within_ms:
             yield f"pressure not halved within {row.halved_within_ms:.0f} ms"
     if latched and outcome.found_ms is not None and outcome.mode != "FAULT":
-        by = "reset while its cause lasts" if _is_reset(row) else "not latched: ended"
-        yield f"{by} in {outcome.mode}"
+        yield f"not latched: ended in {outcome.mode}"
     yield from _unsaid(row, outcome)
     limit_ms = _zero_limit_ms(row, outcome) if latched else None
     if limit_ms is not None:
@@ -233,7 +227,7 @@ def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
 
 
 def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
-    """What CTRL_STATUS, ALARM and PUMP_CMD did not say, or not rightly."""
+    """What the bus was not told, or told wrongly."""
     latched = row.reaction in ("stop", "ramp")
     if outcome.beyond_share_pa > 0:
         yield f"commanded {outcome.beyond_share_pa:.0f} Pa more than it may while degraded"

@@ -96,16 +96,15 @@ def commission(
     if node.stage is not Stage.DONE:
         fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)
     # the last commissioning counts: what came of the one before is void, whatever happens now
-    unwritten = ""
-    try:
+    with suppress(OSError):  # what can't be removed can't be replaced either, and that is said
         remove_record(path)
-    except OSError as error:
-        unwritten = f"{path}: the record before can't be removed: {error.strerror}; remove it"
     made = make_record(loaded, config, channel, node.checks(), node.ended)
+    unwritten = ""
     try:
         write_record(path, made)
     except OSError as error:
-        unwritten = f"{path}: the record can't be written: {error.strerror}"
+        left = "; remove the one that is there" if path.exists() else ""
+        unwritten = f"{path}: the record can't be written: {error.strerror}{left}"
     # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
     with suppress(OSError, SystemExit):
         if json_:

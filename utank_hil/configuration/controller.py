@@ -196,8 +196,9 @@ class ControllerConfig(Section):
                 "and for six roll periods after, no law is compared with the passive ship"
             )
             problems.append(("every_s", reason))
-        highest_rad_s = math.pi / period_s
-        if settings.excitation.band[1] >= highest_rad_s:
+        highest_rad_s, excitation = math.pi / period_s, settings.excitation
+        banded = excitation.kind in ("multisine", "chirp")
+        if banded and excitation.band[1] >= highest_rad_s:
             reason = f"must stay below {highest_rad_s:.3g}, half of the law's sampling"
             problems.append(("excitation.band_rad_s", reason))
         if settings.identification_s > MOST_PULSES_S:

@@ -34,9 +34,9 @@ from utank_hil.runtime.faults import FAULTS
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.judging import all_halving, first_stopping
-from utank_hil.runtime.monitoring import Monitors
+from utank_hil.runtime.monitoring import STALE_MS, Monitors
 from utank_hil.runtime.monitors.thresholds import DEGRADED_SHARE
-from utank_hil.runtime.observations import Observer
+from utank_hil.runtime.observations import MILLISECOND_NS, Observer
 from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.runtime.signals import SIGNALS, put_quick, put_slow
@@ -48,8 +48,8 @@ from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 NANOSECONDS: Final = 1e-9
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
-FRESH_PRESSURE_NS: Final = 100_000_000
-"""In the place of an older pressure the level is predicted with the command."""
+FRESH_PRESSURE_NS: Final = round(STALE_MS * MILLISECOND_NS)
+"""In the place of an older pressure the level is predicted with the command, as the twin's roll."""
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE

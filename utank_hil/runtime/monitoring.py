@@ -403,8 +403,6 @@ class Monitors:
         )
         self._used.water = water
         wrong = water or self._used.watch.found & _MOTION_SIGN
-        if equation.settled:
-            self._unwatched_s, self._of_watch = 0.0, 0
         self.confirmed = not wrong and (self.confirmed or equation.obeyed)
         motions, spare = inbox.motions, self._spare
         if motions is None or spare is None:
@@ -423,8 +421,9 @@ class Monitors:
         """Note for how long, with measurements that come, nothing was told by the water."""
         shortest_s = UNWATCHED_PERIODS * self.thresholds.roll_period_s
         longest_s = LONG_PERIODS * self.thresholds.roll_period_s
-        # of a silence, which others judge, no more counts than of a gap
-        if oldest_ms <= SILENT_S * 1e3 and not self._used.equation.settled:
+        if self._used.equation.settled:
+            self._unwatched_s = 0.0
+        elif oldest_ms <= SILENT_S * 1e3:  # of a silence, which others judge, no more than of a gap
             self._unwatched_s += min((now_ns - self._looked_ns) * 1e-9, SILENT_S)
         self._looked_ns = now_ns
         unwatched = self._unwatched_s > shortest_s

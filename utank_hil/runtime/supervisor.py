@@ -21,9 +21,9 @@ from utank_hil.runtime.safety_limits import SafetyLimits
 _ACTIVE: Final = Mode.ACTIVE
 _NO_FAULT: Final = Fault.NONE
 DISARMED_ZERO_WITHIN_MS: Final = 1000
+"""When the pressure is cut after disarming, even if the ramp has not come to its end."""
 PASSIVE_WITHIN_NS: Final = 2_000_000_000
 """So long PASSIVE that was asked for, and can't be entered yet, is due."""
-"""When the pressure is cut after disarming, even if the ramp has not come to its end."""
 RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
 DEPARTURES: Final = 2.0
