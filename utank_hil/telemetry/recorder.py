@@ -394,7 +394,13 @@ def _main() -> None:
         RecorderReport(**content.pop("report", {"rows": 0, "lost": 0, "parts": 0})),
         Places(**content.pop("places", {})),
     )
-    failing = content.pop("failing", "")
+    failing, is_new = content.pop("failing", ""), content.pop("is_new", False)
+    if failing:
+        if is_new:
+            _complain(arguments.file, f"{failing}; tried again every {_RETRY_S:g} s")
+        if signal.sigtimedwait(_ENDING, _RETRY_S) is not None:
+            _print_json({"error": failing})
+            sys.exit(1)
     try:
         if "rings" not in content:
             os.nice(_NICENESS)
@@ -413,15 +419,18 @@ def _main() -> None:
             begun = part_of(arguments.file, progress.report.parts + 1)
             for suffix in SUFFIXES:  # of a part that has nothing yet
                 begun.with_suffix(suffix).unlink(missing_ok=True)
+            # at once: Rerun's threads would write on as soon as there is room, after a hole
+            _go_on(content | asdict(progress) | {"failing": reason, "is_new": reason != failing})
         if reason != failing:
-            with contextlib.suppress(OSError):  # a terminal that is gone
-                then = f"; tried again every {_RETRY_S:g} s" if again else ""
-                print(f"recording {arguments.file} failed: {reason}{then}", file=sys.stderr)
-                sys.stderr.flush()
-        if again and signal.sigtimedwait(_ENDING, _RETRY_S) is None:
-            _go_on(content | asdict(progress) | {"failing": reason})
+            _complain(arguments.file, reason)
         _print_json({"error": reason})
         os._exit(1)  # Rerun's exit hook would wait forever for a dead writer
+
+
+def _complain(file: Path, reason: str) -> None:
+    with contextlib.suppress(OSError):  # a terminal that is gone
+        print(f"recording {file} failed: {reason}", file=sys.stderr)
+        sys.stderr.flush()
 
 
 def _nobody_writes(ring: str) -> bool:

@@ -168,17 +168,23 @@ def read_about(path: Path) -> dict[str, Any]:
 
 
 def _chunks(path: Path, component: str) -> list[Chunk]:
-    """Return the chunks with a component; a file truncated within a message is repaired first."""
+    """Return the chunks with a component; of a damaged file, those that can be read.
+
+    A killed recorder leaves it cut, a disk that was full for a time with a hole, a power cut with
+    zeros.
+    """
     try:
         return _read_chunks(path, component)
     except RuntimeError as error:
-        if "exceeds file size" not in str(error):
-            raise ValueError(f"{path}: {error}") from error
-    with tempfile.TemporaryDirectory() as folder:
-        repaired = Path(folder) / path.name
-        command = [rerun_binary(), "rrd", "optimize", str(path), "-o", str(repaired)]
-        subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
-        return _read_chunks(repaired, component)
+        with tempfile.TemporaryDirectory() as folder:
+            intact = Path(folder) / path.name
+            command = [rerun_binary(), "rrd", "optimize", "--continue-on-error"]
+            command += [str(path), "-o", str(intact)]
+            try:
+                subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
+                return _read_chunks(intact, component)
+            except (subprocess.CalledProcessError, RuntimeError):
+                raise ValueError(f"{path}: {error}") from error
 
 
 def _read_chunks(path: Path, component: str) -> list[Chunk]:
