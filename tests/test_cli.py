@@ -20,6 +20,8 @@ from utank_hil.telemetry.recording import read_recording
 
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
+DESIGNED_LONG = {"naval_self_tuning", "patti_b_self_tuning", "self_tuning"}
+"""Laws that take ten seconds; `self_tuned` is the same kind."""
 BIN = Path(sys.executable).parent
 RESULTS = ("out/bench.rrd", "out/gpc.frames")
 """Of `utank-hil bench --frames`, for the examples."""
@@ -69,7 +71,15 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(
+            path, id=path.stem, marks=[pytest.mark.evidence] * (path.stem in DESIGNED_LONG)
+        )
+        for path in SHIPPED
+    ],
+)
 def test_shipped_controllers_pass_their_check(path: Path) -> None:
     result = invoke(app, "check", path, "--json")
     assert result.exit_code == 0

@@ -20,6 +20,7 @@ COPIED = ("configs", "docs", "firmware_sim", "tests", "tools", "utank_hil", "pyp
 ROW = re.compile(r"^\| \d+ \| `(\S+)` \|", re.M)
 CHANGING = [page for page in HOW_TO if "```diff" in page.read_text(encoding="utf-8")]
 WRITTEN = {"docs/configuration.md"}
+TAKES_LONG = {"fault"}
 ALSO = ("catalogue", "codec", "e2e")
 """Tests of the bus, beside those that a page changes."""
 
@@ -67,7 +68,13 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.fixture(scope="module", params=CHANGING, ids=lambda page: page.stem)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(page, id=page.stem, marks=[pytest.mark.evidence] * (page.stem in TAKES_LONG))
+        for page in CHANGING
+    ],
+)
 def walked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the repository after the last step of a page."""
     folder = tmp_path_factory.mktemp(request.param.stem)

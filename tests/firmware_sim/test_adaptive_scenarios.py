@@ -38,7 +38,8 @@ def cached_run_of(name: str, controller: str) -> Run:
 
 
 @pytest.mark.parametrize(
-    "controller", ["dpc", pytest.param("dpc-roll", marks=pytest.mark.evidence), "gpc-roll"]
+    "controller",
+    [*(pytest.param(name, marks=pytest.mark.evidence) for name in ("dpc", "dpc-roll")), "gpc-roll"],
 )
 def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controller: str) -> None:
     run = cached_run_of("adaptive.yaml", controller)

@@ -22,7 +22,7 @@ from retuning_story import (
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 
-pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(1800)]
+pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(1800)]
 
 LATE_S = 0.035  # from one command to the next: more than a tick missed
 
@@ -68,8 +68,7 @@ def test_swap_makes_no_step_and_disturbs_nothing(retuned: Story) -> None:
     assert_nothing_was_disturbed(retuned)
 
 
-@pytest.mark.timeout(3600)
-@pytest.mark.evidence  # twelve minutes in which no process is held up for 100 ms
+@pytest.mark.timeout(3600)  # twelve minutes in which no process is held up for 100 ms
 def test_shipped_law_of_order_200_is_retuned_from_500_s_of_data(tmp_path: Path) -> None:
     def attempt(folder: Path) -> Story:
         return tell_story(folder, UNJUDGED, RETUNED, "adaptive_gpc.yaml", 500.0 + 120.0)
