@@ -520,6 +520,17 @@ def test_refusals_in_a_row_trip_the_drive_and_one_good_command_forgives() -> Non
     assert bench.drive.refused == 2 * MISCODED_COMMANDS_TO_TRIP - 1
 
 
+def test_a_drive_trips_by_refusals_that_come_before_any_good_command() -> None:
+    bench = DriveBench()
+    for _ in range(MISCODED_COMMANDS_TO_TRIP - 1):
+        bench.command(1e9)
+    bench.tick()
+    assert bench.told.state is DriveState.SWITCH_ON_DISABLED
+    bench.command(1e9)
+    bench.ticks(10)
+    assert bench.told.state is DriveState.FAULT
+
+
 def test_corrupted_and_foreign_frames_are_as_if_never_sent() -> None:
     bench = armed()
     good = bench.commands.counter

@@ -206,8 +206,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "firmware_sim/drive.py": {
         ": STOPPED_SHARE = 0.02 -> STOPPED_SHARE = 0.025": _A_QUARTER,
         ": LONGEST_STOP_NS = 500000000 -> LONGEST_STOP_NS = 500000001": _A_NANOSECOND,
-        "PumpDrive.__init__: self._accepted_ns = 0 -> self._accepted_ns = 1": _A_NANOSECOND,
-        "PumpDrive.__init__: self._timeout_ns = 0 -> self._timeout_ns = 1": _A_NANOSECOND,
+        "PumpDrive.__init__: self._accepted_ns = 0 -> ": _SET_FIRST,
+        "PumpDrive.__init__: self._accepted_ns = 0 -> self._accepted_ns = 1": _SET_FIRST,
+        "PumpDrive.__init__: self._timeout_ns = 0 -> ": _SET_FIRST,
+        "PumpDrive.__init__: self._timeout_ns = 0 -> self._timeout_ns = 1": _SET_FIRST,
         "PumpDrive.__init__: self._moving_ns = 0 -> ": _SET_FIRST,
         "PumpDrive.__init__: self._moving_ns = 0 -> self._moving_ns = 1": _SET_FIRST,
         "PumpDrive.__init__: self._setpoint_pa = 0.0 -> ": _SET_FIRST,
