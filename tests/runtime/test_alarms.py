@@ -408,6 +408,33 @@ def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_con
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.FAULT)]
 
 
+def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_keeps_from_arming() -> None:
+    bench = Told()
+    bench.drive_at(10e3)
+    bench.silent.add(type(bench.tank))
+    bench.run(400)
+    bench.accept()
+    bench.silent.clear()
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(500)
+    assert (bench.node.mode, bench.told) == (Mode.STANDBY, [])
+    bench.silent.add(type(bench.tank))
+    bench.run(400)
+    assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.INIT)]
+
+
+def test_once_it_was_ready_a_second_thing_alarms_in_init_without_a_quiet_time() -> None:
+    bench = Told()
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    bench.silent.add(type(bench.tank))
+    bench.run(400)
+    bench.drive_warns = True
+    bench.run(300)
+    assert bench.node.mode is Mode.INIT
+    assert [event.code for event in bench.told] == [SILENT, Fault.DRIVE_WARNING]
+
+
 def test_the_alarm_of_a_refused_arming_goes_and_hides_no_later_one() -> None:
     bench = Told()
     bench.tank = bench.tank._replace(port_high=Switch.ON)

@@ -63,7 +63,28 @@ looks = st.lists(
 )
 
 
-@given(looks)
+bursts = st.lists(
+    st.tuples(
+        st.sampled_from([1.0, 20.0, 60.0, 200.0]),
+        st.lists(
+            st.tuples(st.integers(-3, 3), st.integers(-2, 2), st.sampled_from([0.05, 0.125, 0.3])),
+            min_size=1,
+            max_size=6,
+        ),
+    ),
+    min_size=1,
+    max_size=4,
+).map(
+    lambda parts: [
+        (noise * moved, noise * turned / 2, seconds, True)
+        for noise, part in parts
+        for moved, turned, seconds in part
+    ]
+)
+"""Noise that is suddenly many times as much, or as little, and a roll among it."""
+
+
+@given(st.one_of(looks, bursts))
 def test_the_sum_is_that_of_its_formulas(looks: list[Look]) -> None:
     test, found = SignTest(LIMITS), []
     expected = sums_of(looks)
@@ -151,8 +172,9 @@ def first_found(test: SignTest, turned_s: float, step_s: float) -> int:
         # until they do
         (0.14, 3.1, 2),
         (0.05, 0.8, 5),
-        # but no longer than 0.6 s, of which each says 4.1
+        # but no longer than 0.6 s, of which each says 4.1, or the least that counts
         (0.05, 0.2122, 12),
+        (0.05, 0.15, 12),
     ],
 )
 def test_steps_last_until_they_say_enough(
@@ -186,3 +208,11 @@ def test_neither_a_right_sign_nor_a_roll_that_does_not_move_is_found() -> None:
             assert not test.update(way * 4 * S, way * 4 * S, 0.6, judged=True)
             assert not test.update(0.0, way * 4 * S, 0.6, judged=True)
     assert test.sum == 0.0
+
+
+def test_a_sum_of_eight_is_not_yet_too_much() -> None:
+    test = SignTest(LIMITS)
+    for _ in range(2):
+        assert not test.update(-4 * S, 4 * S, 0.6, judged=True)
+    assert test.sum == 8.0
+    assert test.update(-4 * S, 4 * S, 0.6, judged=True)

@@ -135,6 +135,47 @@ def test_a_drift_lasts_after_thirty_seconds_that_half_of_it_ends(
     assert [fed.to(way * 2 * D) for _ in range(61)] == [DRIFT] * 60 + [LASTS]
 
 
+def forgetting(fed: Fed, way: int) -> None:
+    """Leave four thresholds unexplained until the bias is forgotten, after a minute beyond three.
+
+    In the first step nothing is unexplained yet.
+    """
+    left = []
+    while not left or left[-1] > 3 * D:
+        fed.to(way * 4 * D)
+        left.append(abs(fed.monitor.unexplained_rad))
+    assert len(left) == 122
+
+
+def lasting(fed: Fed) -> int:
+    """For how many steps without anything new the drift is still found."""
+    return next(count for count in range(200) if not fed(0.0))
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_bias_that_explains_nothing_for_a_minute_is_forgotten(way: int) -> None:
+    fed = Fed(0.5)
+    for _ in range(100):
+        fed.to(way * 4 * D)
+    fed.to(0.0)
+    forgetting(fed, way)  # the first minute was not whole
+    # thirty seconds of agreement, the step of the forgetting among them
+    assert lasting(fed) == 59
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("agreed", [0, 20, 57])
+def test_a_drift_among_the_thirty_seconds_of_agreement_begins_them_anew(
+    way: int, agreed: int
+) -> None:
+    fed = Fed(0.5)
+    forgetting(fed, way)
+    assert [fed.to(0.0) for _ in range(agreed)] == [LASTS] * agreed
+    assert fed.to(way * 1.5 * D) == LASTS
+    fed.to(0.0)
+    assert lasting(fed) == 59
+
+
 @pytest.mark.parametrize(("share", "found"), [(0.97, False), (1.03, True)])
 def test_noise_of_the_roll_is_its_second_difference_over_the_square_root_of_six(
     share: float, found: bool
@@ -221,3 +262,12 @@ def test_where_the_rate_stands_still_for_longer_the_sign_is_not_judged() -> None
         found.append(fed.monitor.sign.sum)
     # 0.7 s is not longer
     assert found == [5.0, 10.0, 15.0, 15.0, 16.0]
+
+
+def test_a_gap_begins_the_test_of_the_sign_anew() -> None:
+    fed = Fed(0.35, SIGNS)
+    for _ in range(3):
+        fed(-8 * S, 8 * S)
+    assert fed.monitor.sign.sum > 0
+    fed.monitor.restart()
+    assert fed.monitor.sign.sum == 0.0

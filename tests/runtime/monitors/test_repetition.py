@@ -120,6 +120,15 @@ def test_samples_that_are_each_sent_more_than_once_are_not_frozen() -> None:
         assert not repetition.frozen
 
 
+def test_a_loop_with_two_equal_samples_repeats_and_is_not_frozen() -> None:
+    loop, repetition = noise(20), Repetition(150)
+    loop[8] = loop[7]
+    for sample in loop * 150:
+        repetition.take(*sample)
+        assert not repetition.frozen
+    assert repetition.found
+
+
 def test_one_of_both_that_differs_is_enough() -> None:
     rolls, rates = [a for a, _ in noise(50)] * 10, [b for _, b in noise(500)]
     assert not any(taken(list(zip(rolls, rates, strict=True))))
