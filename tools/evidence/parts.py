@@ -126,7 +126,7 @@ PARTS = (
     ),
     Part(
         "false_alarms",
-        "python -m tools.studies.false_alarms --hours 10 --json",
+        "python -m tools.studies.false_alarms --hours 50 --json",
         "rate of false alarms of the monitors: every law, calm to storm, voyages and retuning",
         1200,
     ),
