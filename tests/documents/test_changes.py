@@ -68,13 +68,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.fixture(
-    scope="module",
-    params=[
-        pytest.param(page, id=page.stem, marks=[pytest.mark.evidence] * (page.stem in TAKES_LONG))
-        for page in CHANGING
-    ],
-)
+@pytest.fixture(scope="module", params=CHANGING, ids=lambda page: page.stem)
 def walked(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the repository after the last step of a page."""
     folder = tmp_path_factory.mktemp(request.param.stem)
@@ -101,6 +95,14 @@ def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
     assert len(changed) <= 7
 
 
+@pytest.mark.parametrize(
+    "walked",
+    [
+        pytest.param(page, id=page.stem, marks=[pytest.mark.evidence] * (page.stem in TAKES_LONG))
+        for page in CHANGING
+    ],
+    indirect=True,
+)
 def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
     run(walked, "tools.documents.write", "--check")
     tests = {name for name in rows(walked) if name.startswith("tests/")}

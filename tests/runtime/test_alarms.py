@@ -397,23 +397,25 @@ def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -
     ]
 
 
-def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_control() -> None:
+def halved_and_accepted() -> Told:
+    """In charge with half the pressure, without gauges, whose alarm is accepted."""
     bench = Told()
     bench.drive_at(10e3)
     bench.silent.add(type(bench.tank))
     bench.run(400)
     bench.accept()
+    return bench
+
+
+def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_ends_control() -> None:
+    bench = halved_and_accepted()
     bench.run(1000)
     assert (bench.node.mode, bench.status.alarm) == (Mode.FAULT, True)
     assert [(e.code, e.state, e.mode) for e in bench.told] == [(SILENT, ACTIVE, Mode.FAULT)]
 
 
 def test_what_halved_the_pressure_and_was_accepted_alarms_again_when_it_keeps_from_arming() -> None:
-    bench = Told()
-    bench.drive_at(10e3)
-    bench.silent.add(type(bench.tank))
-    bench.run(400)
-    bench.accept()
+    bench = halved_and_accepted()
     bench.silent.clear()
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
     bench.run(500)

@@ -170,21 +170,27 @@ def read_about(path: Path) -> dict[str, Any]:
 def _chunks(path: Path, component: str) -> list[Chunk]:
     """Return the chunks with a component; of a damaged file, those that can be read.
 
-    A killed recorder leaves it cut, a disk that was full for a time with a hole, a power cut with
-    zeros.
+    A killed recorder leaves it cut. Of anything else, as a disk that was full for a time or a power
+    cut leave it, a warning tells: rows may be missing in the middle.
     """
     try:
         return _read_chunks(path, component)
     except RuntimeError as error:
-        with tempfile.TemporaryDirectory() as folder:
-            intact = Path(folder) / path.name
-            command = [rerun_binary(), "rrd", "optimize", "--continue-on-error"]
-            command += [str(path), "-o", str(intact)]
-            try:
-                subprocess.run(command, env=rerun_environment(), check=True, capture_output=True)
-                return _read_chunks(intact, component)
-            except (subprocess.CalledProcessError, RuntimeError):
-                raise ValueError(f"{path}: {error}") from error
+        damage = error
+    with tempfile.TemporaryDirectory() as folder:
+        intact = Path(folder) / path.name
+        command = [rerun_binary(), "rrd", "optimize", "--continue-on-error"]
+        command += [str(path), "-o", str(intact)]
+        done = subprocess.run(command, env=rerun_environment(), check=False, capture_output=True)
+        try:
+            chunks = _read_chunks(intact, component)
+        except RuntimeError:
+            chunks = []
+    if not chunks:
+        raise ValueError(f"{path}: {damage}") from damage
+    if done.stderr or "exceeds file size" not in str(damage):
+        warnings.warn(f"{path} is damaged: rows may be missing", stacklevel=3)
+    return chunks
 
 
 def _read_chunks(path: Path, component: str) -> list[Chunk]:
