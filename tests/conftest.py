@@ -33,19 +33,32 @@ settings.load_profile("same")
 
 
 LONGEST = (
-    *("faults/test_fault_campaign.py", "firmware_sim/test_worker_pool.py", "test_cli.py"),
-    *("documents/test_changes.py", "tools/test_law_tools.py", "documents/test_how_to.py"),
-    *("test_imports.py", "analysis/loop/test_self_tuning.py", "configuration/test_shipped.py"),
-    *("firmware_sim/test_renewed_bench.py", "commands/test_viewer_pixels.py"),
-    *("firmware_sim/test_init_command.py", "campaign/test_campaign.py"),
+    *("faults/test_fault_campaign.py", "telemetry/test_recorder.py", "tools/test_week.py"),
+    *("retuning/test_retuner_process.py", "test_cli.py", "test_imports.py"),
+    *("firmware_sim/test_bench.py", "faults/test_lockstep_faults.py", "commands/test_check.py"),
+    *("runtime/test_supervisor.py", "commands/test_report.py", "tools/test_vcan.py"),
+    *("firmware_sim/test_design_command.py", "retuning/test_redesign.py"),
 )
 """Files of 15 s of CPU and more: a worker that begins one at the end is waited for."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest files first, for the workers to end together."""
+    """Give `evidence` with parameters to these alone; put the longest files first.
+
+    The workers then end together.
+    """
+    for item in items:
+        _only_named_parameters_are_evidence(item)
     place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(place)))
+
+
+def _only_named_parameters_are_evidence(item: pytest.Item) -> None:
+    own = item.own_markers
+    for mark in [each for each in own if each.name == "evidence" and each.args]:
+        if item.callspec.id not in mark.args:  # type: ignore[attr-defined]  # of a Function
+            own.remove(mark)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -20,8 +20,6 @@ from utank_hil.telemetry.recording import read_recording
 
 CONFIGS = Path("configs").resolve()
 SHIPPED = sorted((CONFIGS / "controllers").glob("*.yaml"))
-DESIGNED_LONG = {"naval_self_tuning", "patti_b_self_tuning", "self_tuning"}
-"""Laws that take ten seconds; `self_tuned` is the same kind."""
 BIN = Path(sys.executable).parent
 RESULTS = ("out/bench.rrd", "out/gpc.frames")
 """Of `utank-hil bench --frames`, for the examples."""
@@ -71,15 +69,8 @@ def test_help_of_every_command_has_an_example_that_parses(application, words, na
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(
-            path, id=path.stem, marks=[pytest.mark.evidence] * (path.stem in DESIGNED_LONG)
-        )
-        for path in SHIPPED
-    ],
-)
+@pytest.mark.evidence("naval_self_tuning", "patti_b_self_tuning", "self_tuned", "self_tuning")
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_controllers_pass_their_check(path: Path) -> None:
     result = invoke(app, "check", path, "--json")
     assert result.exit_code == 0
@@ -261,7 +252,7 @@ def wait_for_workers(process: subprocess.Popen[str], cpu_s: float) -> None:
             used_s = max(used_s, ticks / os.sysconf("SC_CLK_TCK"))
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_interrupted_bench_reports_what_it_has_and_leaves_a_readable_recording(
     tmp_path: Path,
 ) -> None:

@@ -81,10 +81,6 @@ def bench(
     loaded = load(scenario, Scenario)
     if real_time and loaded.faults:
         fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
-    laws = {
-        name: admit(controller, scenario, f"controllers.{name}")
-        for name, controller in loaded.controllers.items()
-    }
     for number, fault in enumerate(loaded.faults if frames else ()):
         if not fault.replayable:
             fail(
@@ -93,6 +89,10 @@ def bench(
             )
     logs = [frames_name(name) for name in ("passive", *loaded.controllers)] if frames else []
     prepare_out(out, (*REPORT_FILES, *logs))
+    laws = {
+        name: admit(controller, scenario, f"controllers.{name}")
+        for name, controller in loaded.controllers.items()
+    }
     if real_time and duration is None:
         duration = min(loaded.duration_s, REAL_TIME_S)
     options = BenchOptions(real_time, bus, seed, duration, out if frames else None)

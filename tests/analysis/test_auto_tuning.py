@@ -32,6 +32,7 @@ def short_search(monkeypatch):
     monkeypatch.setattr("utank_hil.analysis.loop.scaled_law.STEP", 8.0)
 
 
+@pytest.mark.evidence("dpc", "gpc")
 @pytest.mark.parametrize("kind", LINEAR_KINDS)
 def test_the_law_has_all_margins_and_costs_less_than_the_one_that_is_only_scaled(
     kind, short_search

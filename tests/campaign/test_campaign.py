@@ -32,6 +32,7 @@ def without_times(rows: list[dict[str, object]]) -> list[dict[str, object]]:
     return [{key: value for key, value in row.items() if key != "wall_s"} for row in rows]
 
 
+@pytest.mark.evidence
 def test_workers_that_are_killed_and_an_interruption_change_no_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -1,5 +1,6 @@
 """Names are the user's own: what Rich would take for markup is printed as it is."""
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,9 @@ from ports import QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
+from utank_hil.commands import gate
 from utank_hil.commands import run as module
+from utank_hil.commands.terminal import Terminal
 
 CONFIGS = Path("configs").resolve()
 LAW, SHIP, SEA, RUN = "law [/red]", "ship [/b]", "sea [/i]", "gpc [bold]"
@@ -40,6 +43,15 @@ def test_check_prints_names_as_they_are(tmp_path: Path) -> None:
     assert f"{SHIP}: the ship is valid" in told("check", tmp_path / "ship.yaml")
 
 
+def test_a_terminal_shows_that_a_law_is_being_designed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = io.StringIO()
+    monkeypatch.setattr(gate, "notes", Terminal(file=shown, force_terminal=True, _environ={}))
+    told("check", controller(tmp_path))
+    assert f"{LAW}: designing its law" in shown.getvalue()
+
+
 def test_run_goes_on_whatever_the_law_is_called(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -48,7 +60,7 @@ def test_run_goes_on_whatever_the_law_is_called(
     assert output.count(LAW) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_bench_prints_names_as_they_are(tmp_path: Path) -> None:
     config = controller(tmp_path)
     scenario = written(

@@ -132,6 +132,7 @@ def settled(seen: Opened) -> np.ndarray:
     return after
 
 
+@pytest.mark.evidence
 def test_a_browser_shows_the_watch(shown: Opened) -> None:
     for width, height in SIZES:
         shown.page.set_viewport_size({"width": width, "height": height})
@@ -141,6 +142,7 @@ def test_a_browser_shows_the_watch(shown: Opened) -> None:
     assert {urlsplit(address).hostname for address in shown.outside} <= ASKED
 
 
+@pytest.mark.evidence("1920-1080")
 @pytest.mark.parametrize(("width", "height"), SIZES)
 def test_the_viewers_own_window_shows_the_watch(
     browser: Browser, recording: Path, tmp_path: Path, width: int, height: int

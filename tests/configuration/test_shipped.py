@@ -55,6 +55,7 @@ def test_drive_and_high_level_switch_follow_from_the_vessel_unless_written() -> 
     assert naval.sensors.high_level_m < naval.vessel.tank.level_limit_m
 
 
+@pytest.mark.evidence("patti_b_self_tuning", "naval_self_tuning")
 @pytest.mark.slow
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda p: p.stem)
 def test_controller_arms_and_acts_on_the_bus_within_the_drives_limits(path: Path) -> None:
@@ -91,6 +92,7 @@ def roll_rms_rad(scenario: Scenario, config: ControllerConfig | None, duration_s
     return float(np.std(roll_rad[6000:]))
 
 
+@pytest.mark.evidence("semi_active-0.15-240", "patti_b-0.2-180")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "below", "seconds"),

@@ -60,6 +60,7 @@ def storm(wave_moment, design=None):
     return np.array(rows[round(WARM_UP_S / STEP_S) :]).T
 
 
+@pytest.mark.evidence("dpc")
 @pytest.mark.slow
 @pytest.mark.parametrize("design", [GPC_ROLL, DPC_ROLL_LEVEL], ids=["gpc", "dpc"])
 def test_roll_falls_by_a_quarter_within_the_limits(wave_moment, design):

@@ -20,7 +20,6 @@ COPIED = ("configs", "docs", "firmware_sim", "tests", "tools", "utank_hil", "pyp
 ROW = re.compile(r"^\| \d+ \| `(\S+)` \|", re.M)
 CHANGING = [page for page in HOW_TO if "```diff" in page.read_text(encoding="utf-8")]
 WRITTEN = {"docs/configuration.md"}
-TAKES_LONG = {"fault"}
 ALSO = ("catalogue", "codec", "e2e")
 """Tests of the bus, beside those that a page changes."""
 
@@ -95,14 +94,7 @@ def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
     assert len(changed) <= 7
 
 
-@pytest.mark.parametrize(
-    "walked",
-    [
-        pytest.param(page, id=page.stem, marks=[pytest.mark.evidence] * (page.stem in TAKES_LONG))
-        for page in CHANGING
-    ],
-    indirect=True,
-)
+@pytest.mark.evidence
 def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
     run(walked, "tools.documents.write", "--check")
     tests = {name for name in rows(walked) if name.startswith("tests/")}

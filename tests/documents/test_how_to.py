@@ -63,6 +63,7 @@ def has_slow_steps(page: Path) -> bool:
     return any("slow" in block.note.split() for block in blocks(page.read_text(encoding="utf-8")))
 
 
+@pytest.mark.evidence("ship", "ship-slow", "law-slow", "logs-slow")
 @pytest.mark.parametrize(
     ("page", "slow"),
     [

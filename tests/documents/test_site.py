@@ -32,6 +32,7 @@ def site() -> Path:
     return folder / "docs"
 
 
+@pytest.mark.evidence("can-catalogue", "gallery")
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
     browser: Browser, site: Path, name: str

@@ -332,6 +332,7 @@ def test_a_fault_in_the_moment_of_arming_ends_it_before_anything_moved() -> None
     assert node.ended.startswith("DRIVE_FAULT")
 
 
+@pytest.mark.evidence("sensors_2")
 @pytest.mark.parametrize("silent", ["sensors", "sensors_2"])
 def test_a_second_motion_sensor_that_is_not_heard_is_waited_for(silent: str) -> None:
     """The controller could do without; its zeros and signs would be those of nothing."""

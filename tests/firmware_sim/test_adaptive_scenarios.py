@@ -37,10 +37,8 @@ def cached_run_of(name: str, controller: str) -> Run:
     return run_of(name, controller)
 
 
-@pytest.mark.parametrize(
-    "controller",
-    [*(pytest.param(name, marks=pytest.mark.evidence) for name in ("dpc", "dpc-roll")), "gpc-roll"],
-)
+@pytest.mark.evidence("dpc", "dpc-roll")
+@pytest.mark.parametrize("controller", ["dpc", "dpc-roll", "gpc-roll"])
 def test_retuned_after_the_loading_changed_the_ship_rolls_a_third_less(controller: str) -> None:
     run = cached_run_of("adaptive.yaml", controller)
     assert [event.state for event in run.retuning] == [IDENTIFY, DESIGN, TRIAL, RETUNED]
@@ -82,6 +80,7 @@ def test_heeled_by_the_wind_and_measured_askew_she_is_retuned_all_the_same() -> 
     assert roll[last].std() == pytest.approx(upright.column("true_roll_rad")[last].std(), rel=0.1)
 
 
+@pytest.mark.evidence
 def test_swap_makes_no_larger_steps_than_the_rate_limit_lets() -> None:
     run = cached_run_of("adaptive.yaml", "dpc")
     rate = scenario("adaptive.yaml").controllers["dpc"].limits.rate_pa_s

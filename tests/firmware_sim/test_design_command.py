@@ -85,6 +85,7 @@ def test_tank_command_expects_the_roll_that_the_storm_gives(first_tank):
     assert picture.stat().st_size > 20_000
 
 
+@pytest.mark.evidence
 def test_tank_command_sweeps(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(tank_prediction, "STABILITY_SHARES", (0.05, 0.1))
     monkeypatch.setattr(tank_prediction, "FREQUENCY_RATIOS", (1.0,))
@@ -97,6 +98,7 @@ def test_tank_command_sweeps(tmp_path: Path, monkeypatch):
     assert (tmp_path / "tank_sweep.png").stat().st_size > 20_000
 
 
+@pytest.mark.evidence
 def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Path):
     vessel = tmp_path / "own.yaml"
     vessel.write_text(
@@ -117,6 +119,7 @@ def test_tank_command_takes_a_vessel_without_pump_in_any_named_sea(tmp_path: Pat
     assert run("tank", vessel, "--scenario", sea, "--out", tmp_path).exit_code == 0
 
 
+@pytest.mark.evidence("patti_b-True")
 @pytest.mark.parametrize(("ship", "said"), [("patti_b", True), ("thesis_first", False)])
 def test_tank_command_says_what_a_linear_prediction_leaves_out(
     ship: str, said: bool, tmp_path: Path

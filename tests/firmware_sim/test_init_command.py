@@ -53,6 +53,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     return lambda ship: made(tuple(ship.items()))
 
 
+@pytest.mark.evidence("0.7", "3.5")
 @pytest.mark.parametrize("ship", [PATROL, SLOW, STIFF, TRAWLER], ids=lambda ship: str(ship["gm"]))
 def test_project_is_valid_and_its_law_is_let_on_the_bus(
     project: Project, ship: dict[str, float]
@@ -80,7 +81,7 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
     assert set(told["files"]) == {"ship", "controller", "scenario", "README"}
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_on_the_bench_the_law_is_armed_and_better_than_passive(
     project: Project,
 ) -> None:

@@ -23,7 +23,7 @@ def rms_deg(roll_rad: np.ndarray) -> float:
     return math.degrees(float(np.sqrt(np.mean(roll_rad[SETTLED:] ** 2))))
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_patti_b_rolls_as_the_simulation_of_the_nonlinear_equations_says() -> None:
     vessel, waves = PATTI_B.vessel, PATTI_B.wave_moment(1)
     rows = round(PATTI_B.duration_s / RECORD_S)

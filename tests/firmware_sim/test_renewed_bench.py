@@ -33,6 +33,7 @@ def job_of(duration_s: float, scenario: Scenario = SCENARIO) -> Job:
     return jobs_of(scenario, scenario.seed, duration_s)[1]
 
 
+@pytest.mark.evidence
 def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -50,6 +51,7 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     assert (result.first, result.ticks, why) == (None, 24_000, [])
 
 
+@pytest.mark.evidence
 def test_a_peak_of_the_waves_is_not_taken_for_a_ship_of_twice_the_stiffness() -> None:
     """Patti-B in mild waves looked 2.5 times as stiff; the law for that capsized her."""
     scenario = load_config(Path("configs/scenarios/patti_b.yaml"), Scenario)

@@ -95,11 +95,8 @@ def a_worker(process: "subprocess.Popen[str]") -> int:
         time.sleep(0.02)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    ["faults", *(pytest.param(name, marks=pytest.mark.evidence) for name in ("bench", "campaign"))],
-)
+@pytest.mark.evidence
+@pytest.mark.parametrize("name", ["faults", "bench", "campaign"])
 def test_sigterm_to_all_processes_ends_a_command_in_order(tmp_path: Path, name: str) -> None:
     with at_work(name, tmp_path) as process:
         a_worker(process)
@@ -111,8 +108,8 @@ def test_sigterm_to_all_processes_ends_a_command_in_order(tmp_path: Path, name: 
         time.sleep(0.02)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["bench", pytest.param("faults", marks=pytest.mark.evidence)])
+@pytest.mark.evidence
+@pytest.mark.parametrize("name", ["bench", "faults"])
 def test_a_process_that_is_killed_is_said_with_a_code_of_its_own(tmp_path: Path, name: str) -> None:
     with at_work(name, tmp_path) as process:
         os.kill(a_worker(process), signal.SIGKILL)

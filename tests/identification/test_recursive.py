@@ -80,7 +80,7 @@ def test_number_that_is_no_measurement_is_a_gap_and_spoils_nothing() -> None:
     assert np.isfinite(spoiled.arx.alpha).all()
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_stays_stable_over_half_a_day_with_hours_of_still_water() -> None:
     # 200000 samples of 0.2 s are 11 hours; the middle half has no signal but the last bit of noise
     model = RecursiveArx(4, *SCALE, SAMPLE_TIME_S, forgetting=0.99)

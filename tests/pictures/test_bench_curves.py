@@ -57,6 +57,7 @@ def test_a_short_run_needs_no_zoom(tmp_path: Path) -> None:
     assert short.shape[1] < long.shape[1]
 
 
+@pytest.mark.evidence
 def test_what_retuning_did_is_a_lane_and_the_zoom_is_around_its_trial(tmp_path: Path) -> None:
     curves = [curve("passive", 1800.0, 0.1, 300.0), curve("active", 1800.0, 0.05, 700.0)]
     plain = read(draw_bench(curves, tmp_path / "a.png", "A storm"))

@@ -32,6 +32,7 @@ def retuned() -> Answer:
     return retune(record_of(1), task_of(1, 60))
 
 
+@pytest.mark.evidence("7.5-1-200", "10.0-1-200")
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
 @pytest.mark.parametrize("period_s", [7.5, 10.0])
 def test_law_for_the_ship_of_the_record_is_found_under_a_regular_wave(
@@ -49,6 +50,7 @@ def test_law_for_the_ship_of_the_record_is_found_under_a_regular_wave(
     assert isinstance(read_answer(answer_bytes(answer)), Candidate)
 
 
+@pytest.mark.evidence("1-200")
 @pytest.mark.parametrize(("outputs", "order"), [(2, 120), (1, 200)])
 def test_steady_heel_of_two_degrees_changes_neither_ship_nor_verdict(
     outputs: int, order: int

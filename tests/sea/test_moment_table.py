@@ -22,6 +22,7 @@ def write(file: Path, omega: np.ndarray, heading_deg: np.ndarray) -> Path:
     return file
 
 
+@pytest.mark.evidence
 def test_table_of_the_effective_slope_gives_its_moment_from_either_side(tmp_path: Path) -> None:
     omega, heading = np.linspace(0.1, 9.0, 900), np.linspace(0, 180, 181)
     table = MomentTable.read(write(tmp_path / "table.csv", omega, heading))

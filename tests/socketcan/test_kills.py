@@ -1,8 +1,8 @@
 """Controller and ship killed at random instants, signals, and an interface that flaps.
 
 Twenty kills each take half an hour in the emulated kernel, most of it programs that start. So this
-is evidence; `make test` kills one controller and takes the interface down once, in
-`test_two_processes.py`.
+is evidence; `make test` kills one controller (`test_two_processes.py`) and takes the interface down
+once (`test_replay_on_vcan.py`).
 """
 
 import random

@@ -79,11 +79,13 @@ def until_it_ends(
 @pytest.mark.parametrize(
     ("flaw", "faults", "error"),
     [
-        (
+        pytest.param(
             "raises",
             {Fault.INTERNAL},
             "ZeroDivisionError: of our own",
-        ),  # the drive stops by its own command timeout while the law sleeps
+            marks=pytest.mark.evidence,
+        ),
+        # the drive stops by its own command timeout while the law sleeps
         ("sleeps", {Fault.OVERRUN, Fault.DRIVE_FAULT, Fault.DRIVE_SILENT}, ""),
     ],
 )

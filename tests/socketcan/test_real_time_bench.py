@@ -26,7 +26,7 @@ from utank_hil.telemetry.replay_head import causes, recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
-DURATION_S = 30.0
+DURATION_S = 20.0
 Bench = tuple[Scenario, dict, dict[str, dict[str, np.ndarray]]]
 ENOUGH_S = 10.0
 HELD_UP_S = 0.3

@@ -9,6 +9,7 @@ from retuning_story import (
     DESIGN,
     IDENTIFY,
     IDLE,
+    REFUSED,
     RETUNED,
     SHORT,
     TRIAL,
@@ -16,6 +17,7 @@ from retuning_story import (
     Story,
     assert_nothing_was_disturbed,
     assert_ship_is_found,
+    in_charge,
     tell_story,
 )
 
@@ -66,6 +68,20 @@ def test_pulses_and_the_new_law_reach_the_pump(retuned: Story) -> None:
 
 def test_swap_makes_no_step_and_disturbs_nothing(retuned: Story) -> None:
     assert_nothing_was_disturbed(retuned)
+
+
+def test_refusal_is_shown_with_its_reason_and_the_old_law_goes_on(tmp_path: Path) -> None:
+    def attempt(folder: Path) -> Story:
+        # she rolls more than identification is allowed in
+        return tell_story(folder, SHORT | {"roll_limit_rad": 0.01}, REFUSED)
+
+    refused = first_that_can_be_judged(attempt, tmp_path)
+    assert refused.states == [IDLE, IDENTIFY, REFUSED], refused.reasons
+    assert "above the limit" in refused.reasons["REFUSED"]
+    assert_nothing_was_disturbed(refused)
+    since_s = min(f.time_s for f in refused.of("CTRL_STATUS") if f.signals["retuning"] == REFUSED)
+    after = {f.signals["pressure_pa"] for f in in_charge(refused) if f.time_s > since_s + 0.5}
+    assert len(after) > 10
 
 
 @pytest.mark.timeout(3600)  # twelve minutes in which no process is held up for 100 ms

@@ -18,7 +18,7 @@ from two_processes import (
 
 from utank_hil.canbus import Mode, ValveControl, ValveFault, ValveState
 
-pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
 
 TIMEOUT_S = 0.1
 

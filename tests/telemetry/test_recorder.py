@@ -315,6 +315,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     assert "retuning REFUSED: why it was" in [line.text for line in text_log(file)]
 
 
+@pytest.mark.evidence("1", "15")
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
     tmp_path: Path, stop: signal.Signals
@@ -468,7 +469,7 @@ def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
     assert len(later) >= 600
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 def test_where_nobody_writes_any_more_no_further_file_is_tried(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

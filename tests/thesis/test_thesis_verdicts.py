@@ -73,7 +73,7 @@ def judge(key: str, expected: str) -> Figure:
     return figure
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("key", FAST)
 def test_a_figure_has_its_verdicts_and_a_reason_for_each_deviation(key: str) -> None:
     judge(key, FAST[key])

@@ -12,6 +12,7 @@ def test_the_documents_are_those_of_the_code() -> None:
     assert write.main(["--check"]) == 0
 
 
+@pytest.mark.evidence
 def test_a_stale_table_is_found_and_written_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

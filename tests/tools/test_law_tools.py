@@ -34,6 +34,7 @@ def test_campaign_compares_seed_by_seed_and_draws(tool, tmp_path: Path):
     assert swell["below"]["clipped"]["mean"] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.evidence
 def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passive(tool):
     found = tool("studies.share_of_possible", "--seeds", "2", "--seconds", "90", "--json").found
     rows = found["rows"]
@@ -47,6 +48,7 @@ def test_share_of_the_possible_is_one_at_the_bound_and_zero_with_the_tank_passiv
     assert rows["causal bound"]["share"] < 1
 
 
+@pytest.mark.evidence
 def test_a_law_that_knows_the_sea_leaves_less_roll_than_one_tuned_in_a_storm(tool, monkeypatch):
     # bounds of two records of five minutes, in this process
     monkeypatch.setattr(many_seas, "CAUSAL_RECORDS", 2)
@@ -119,6 +121,7 @@ def test_undelayed_linearization_without_brake_or_shift_hardly_grows(tool):
     )
 
 
+@pytest.mark.evidence
 def test_benchmark_times_every_kind_of_controller():
     # in a process of its own, whose scheduling it changes
     command = [sys.executable, "-m", "tools.benchmarks.controllers", "--steps", "100", "--json"]

@@ -77,6 +77,7 @@ def test_code_is_changed_and_the_file_is_not(tmp_path: Path) -> None:
     assert file.read_text(encoding="utf-8") == SOURCE
 
 
+@pytest.mark.evidence
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.file)
 def test_what_is_explained_is_a_mutant_and_every_test_file_is_there(target: Target) -> None:
     _, mutants = mutants_of(ROOT / target.file)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from rich.text import Text
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
@@ -77,7 +78,8 @@ def judge(
         As in `margins`.
     """
     try:
-        law = build_law(config)
+        with notes.status(Text(f"{config.name}: designing its law")):  # takes seconds at times
+            law = build_law(config)
     except ParameterError as error:
         fail_with(located(error, path, key))
     step_s = _step_time_s(law)

@@ -99,7 +99,7 @@ def test_unknown_law_is_refused():
 DURATION_S = [100.0, pytest.param(300.0, marks=pytest.mark.evidence)]
 
 
-@pytest.mark.slow
+@pytest.mark.evidence
 @pytest.mark.parametrize("duration_s", DURATION_S)
 def test_contest_at_the_printed_amplitudes(duration_s):
     none = contest("no tank", duration_s=duration_s)

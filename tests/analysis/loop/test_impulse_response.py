@@ -82,6 +82,7 @@ def probe(function, **options):
     return impulse_response_law(lambda: Stepped(function), ROLL, **options)
 
 
+@pytest.mark.evidence("dpc", "gpc")
 @pytest.mark.parametrize("name", LAWS)
 def test_it_is_the_law_that_was_stepped(name):
     own, measured = LAWS[name]
@@ -137,6 +138,7 @@ def test_a_law_that_does_nothing_leaves_the_loop_open():
     assert margins(found, pump_model(SHIP, TANK, ROLL)).peak_loop_gain == 0
 
 
+@pytest.mark.evidence
 def test_a_long_memory_is_followed_to_its_end():
     pole = np.exp(-0.02 * 0.01)  # a washout of 50 s in a law of 10 ms
     found = probe(lambda y, mean: (y - mean, pole * mean + (1 - pole) * y))

@@ -83,6 +83,7 @@ def test_mean_of_the_positive_part_of_a_product_is_that_of_draws():
         assert _mean_positive_product(2.0, 3.0, 6 * r) == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.evidence
 def test_another_ship_gets_a_law_with_all_margins_too():
     naval = load_config(CONTROLLERS / "naval_constrained_gpc.yaml", ControllerConfig).plant
     design = SelfTunedDesign("self_tuned")

@@ -92,6 +92,7 @@ def colour(path: Path, rgb: tuple[int, int, int]) -> int:
     return int((np.abs(image[..., :3] - np.array(rgb) / 255).max(axis=-1) < 0.02).sum())
 
 
+@pytest.mark.evidence
 def test_the_picture_fills_accepted_laws_and_stars_the_design(gpc, tmp_path: Path):
     blue, yellow = (0x00, 0x72, 0xB2), (0xF0, 0xE4, 0x42)
     path = draw_trade(gpc, tmp_path / "trade.png", "A trade", 50e3, 3.85)

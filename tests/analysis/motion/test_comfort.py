@@ -71,6 +71,7 @@ def test_interruptions_count_both_sides_and_begin_at_the_tipping_angle():
         assert found == pytest.approx(tips * 6, abs=0.2)  # six rolls a minute
 
 
+@pytest.mark.evidence
 def test_interruptions_in_gaussian_roll_are_rices_rate_of_crossings():
     rng = np.random.default_rng(5)
     time = np.arange(0, 40_000, 0.1)
