@@ -77,6 +77,7 @@ class Line:
 
     def __init__(self) -> None:
         self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M)
+        self.inbox.pump_echo.sent(4)
         self.senders = {kind: CATALOGUE.transmitter(kind) for kind in GOOD}
         self.now_ns = 1000
 
@@ -104,8 +105,12 @@ class Line:
             "watched",
             "expected",
             "stations",
+            "pump_echo",
+            "valve_echo",
         }
         return {
+            "pump_echo": self.inbox.pump_echo.heard_ns,
+            "valve_echo": self.inbox.valve_echo.heard_ns,
             **{name: getattr(self.inbox, name) for name in shown | {"level_m"}},
             **{
                 name: value
@@ -131,7 +136,7 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     assert {kind: attrgetter(name)(inbox) for kind, name in TIMES.items()} == {
         kind: came_ns[kind] for kind in TIMES
     }
-    assert inbox.echo_ns == inbox.drive_ns
+    assert inbox.pump_echo.heard_ns == inbox.drive_ns
     assert inbox.frames == len(GOOD)
     assert inbox.protection_valid
 
@@ -260,12 +265,14 @@ def test_every_stream_that_control_stands_on_counts_for_the_protection(kind: typ
     assert not line.inbox.protection_valid
 
 
-def test_echo_is_fresh_only_when_it_moves() -> None:
+def test_an_echo_is_fresh_only_when_it_moves_and_follows_the_commands() -> None:
     line = Line()
-    for echo, fresh in ((None, False), (3, True), (3, False), (4, True), (4, False), (3, True)):
-        before = line.inbox.echo_ns
-        line.say(GOOD[DriveStatus1]._replace(command_echo=echo))  # type: ignore[attr-defined]
-        assert (line.inbox.echo_ns != before) == fresh
+    echo = line.inbox.pump_echo
+    echo.sent(5)
+    for counter, fresh in ((None, False), (3, True), (3, False), (4, True), (9, False), (2, True)):
+        before = echo.heard_ns
+        line.say(GOOD[DriveStatus1]._replace(command_echo=counter))  # type: ignore[attr-defined]
+        assert (echo.heard_ns == line.now_ns) is (echo.heard_ns != before) is fresh
         assert line.inbox.drive_ns == line.now_ns
 
 
@@ -304,10 +311,11 @@ def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
     assert (line.inbox.drive_state, line.inbox.drive_ns) == (None, NEVER_HEARD_NS)
     line.say(status)
     heard_ns = line.inbox.drive_ns
+    line.inbox.pump_echo.sent(9)
     line.say(status._replace(state=None, power_limited=False, command_echo=9))
     inbox = line.inbox
     assert (inbox.drive_state, inbox.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
-    assert inbox.drive_ns == inbox.echo_ns == heard_ns
+    assert inbox.drive_ns == inbox.pump_echo.heard_ns == heard_ns
 
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
@@ -367,7 +375,7 @@ def test_new_it_knows_nothing_and_trusts_nothing() -> None:
         for name in ("roll_rad", "roll_rate_rad_s", "port_level_m", "starboard_level_m",
                      "pressure_pa", "power_w", "frames", "foreign", "tank_cycles"):  # fmt: skip
             assert getattr(inbox, name) == 0, name
-        for name in ("motion_ns", "tank_ns", "valve_ns", "valve_echo_ns", "conflict_ns"):
+        for name in ("motion_ns", "tank_ns", "valve_ns", "conflict_ns"):
             assert getattr(inbox, name) == NEVER_HEARD_NS, name
         assert inbox.valve_opening == 1.0
         assert inbox.valve_state is None
@@ -381,7 +389,7 @@ def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> N
     line = listening()
     inbox = line.inbox
     assert inbox.drive_state is None
-    assert {inbox.pump_ns, inbox.drive_ns, inbox.echo_ns} == {NEVER_HEARD_NS}
+    assert {inbox.pump_ns, inbox.drive_ns, inbox.pump_echo.heard_ns} == {NEVER_HEARD_NS}
     beats = {address: CATALOGUE.receiver(Heartbeat, address).can_id for address in Address
              if (Heartbeat, address) in CATALOGUE._codecs}  # fmt: skip
     expected = {CATALOGUE.codec(DriveStatus2).can_id, beats[Address.DRIVE], beats[Address.SENSORS]}
@@ -399,7 +407,7 @@ def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> Non
     inbox = line.inbox
     assert inbox.drive_state is DriveState.OPERATION_ENABLED
     century_ns = 100 * 366 * 86_400 * 1_000_000_000
-    assert min(inbox.pump_ns, inbox.drive_ns, inbox.echo_ns) > century_ns
+    assert min(inbox.pump_ns, inbox.drive_ns, inbox.pump_echo.heard_ns) > century_ns
     line.say(GOOD[SensorMotion])
     line.say(GOOD[SensorTank])
     assert inbox.protection_valid
@@ -413,6 +421,7 @@ def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> Non
 def test_what_the_valve_says_is_kept_and_its_echo_is_fresh_only_when_it_moves() -> None:
     line = listening(valve=True)
     inbox, sender = line.inbox, CATALOGUE.transmitter(ValveStatus)
+    inbox.valve_echo.sent(4)
 
     def say(opening: float, echo: int | None) -> int:
         flags = [False] * (len(ValveStatus._fields) - 5)
@@ -423,24 +432,15 @@ def test_what_the_valve_says_is_kept_and_its_echo_is_fresh_only_when_it_moves() 
     first_ns = say(0.4, None)
     assert inbox.valve_state is ValveState.FOLLOWING
     assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
-    assert inbox.valve_echo_ns == NEVER_HEARD_NS
+    assert inbox.valve_echo.heard_ns == NEVER_HEARD_NS
     say(NAN, None)
     assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
     second_ns = say(0.5, 3)
-    assert (inbox.valve_ns, inbox.valve_echo_ns) == (second_ns, second_ns)
+    assert (inbox.valve_ns, inbox.valve_echo.heard_ns) == (second_ns, second_ns)
     third_ns = say(0.5, 3)
     say(0.5, None)
-    assert (inbox.valve_ns > third_ns, inbox.valve_echo_ns) == (True, second_ns)
-    assert say(0.5, 4) == inbox.valve_echo_ns
-
-
-def test_a_drive_without_an_echo_is_not_fresh_for_it() -> None:
-    line = Line()
-    line.say(GOOD[DriveStatus1])
-    echo_ns = line.inbox.echo_ns
-    for echo in (None, 4, None, 4):
-        line.say(GOOD[DriveStatus1]._replace(command_echo=echo))  # type: ignore[attr-defined]
-        assert line.inbox.echo_ns == echo_ns
+    assert (inbox.valve_ns > third_ns, inbox.valve_echo.heard_ns) == (True, second_ns)
+    assert say(0.5, 4) == inbox.valve_echo.heard_ns
 
 
 @pytest.mark.parametrize("limited", ["power_limited", "speed_limited"])

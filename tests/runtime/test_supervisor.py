@@ -741,6 +741,83 @@ def test_what_is_latched_or_refuses_is_raised_in_that_tick_alone() -> None:
     assert bench.tick(**RAMPING, link_lost=True).raised is Fault.BUS_LOST
 
 
+@pytest.mark.parametrize("roll_rad", [0.36, -0.36])
+def test_a_ship_that_rolls_beyond_her_limit_is_not_armed_as_she_passes_upright(
+    roll_rad: float,
+) -> None:
+    bench = Bench()
+    bench.tick(roll_rad=roll_rad)
+    for _ in range(998):
+        bench.tick()
+    assert not bench.tick(**ARMING).arming
+    assert (bench.supervisor.fault, bench.supervisor.raised) == (Fault.HEEL_LIMIT,) * 2
+    assert bench.tick(**ARMING).arming
+    bench = Bench()
+    bench.tick(roll_rad=0.35)
+    assert bench.tick(**ARMING).arming
+
+
+def test_a_roll_beyond_the_limit_while_arming_ends_it() -> None:
+    bench = Bench()
+    bench.tick()
+    assert bench.tick(**ARMING).arming
+    bench.tick(**{**ACTIVE, "drive_enabled": False, "roll_rad": 0.4})
+    assert bench.supervisor.raised is Fault.HEEL_LIMIT
+
+
+PASSIVE = {"requested_mode": Mode.PASSIVE}
+
+
+def out_ms(bench: Bench, **changes: object) -> float:
+    """What a tick in PASSIVE counts; the tick stays there."""
+    seen = replace(HEALTHY, **PASSIVE, **changes)  # type: ignore[arg-type]
+    bench.supervisor.update(seen, bench.now_ns)
+    bench.now_ns += TICK_NS
+    assert bench.supervisor.mode is Mode.PASSIVE
+    return seen.drive_out_ms
+
+
+def test_a_drive_in_passive_has_its_time_to_get_enabled_and_then_counts_as_out() -> None:
+    bench = passive_bench()
+    assert {out_ms(bench) for _ in range(199)} == {0.0}
+    assert [out_ms(bench) for _ in range(5)] == [10.0, 20.0, 30.0, 40.0, 50.0]
+    assert bench.supervisor.drive_wanted
+    assert out_ms(bench, drive_enabled=True) == 0.0
+
+
+def test_a_drive_that_leaves_in_passive_counts_as_out_from_then_on() -> None:
+    bench = passive_bench()
+    assert out_ms(bench, drive_enabled=True) == 0.0
+    assert [out_ms(bench) for _ in range(3)] == [10.0, 20.0, 30.0]
+    assert out_ms(bench, drive_enabled=True) == 0.0
+
+
+def test_a_drive_that_comes_and_goes_in_passive_counts_as_out() -> None:
+    bench = passive_bench()
+    out_ms(bench, drive_enabled=True)
+    counted = [out_ms(bench, drive_enabled=tick % 2 == 1) for tick in range(12)]
+    assert counted[:4] == [10.0, 0.0, 10.0, 0.0]
+    assert min(counted[4:]) > 0.0
+    assert counted[-1] > 40.0
+
+
+def test_a_drive_counts_as_out_in_passive_after_active_at_once() -> None:
+    bench = armed_bench()
+    bench.tick(**{**ACTIVE, **PASSIVE})
+    assert [out_ms(bench) for _ in range(2)] == [10.0, 20.0]
+
+
+def test_elsewhere_it_is_off_as_it_should_be() -> None:
+    bench = passive_bench()
+    out_ms(bench, drive_enabled=True)
+    assert out_ms(bench) == 10.0
+    seen = replace(HEALTHY, drive_out_ms=50.0, requested_mode=Mode.STANDBY)
+    bench.supervisor.update(seen, bench.now_ns)
+    assert bench.supervisor.mode is Mode.STANDBY
+    bench.supervisor.update(seen, bench.now_ns + TICK_NS)
+    assert seen.drive_out_ms == 0.0
+
+
 READY = {
     "motion_age_ms": 40, "tank_age_ms": 100, "pump_age_ms": 1000, "drive_age_ms": 60,
     "echo_age_ms": 100,

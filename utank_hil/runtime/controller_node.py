@@ -449,7 +449,8 @@ class ControllerNode:
                 self._controller.reset()
             elif not self._law_raised:
                 self._law_failed = False
-        except Exception as error:  # a law may be anybody's: whatever it raises cuts the pressure
+        # a law may be anybody's: whatever it raises cuts the pressure
+        except (Exception, SystemExit) as error:
             self._law_failed = self._law_raised = True
             self.law_error = self.law_error or f"{type(error).__name__}: {error}"
         if self._law_failed:
@@ -586,6 +587,7 @@ class ControllerNode:
         if self._pump:
             timeout_s = self._settings.command_timeout_s
             frames.append(self._commands.frame(PumpCommand(self.command_pa, word, timeout_s)))
+            self.inbox.pump_echo.sent(self._commands.counter)
         if self._valve is not None:
             frames.append(self._valve.frame(self.inbox, follow=follow))
         return frames

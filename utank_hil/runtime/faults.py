@@ -16,6 +16,8 @@ from utank_hil.runtime.observations import VALVE_OFF, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 
 _NONE: Final = Finding(0)
+ROLL_CALM_S: Final = 10
+"""Half the roll period of a ship that rolls slowly: from one greatest roll to the next."""
 
 Judgement: TypeAlias = Callable[[Observations, SafetyLimits], bool]
 
@@ -201,13 +203,14 @@ FAULTS: Final = (
     ),
     _row(
         Fault.DRIVE_SILENT,
-        "The pump drive sends no status, or does not receive the commands.",
+        "The pump drive sends no status, or does not receive the commands in time.",
         "Check the drive's supply and bus connection. If DRIVE_STATUS_1 arrives but its command "
-        "echo stands still, the drive does not accept PUMP_CMD.",
+        "echo stands still, the drive does not accept PUMP_CMD; if it is behind, look for what "
+        "holds frames up, a gateway for example.",
         Condition(
             Reaction.STOP,
-            "status older than {drive_age_ms:g} ms, or no new command echo for over "
-            "{echo_age_ms:g} ms",
+            "status older than {drive_age_ms:g} ms, or no new command echo, at most three commands "
+            "behind, for over {echo_age_ms:g} ms",
             lambda seen, limits: (
                 seen.drive_age_ms > limits.drive_age_ms or seen.echo_age_ms > limits.echo_age_ms
             ),
@@ -228,13 +231,14 @@ FAULTS: Final = (
     ),
     _row(
         Fault.VALVE_SILENT,
-        "The tank's valve sends no status, or does not receive the commands.",
+        "The tank's valve sends no status, or does not receive the commands in time.",
         "Check the valve's supply and bus connection. If VALVE_STATUS arrives but its command echo "
-        "stands still, the valve does not accept VALVE_CMD.",
+        "stands still, the valve does not accept VALVE_CMD; if it is behind, look for what holds "
+        "frames up, a gateway for example.",
         Condition(
             Reaction.STOP,
-            "status older than {valve_age_ms:g} ms, or no new command echo for over "
-            "{valve_echo_age_ms:g} ms",
+            "status older than {valve_age_ms:g} ms, or no new command echo, at most three commands "
+            "behind, for over {valve_echo_age_ms:g} ms",
             lambda seen, limits: (
                 seen.valve_age_ms > limits.valve_age_ms
                 or seen.valve_echo_age_ms > limits.valve_echo_age_ms
@@ -526,6 +530,11 @@ FAULTS: Final = (
                 abs(seen.roll_rad) > limits.roll_limit_rad
                 or abs(seen.heel_rad) > limits.heel_limit_rad
             ),
+        ),
+        Condition(  # a ship that rolls through upright is upright twice in a period
+            Reaction.REFUSE,
+            f"roll over {{roll_limit_rad:g}} rad within the last {ROLL_CALM_S} s",
+            lambda seen, _: seen.rolled_over_ms < 1e3 * ROLL_CALM_S,
         ),
         law_limit="roll_rad",
     ),

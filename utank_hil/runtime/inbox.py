@@ -31,6 +31,7 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
+from utank_hil.runtime.command_echo import CommandEcho
 from utank_hil.runtime.hardwired import HardwiredHeard
 from utank_hil.runtime.monitors.spikes import MotionGate, SpikeGates
 from utank_hil.runtime.motion_sensors import MotionSensor, MotionSensors
@@ -94,8 +95,9 @@ class Inbox:
     pressure_pa : float
         Measured across the pump, received at `pump_ns`.
     drive_state, drive_fault : DriveState or None, DriveFault or None
-        Received at `drive_ns`; the echo of a new command at `echo_ns`. Without a pump the drive
-        counts as enabled and is never late.
+        Received at `drive_ns`. Without a pump the drive counts as enabled and is never late.
+    pump_echo, valve_echo : CommandEcho
+        Whether drive and valve get the commands in time.
     drive_warns : bool
         A warning bit was set in the last DRIVE_STATUS_2.
     drive_held_back : bool
@@ -105,7 +107,7 @@ class Inbox:
     valve_opening : float
         As the valve last measured it, at `valve_ns`; 1, open, before and where there is none.
     valve_state, valve_fault : ValveState or None, ValveFault or None
-        As the valve last reported; the echo of a new command came at `valve_echo_ns`.
+        As the valve last reported.
     stations : Stations
         What the operators want.
     second_strange_ns : int
@@ -204,14 +206,14 @@ class Inbox:
         self.valve_opening = 1.0
         self.valve_state: ValveState | None = None
         self.valve_fault: ValveFault | None = ValveFault.NONE
-        self.valve_ns = self.valve_echo_ns = NEVER_HEARD_NS
-        self._valve_echo: int | None = None
+        self.valve_ns = NEVER_HEARD_NS
+        self.valve_echo = CommandEcho()
         self.drive_state = None if pump else _ENABLED
         self.drive_fault: DriveFault | None = DriveFault.NONE
         self.versions_match = False
         self.motion_ns = self.tank_ns = NEVER_HEARD_NS
-        self.pump_ns = self.drive_ns = self.echo_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
-        self._echo: int | None = None
+        self.pump_ns = self.drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
+        self.pump_echo = CommandEcho(self.pump_ns)
         self.tank_cycles = self._cycles = self._tank_lost = 0
         self._tank_due_ns = NEVER_HEARD_NS  # when the last frame was due by its counter
         self._tank_patience_ns = self._tank.cycle_ns * 3 // 2
@@ -338,9 +340,7 @@ class Inbox:
         self.drive_state = status.state
         self.drive_held_back = status.power_limited or status.speed_limited
         self.drive_ns = now_ns
-        if status.command_echo is not None and status.command_echo != self._echo:
-            self._echo = status.command_echo
-            self.echo_ns = now_ns
+        self.pump_echo.heard(status.command_echo, now_ns)
 
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
         self.drive_fault = status.fault
@@ -357,9 +357,7 @@ class Inbox:
         self.valve_fault = status.fault
         if math.isfinite(status.opening):
             self.valve_opening, self.valve_ns = status.opening, now_ns
-        if status.command_echo is not None and status.command_echo != self._valve_echo:
-            self._valve_echo = status.command_echo
-            self.valve_echo_ns = now_ns
+        self.valve_echo.heard(status.command_echo, now_ns)
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)

@@ -97,6 +97,8 @@ class Observations:
         The hard-wired stop loop is open or broken.
     roll_rad, heel_rad : float
         Roll, and its low-pass over a minute.
+    rolled_over_ms : float
+        Time since the roll was beyond its limit; the supervisor counts it.
     tick_late_ms : float
         Lateness of this tick.
     overruns_in_ten : int
@@ -147,6 +149,7 @@ class Observations:
     high_level: bool = False
     hardwired_stop: bool = False
     roll_rad: float = 0.0
+    rolled_over_ms: float = math.inf
     heel_rad: float = 0.0
     tick_late_ms: float = 0.0
     overruns_in_ten: int = 0
@@ -228,7 +231,7 @@ class Observer:
         seen.tank_age_ms = (now_ns - inbox.tank_ns) / MILLISECOND_NS
         seen.pump_age_ms = (now_ns - inbox.pump_ns) / MILLISECOND_NS
         seen.drive_age_ms = (now_ns - inbox.drive_ns) / MILLISECOND_NS
-        seen.echo_age_ms = (now_ns - inbox.echo_ns) / MILLISECOND_NS
+        seen.echo_age_ms = (now_ns - inbox.pump_echo.heard_ns) / MILLISECOND_NS
         seen.panel_age_ms = (now_ns - stations.heard_ns) / MILLISECOND_NS
         seen.drive_enabled = inbox.drive_state is _DRIVE_ENABLED
         seen.drive_fault = (

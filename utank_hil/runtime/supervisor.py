@@ -72,7 +72,9 @@ class Supervisor:
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
         self._passive_until_ns = 0
+        self._enabling_until_ns = 0  # in PASSIVE
         self._begin_noting(0)
+        self._rolled_over_ns = -_NEVER_NS
         self._zero_at_ns = _NEVER_NS  # the earliest end of those ramps that run
 
     @property
@@ -83,6 +85,9 @@ class Supervisor:
     def update(self, seen: Observations, now_ns: int) -> None:
         """Take one tick's observations and set `mode`, `fault`, `demand` and `drive_wanted`."""
         self.raised = _NO_FAULT
+        if abs(seen.roll_rad) > self.limits.roll_limit_rad:
+            self._rolled_over_ns = now_ns
+        seen.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
         if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
             return
@@ -136,6 +141,7 @@ class Supervisor:
 
     def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
         ramping = seen.command_pa != 0.0
+        seen.drive_out_ms = 0.0  # off, as it should be
         if self.mode is Mode.PASSIVE:
             if ramping:
                 # so what ends ACTIVE ends this
@@ -144,6 +150,7 @@ class Supervisor:
                 if now_ns >= self._zero_at_ns:
                     self.demand = Demand.ZERO
             else:
+                self._note_passive_drive(seen, now_ns)
                 found = judging.first_ending_passive(seen, self.limits)
             if found is not None:
                 self._latch(*found, seen, now_ns)
@@ -168,6 +175,8 @@ class Supervisor:
         # an old order says nothing of now
         elif self._passive_until_ns and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms:
             self._disarm(Mode.PASSIVE)
+            within_ms = self.limits.arming_timeout_ms
+            self._enabling_until_ns = now_ns + round(within_ms * MILLISECOND_NS)
 
     def _begin_arming(self, seen: Observations, now_ns: int) -> None:
         seen.drive_out_ms = 0.0  # off, as it should be
@@ -229,6 +238,15 @@ class Supervisor:
         if found is not None:
             zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
             self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
+
+    def _note_passive_drive(self, seen: Observations, now_ns: int) -> None:
+        """Count how long it is out of operation enabled; it gets its time to get there."""
+        if now_ns < self._enabling_until_ns:
+            self._begin_noting(now_ns)
+            if seen.drive_enabled:
+                self._enabling_until_ns = 0
+        else:
+            self._note_drive(seen, now_ns)
 
     def _begin_noting(self, now_ns: int) -> None:
         self._drive_enabled_ns = self._noted_ns = now_ns

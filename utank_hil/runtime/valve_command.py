@@ -82,7 +82,7 @@ class ValveCommander:
     def observe(self, inbox: Inbox, seen: Observations, now_ns: int) -> None:
         """Set what concerns the valve in `seen`, once a tick."""
         seen.valve_age_ms = (now_ns - inbox.valve_ns) / MILLISECOND_NS
-        seen.valve_echo_age_ms = (now_ns - inbox.valve_echo_ns) / MILLISECOND_NS
+        seen.valve_echo_age_ms = (now_ns - inbox.valve_echo.heard_ns) / MILLISECOND_NS
         seen.valve_fault = _reports_fault(inbox)
         if not self._following or inbox.valve_state is _FOLLOWING:
             self._followed_ns = now_ns
@@ -107,7 +107,9 @@ class ValveCommander:
             self._resets_left = 0
         self._following = control is ValveControl.FOLLOW
         self._told = self._asked if self._following else self._valve.fail_opening
-        return self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
+        frame = self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
+        inbox.valve_echo.sent(self._sender.counter)
+        return frame
 
 
 def _reports_fault(inbox: Inbox) -> bool:
