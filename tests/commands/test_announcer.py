@@ -222,7 +222,11 @@ def test_process_that_dies_at_its_start_is_an_error_at_once(
 
 def test_process_that_died_is_an_error_and_nothing_waits_for_it() -> None:
     announcer = Announcer()
+    assert announcer.failure() == ""
     announcer._process.kill()
+    wait_for(lambda: not announcer._process.is_alive())
+    assert "ended with code -9" in announcer.failure()
+    assert announcer.failure() == ""  # once
     announcer.write(TRIAL, 0)
     announcer.stop()
     assert announcer.error is not None

@@ -20,6 +20,7 @@ from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
     why_not_commissioned,
+    why_not_replaceable,
     write_record,
 )
 from utank_hil.commands.common import new_app
@@ -358,13 +359,53 @@ def test_a_place_that_is_not_writable_is_named_before_the_ship_is_moved(
     assert "--record" in result.output
 
 
+@pytest.mark.parametrize("there", ["name: a ship\n", "[1, 2]", '{"roll_rad": 1.0}', "3", None])
+def test_what_is_no_record_is_not_replaced_by_one(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: str | None
+) -> None:
+    path = tmp_path / "there"
+    if there is None:
+        os.mkfifo(path)
+    else:
+        path.write_text(there)
+    result = commission(monkeypatch, AtTheQuay, file, "--record", path)
+    assert result.exit_code == ExitCode.USAGE
+    assert str(path) in result.output.replace("\n", "")
+    assert "--record" in result.output
+    assert path.is_fifo() if there is None else path.read_text() == there
+
+
+@pytest.mark.parametrize(("name", "there"), [
+    ("r.json", ""), ("r.json", None), ("r.json", '{"commissioned_for": {}}'),
+    ("r.commissioning.json", "cut off {"),
+])  # fmt: skip
+def test_a_record_that_is_there_is_replaced(tmp_path: Path, name: str, there: str | None) -> None:
+    if there is not None:
+        (tmp_path / name).write_text(there)
+    assert why_not_replaceable(tmp_path / name) == ""
+
+
+def test_a_record_is_json_that_anybody_reads(file: Path) -> None:
+    written = passed(file).read_text()
+    assert "Infinity" not in written
+    assert "NaN" not in written
+    record_path(file).write_text(written.replace('"headroom_m": null', '"headroom_m": Infinity'))
+    assert reason(file) == ""  # as it was written before
+
+
+def test_a_record_counts_on_its_own_interface(file: Path) -> None:
+    path = passed(file, "can1")
+    assert "was made on can1, and this is other hardware; run" in reason(file, "can0")
+    assert reason(file, "can1") == reason(file, "vcan0", path) == ""
+
+
 def test_run_says_why_arming_will_be_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "SocketCanPort", QuietBus)
     words = ["run", str(file), "--bus", "any0", "--duration", "0.1", "--json"]
     result = CliRunner().invoke(app, words)
     assert json.loads(result.stdout)["not_commissioned"].startswith(f"{record_path(file)}: there")
     assert "arming will be refused:" in result.stderr
-    passed(file)
+    passed(file, "any0")
     result = CliRunner().invoke(app, words)
     assert json.loads(result.stdout)["not_commissioned"] == ""
     assert "refused" not in result.stderr

@@ -98,6 +98,24 @@ def test_a_pipe_that_nobody_reads_is_no_refusal() -> None:
         assert started(("check", GPC), stdout=closed).returncode == ExitCode.USAGE
 
 
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_closed_standard_stream_is_nothing_and_its_number_is_not_another_file_s(
+    tmp_path: Path, closed: str
+) -> None:
+    opened = tmp_path / "opened"
+    program = (
+        "import os, sys\n"
+        "from utank_hil.commands.failures import failures_named\n"
+        "with failures_named():\n"
+        f"    print('text'); print('text', file=sys.stderr)\n"
+        f"    number = os.open({str(opened)!r}, os.O_CREAT | os.O_RDWR)\n"
+        "    os.write(number, str(number).encode())\n"
+    )
+    words = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-c", program]
+    assert subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode == 0
+    assert int(opened.read_text()) > 2
+
+
 def test_no_output_at_all_ends_with_the_same_code() -> None:
     with Path("/dev/full").open("w") as full:
         assert started(("check", GPC), stdout=full, stderr=full).returncode == ExitCode.USAGE

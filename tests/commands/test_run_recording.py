@@ -217,7 +217,9 @@ def test_recorder_that_is_ended_is_told_once_while_the_run_goes_on(
 
 
 @pytest.mark.slow
-def test_run_says_within_a_second_that_nothing_is_recorded_any_longer(tmp_path: Path) -> None:
+def test_run_says_within_a_second_that_nothing_is_recorded_or_logged_any_longer(
+    tmp_path: Path,
+) -> None:
     program = (
         "import ports, utank_hil.commands.run\n"
         "utank_hil.commands.run.SocketCanPort = ports.QuietBus\n"
@@ -237,20 +239,24 @@ def test_run_says_within_a_second_that_nothing_is_recorded_any_longer(tmp_path: 
         for line in run.stderr:
             told.append(line)
             if "Ctrl-C ends it" in line:
-                os.kill(recorder_of(run.pid), signal.SIGKILL)
+                os.kill(child_of(run.pid, b"utank_hil.telemetry.recorder"), signal.SIGKILL)
             if "not recorded" in line:
+                os.kill(child_of(run.pid, b"multiprocessing.spawn"), signal.SIGKILL)
+            if "not logged" in line:
                 break
         run.send_signal(signal.SIGINT)
         output = run.communicate()[0]
-    assert told[-1] == "not recorded any longer: the recorder failed: exit code -9\n"
-    assert json.loads(output)["recording"]["error"] == "the recorder failed: exit code -9"
+    lost = "the process that tells events ended with code -9"
+    assert told[-2] == "not recorded any longer: the recorder failed: exit code -9\n"
+    assert told[-1] == f"events are not logged any longer: {lost}\n"
+    report = json.loads(output)
+    assert report["recording"]["error"] == "the recorder failed: exit code -9"
+    assert report["log_error"] == lost
 
 
-def recorder_of(run: int) -> int:
+def child_of(run: int, words: bytes) -> int:
     children = Path(f"/proc/{run}/task/{run}/children").read_text().split()
     (found,) = [
-        int(child)
-        for child in children
-        if b"utank_hil.telemetry.recorder" in Path(f"/proc/{child}/cmdline").read_bytes()
+        int(child) for child in children if words in Path(f"/proc/{child}/cmdline").read_bytes()
     ]
     return found

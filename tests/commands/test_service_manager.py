@@ -52,6 +52,12 @@ def test_watchdog_is_fed_by_the_count_of_ticks_and_several_times_in_its_time(man
         assert messages(manager) == []
 
 
+def test_a_name_of_several_lines_is_one_line_and_no_order_to_the_manager(manager) -> None:
+    with ServiceManager(environment(manager)) as service:
+        service.ready("a\nWATCHDOG=trigger \ud800 on can0")
+    assert messages(manager) == ["READY=1\nSTATUS=a WATCHDOG=trigger ? on can0"]
+
+
 def test_ready_waits_for_a_manager_that_is_busy(manager) -> None:
     with ServiceManager(environment(manager)) as service:
         for _ in range(1000):  # its queue is full after some

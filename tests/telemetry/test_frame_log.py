@@ -127,9 +127,25 @@ def test_another_file_is_refused_with_its_name(tmp_path: Path) -> None:
         FrameLog(tmp_path / "b.frames")
 
 
-def test_a_log_that_does_not_fit_is_named_and_read_up_to_there(tmp_path: Path) -> None:
+def test_a_log_that_does_not_fit_is_named_and_goes_on_in_the_next_part(tmp_path: Path) -> None:
     file = tmp_path / "a.frames"
     with little_room(), pytest.raises(OSError, match=f"File too large: '{file}'"):
         write_log(file, 230)
-    _, log = read(file)
-    assert f"{file.name} is cut" in log.cut
+    first, log = read(file)
+    assert log.cut == ""
+    second, _ = write_log(tmp_path / "a-part002.frames", 20, seed=1)
+    records, _ = read(file)
+    assert records.tobytes() == first.tobytes() + second
+
+
+def test_the_last_block_can_be_taken_back_once(tmp_path: Path) -> None:
+    file = tmp_path / "a.frames"
+    blocks = [np.frombuffer(tick(n, random.Random(n)), RECORD) for n in range(3)]
+    with FrameLogWriter(file, HEAD) as log:
+        for block in blocks[:2]:
+            log.write(block)
+        log.take_back()
+        log.take_back()
+        log.write(blocks[2])
+    records, _ = read(file)
+    assert records.tobytes() == blocks[0].tobytes() + blocks[2].tobytes()

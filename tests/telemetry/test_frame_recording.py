@@ -61,6 +61,27 @@ def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> No
     assert read(file.with_suffix(".frames")).tobytes() == data
 
 
+def test_what_the_recording_beside_it_could_not_take_is_in_the_next_part_alone(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "run-a.rrd"
+    with RingWriter(ROW, rows=IN_A_SLOT) as frames:
+        data = feed(frames, range(10))
+        with FrameRecording(frames.name, file, HEAD) as log:
+            log.write()
+            place = log.place
+            log.take_back(place)  # nothing came since
+            log.write()
+            log.take_back(0)  # nor was anything written
+            data += feed(frames, range(10, 20))
+            log.write()
+            log.take_back(place)
+        data += feed(frames, range(20, 30))
+        with FrameRecording(frames.name, tmp_path / "run-a-part002.rrd", HEAD, place) as log:
+            log.write()
+    assert read(file.with_suffix(".frames")).tobytes() == data
+
+
 def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
     with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:

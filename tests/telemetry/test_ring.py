@@ -186,6 +186,33 @@ def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
     foreign.unlink()
 
 
+@pytest.mark.parametrize("word", [2, 3, 4, 7, None])
+def test_a_damaged_segment_is_refused_and_stops_no_writer(word: int | None) -> None:
+    with RingWriter(["a", "b"]) as whole:
+        content = bytearray((SHM / whole.name).read_bytes())
+    if word is None:
+        content = content.replace(b'[["a"', b'}{]["')
+    else:
+        content[8 * word : 8 * word + 8] = (-5).to_bytes(8, "little", signed=True)
+    damaged = SHM / f"utank-{os.getpid()}-damaged"
+    damaged.write_bytes(content)
+    with pytest.raises(RingError, match="telemetry ring"):
+        RingReader(damaged.name)
+    RingWriter(["a"]).close()
+    damaged.unlink()
+
+
+@pytest.mark.timeout(20)
+def test_a_pipe_of_somebody_else_holds_nobody_up() -> None:
+    pipe = SHM / f"utank-{os.getpid()}-pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(RingError, match="no telemetry ring"):
+        RingReader(pipe.name)
+    RingWriter(["a"]).close()
+    assert pipe.is_fifo()
+    pipe.unlink()
+
+
 def test_the_name_of_a_living_writer_is_not_taken_over() -> None:
     with RingWriter(["a"]) as writer, pytest.raises(RingError, match="its writer runs"):
         RingWriter(["a"], name=writer.name)

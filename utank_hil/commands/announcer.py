@@ -81,6 +81,13 @@ class Announcer:
         if self._writer is not None:
             self._writer.write(event, start_ns)
 
+    def failure(self) -> str:
+        """Why the process has ended before the run, once; never waits."""
+        if self.error is not None or self._process is None or self._process.is_alive():
+            return ""
+        self._note_end(self._process)
+        return self.error or ""
+
     def stop(self) -> None:
         """Have the last events printed, and find out whether all went well; idempotent."""
         writer, self._writer = self._writer, None
@@ -94,8 +101,12 @@ class Announcer:
             self._process.kill()
             self._process.join()
             self.error = "the process that tells events did not end and was killed"
-        elif self._process.exitcode != 0:
-            self.error = f"the process that tells events ended with code {self._process.exitcode}"
+        else:
+            self._note_end(self._process)
+
+    def _note_end(self, process: SpawnProcess) -> None:
+        if process.exitcode != 0:
+            self.error = f"the process that tells events ended with code {process.exitcode}"
 
 
 def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:

@@ -14,6 +14,7 @@ from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
     remove_record,
+    why_not_replaceable,
     write_record,
 )
 from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
@@ -57,8 +58,8 @@ def commission(
     """
     loaded = load(config, ControllerConfig)
     path = record or record_path(config)
-    reason = why_not_writable(path.parent, (path.name,))
-    if reason is not None:
+    reason = why_not_replaceable(path) or why_not_writable(path.parent, (path.name,))
+    if reason:
         fail(f"{reason}; choose another place with --record")
     statistics = LoopStatistics()
     with ExitStack() as stack:

@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel
 
 from utank_hil.canbus import load_catalogue
+from utank_hil.commands.common import finite
 from utank_hil.configuration import ControllerConfig
 from utank_hil.provenance import PROGRAM, commit, version
 from utank_hil.runtime.commissioning.checks import Check
@@ -80,6 +81,22 @@ def make_record(
     }
 
 
+def why_not_replaceable(path: Path) -> str:
+    """Why no record may be written to a place, because of what is there; empty if it may."""
+    if not path.exists():
+        return ""
+    if not path.is_file():
+        return f"{path}: is no regular file"
+    if path.name.endswith(SUFFIX):  # one that is damaged, too
+        return ""
+    try:
+        there = path.read_text(encoding="utf-8")
+        record = not there.strip() or "commissioned_for" in json.loads(there)
+    except (OSError, ValueError, TypeError):
+        record = False
+    return "" if record else f"{path}: is there and is no record of a commissioning"
+
+
 def write_record(path: Path, record: dict[str, Any]) -> None:
     """Write a record so that at any time there is the old one or the new one as a whole.
 
@@ -92,7 +109,7 @@ def write_record(path: Path, record: dict[str, Any]) -> None:
         "w", dir=path.parent, prefix=path.name, delete=False, encoding="utf-8"
     ) as file:
         try:
-            json.dump(record, file, indent=1)
+            json.dump(finite(record), file, indent=1, allow_nan=False)
             file.write("\n")
             file.flush()
             os.fsync(file.fileno())
@@ -150,14 +167,16 @@ def why_not_commissioned(config: ControllerConfig, bus: str, file: Path, path: P
         return f"{path}: there is no record of a commissioning; {remedy}"
     except (OSError, ValueError):
         return f"{path}: is no record of a commissioning that can be read; {remedy}"
-    stands_for = json.loads(json.dumps(commissioned_for(config)))
-    changed = _differences(record.commissioned_for, stands_for)
+    stands_for = json.loads(json.dumps(finite(commissioned_for(config))))
+    changed = _differences(finite(record.commissioned_for), stands_for)
     if changed:
         return f"{path}: since {record.date} these changed: {', '.join(changed)}; {remedy}"
     if not record.whole:
         return f"{path}: the commissioning of {record.date} was not passed; {remedy}"
     if _is_emulated(record.bus) and not _is_emulated(bus):
         return f"{path}: was made on {record.bus}, where no hardware is; {remedy}"
+    if record.bus != bus and not _is_emulated(bus):
+        return f"{path}: was made on {record.bus}, and this is other hardware; {remedy}"
     return ""
 
 

@@ -2,6 +2,7 @@
 
 import errno
 import io
+import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
@@ -32,8 +33,14 @@ KILLED: Final = "a process of this command was killed: too little memory?"
 def failures_named() -> Iterator[None]:
     """End in words where a package of an extra is not installed or a file can't be used.
 
-    Signs that the terminal's encoding lacks become question marks.
+    Signs that the terminal's encoding lacks become question marks. A standard stream that is closed
+    is /dev/null: a file or the bus would get its number, and the text that is meant for it.
     """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            mode = "w" if number else "r"
+            stream = open(os.open(os.devnull, os.O_RDWR), mode, encoding="utf-8")  # noqa: SIM115
+            setattr(sys, name, stream)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")
     try:

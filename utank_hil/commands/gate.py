@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from rich.text import Text
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
@@ -78,7 +77,7 @@ def judge(
         As in `margins`.
     """
     try:
-        with notes.status(Text(f"{config.name}: designing its law")):  # takes seconds at times
+        with notes.busy(f"{config.name}: designing its law"):  # takes seconds at times
             law = build_law(config)
     except ParameterError as error:
         fail_with(located(error, path, key))

@@ -149,6 +149,9 @@ def run(
                 failure = recording.failure()
                 if failure:
                     alarms.say(f"not recorded any longer: {failure}")
+                failure = "" if announcer is None else announcer.failure()
+                if failure:
+                    alarms.say(f"events are not logged any longer: {failure}")
             return stop()
 
         with real_time_scheduling() as scheduling:
@@ -170,10 +173,11 @@ def run(
     kept = None if out is None else recording.summary
     # where the output is full or gone (Rich ends by SystemExit), the exit code tells how it ended
     with suppress(OSError, SystemExit):
-        if announcer is not None and announcer.error is not None:
-            notes.say(announcer.error, red="events were not logged:")
+        unlogged = None if announcer is None else announcer.error
+        if unlogged is not None:
+            notes.say(unlogged, red="events were not logged:")
         if json_:
-            print_json(_as_json(node, statistics, kept, refused))
+            print_json(_as_json(node, statistics, kept, refused) | {"log_error": unlogged})
         else:
             _print_summary(loaded.name, node, statistics, kept)
     raise typer.Exit(_code(node))

@@ -58,7 +58,8 @@ class ServiceManager(Closing):
         """
         if self._socket is not None:
             self._socket.settimeout(READY_S)
-            self._socket.send(f"READY=1\nSTATUS={status}".encode())
+            words = " ".join(status.split())  # a line is an assignment of its own
+            self._socket.send(f"READY=1\nSTATUS={words}".encode(errors="replace"))
             self._socket.setblocking(False)
 
     def progress(self, ticks: int) -> None:

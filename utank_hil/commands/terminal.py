@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,6 +58,10 @@ class Terminal(Console):
         colours = {"red": red, "yellow": yellow, "green": green}
         parts = [Text(words, colour) for colour, words in colours.items() if words]
         self.print(*parts, *([text] if text or not parts else []), soft_wrap=True)
+
+    def busy(self, words: str) -> AbstractContextManager[object]:
+        """Show on a terminal what is being done."""
+        return self.status(Text(words)) if self.is_terminal else nullcontext()
 
     def files(self, files: Mapping[str, Path]) -> None:
         """Print which files were written, by what they hold."""

@@ -178,6 +178,8 @@ def record_part(source: Source, progress: Progress) -> bool:
         if source.frames is not None:
             log = FrameRecording(source.frames, file, source.head, places.frames)
             stack.enter_context(log)
+            # where the other file fails, both go on from the same place in the next part
+            stack.callback(lambda: log.take_back(progress.places.frames))
         if number == 1:
             _print_json({"ready": 1})
         time = reader.columns.index("time_s")
@@ -240,6 +242,7 @@ class FrameRecording(Closing):
     ) -> None:
         self._reader = RingReader(ring, place)
         self._writer = FrameLogWriter(file.with_suffix(SUFFIX), head)
+        self._wrote = False
         self.lost = 0
 
     @property
@@ -251,6 +254,7 @@ class FrameRecording(Closing):
         """Write what has come since the last call."""
         rows = self._reader.read()
         records = records_of(rows)
+        self._wrote = len(records) > 0
         lost = self._reader.lost - self.lost
         if lost and len(records):
             self.lost += lost
@@ -258,6 +262,11 @@ class FrameRecording(Closing):
             gap["kind"], gap["number"], gap["time_ns"] = Kind.LOST, lost, records["time_ns"][0]
             records = np.concatenate([gap, records])
         self._writer.write(records)
+
+    def take_back(self, place: int | None) -> None:
+        """Remove what was written since the reader was at a place, if anything."""
+        if self._wrote and self.place != place:
+            self._writer.take_back()
 
     def close(self) -> None:
         """Close ring and file; idempotent."""

@@ -30,6 +30,7 @@ import json
 import mmap
 import os
 import secrets
+import stat
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from multiprocessing import resource_tracker
@@ -238,10 +239,16 @@ class RingReader(Closing):
         magic, version, width, capacity, text_bytes, pid, start, rows = map(int, words[:8])
         first = _first_slot_word(text_bytes)
         stride = rows * width + 1
-        if (magic, version) != (_MAGIC, _VERSION) or size < 8 * (first + capacity * stride):
+        fits = min(width, capacity, text_bytes, rows) > 0 and size >= 8 * (
+            first + capacity * stride
+        )
+        if (magic, version) != (_MAGIC, _VERSION) or not fits:
             raise RingError(f"{name!r} is not a telemetry ring of version {_VERSION}")
         text = self._map[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + text_bytes]
-        columns, about = json.loads(text)
+        try:
+            columns, about = json.loads(text)
+        except ValueError as error:
+            raise RingError(f"{name!r} is a damaged telemetry ring") from error
         self.columns: tuple[str, ...] = tuple(columns)
         self.about: dict[str, Any] | None = about
         self.writer_pid = pid
@@ -322,9 +329,14 @@ def held_ring(name: str) -> str:
 def _opened(name: str) -> int:
     """Descriptor of a ring's segment, to read."""
     try:
-        return os.open(_SHM / name, os.O_RDONLY | os.O_CLOEXEC)
+        # somebody else's may be a pipe, which waits for a writer
+        descriptor = os.open(_SHM / name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except FileNotFoundError as error:
         raise RingError(f"no ring {name!r}: is its writer running?") from error
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise RingError(f"{name!r} is no telemetry ring")
+    return descriptor
 
 
 def ring_names() -> list[str]:
