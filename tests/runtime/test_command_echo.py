@@ -42,6 +42,14 @@ def test_one_that_goes_to_and_fro_counts_only_where_the_commands_are() -> None:
     assert max(silent) >= 11
 
 
-def test_before_the_first_there_is_none() -> None:
-    assert CommandEcho().heard_ns == NEVER_HEARD_NS
+def test_before_the_first_command_there_is_none() -> None:
     assert CommandEcho(7).heard_ns == 7
+    echo = CommandEcho()
+    for counter in range(16):  # of a controller before this one
+        echo.heard(counter, 5)
+    assert echo.heard_ns == NEVER_HEARD_NS
+    echo.sent(1)
+    echo.heard(1, 6)
+    echo.heard(None, 7)
+    echo.heard(1, 8)
+    assert echo.heard_ns == 6

@@ -807,6 +807,14 @@ def test_a_drive_counts_as_out_in_passive_after_active_at_once() -> None:
     assert [out_ms(bench) for _ in range(2)] == [10.0, 20.0]
 
 
+def test_a_drive_that_is_out_in_passive_may_be_armed() -> None:
+    bench = passive_bench()
+    out_ms(bench, drive_enabled=True)
+    assert [out_ms(bench) for _ in range(5)][-1] == 50.0
+    assert bench.tick(**ARMING).arming
+    assert bench.tick(**ACTIVE).mode is Mode.ACTIVE
+
+
 def test_elsewhere_it_is_off_as_it_should_be() -> None:
     bench = passive_bench()
     out_ms(bench, drive_enabled=True)

@@ -47,6 +47,11 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "STILL_ALONE": _TEN_OR_MORE,
     },
     "utank_hil/runtime/supervisor.py": {
+        "Supervisor.__init__: self._enabling_until_ns = 0 -> self._enabling_until_ns = 1": (
+            "PASSIVE is never at the beginning of the clock"
+        ),
+        "Supervisor._note_passive_drive: self._enabling_until_ns = 0 -> "
+        "self._enabling_until_ns = 1": "a nanosecond after the beginning of the clock, likewise",
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 2 << 62": _NEVER,
         ": _NEVER_NS: Final = 1 << 62 -> _NEVER_NS: Final = 1 << 63": _NEVER,
         "Supervisor.__init__: self._begin_noting(0) -> ": _SET_FIRST,
@@ -444,6 +449,7 @@ TARGETS = (
             *_NODE,
         ),
     ),
+    Target("utank_hil/runtime/command_echo.py", ("tests/runtime/test_command_echo.py",)),
     Target(
         "utank_hil/runtime/orders.py",
         ("tests/runtime/test_orders.py",),

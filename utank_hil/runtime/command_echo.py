@@ -32,7 +32,7 @@ class CommandEcho:
     def __init__(self, heard_ns: int = NEVER_HEARD_NS) -> None:
         self.heard_ns = heard_ns
         self._counter: int | None = None
-        self._sent = 0
+        self._sent: int | None = None
 
     def sent(self, counter: int) -> None:
         """Note the counter of the command that leaves."""
@@ -40,7 +40,7 @@ class CommandEcho:
 
     def heard(self, counter: int | None, now_ns: int) -> None:
         """Take the counter in a status; None where there is none yet."""
-        if counter is None or counter == self._counter:
+        if counter is None or counter == self._counter or self._sent is None:
             return
         self._counter = counter
         if (self._sent - counter) & _COUNTER_MASK <= MOST_BEHIND:
