@@ -359,7 +359,9 @@ def test_a_place_that_is_not_writable_is_named_before_the_ship_is_moved(
     assert "--record" in result.output
 
 
-@pytest.mark.parametrize("there", ["name: a ship\n", "[1, 2]", '{"roll_rad": 1.0}', "3", None])
+@pytest.mark.parametrize(
+    "there", ["name: a ship\n", "[1, 2]", '["commissioned_for"]', '{"roll_rad": 1.0}', "3", None]
+)
 def test_what_is_no_record_is_not_replaced_by_one(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, there: str | None
 ) -> None:

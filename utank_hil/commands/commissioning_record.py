@@ -87,14 +87,15 @@ def why_not_replaceable(path: Path) -> str:
         return ""
     if not path.is_file():
         return f"{path}: is no regular file"
-    if path.name.endswith(SUFFIX):  # one that is damaged, too
+    if path.name.endswith(SUFFIX) or not path.stat().st_size:  # one that is damaged, too
         return ""
     try:
-        there = path.read_text(encoding="utf-8")
-        record = not there.strip() or "commissioned_for" in json.loads(there)
-    except (OSError, ValueError, TypeError):
-        record = False
-    return "" if record else f"{path}: is there and is no record of a commissioning"
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = None
+    if isinstance(content, dict) and "commissioned_for" in content:
+        return ""
+    return f"{path}: is there and is no record of a commissioning"
 
 
 def write_record(path: Path, record: dict[str, Any]) -> None:

@@ -87,10 +87,10 @@ class Supervisor:
         self.raised = _NO_FAULT
         if abs(seen.roll_rad) > self.limits.roll_limit_rad:
             self._rolled_over_ns = now_ns
-        seen.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
         if self.mode is _ACTIVE:
             self._while_active(seen, now_ns)
             return
+        seen.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
         # asked for once, it is due until it is there, or something else is asked for, or it is old
         if seen.passive_edge:
             self._passive_until_ns = now_ns + PASSIVE_WITHIN_NS
