@@ -20,7 +20,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
-	@echo "make test       lint, types and the tests, those on a real CAN bus included: 17 minutes"
+	@echo "make test       lint, types and the tests, those on a real CAN bus included: 20 minutes"
 	@echo "make test-fast  the quick tests, without CAN: three minutes"
 	@echo "make compiled   simulations in 0.4 of the time, until the source changes; a minute, with gcc"
 	@echo "make evidence   what takes longer, where its result is missing or out of date: hours at first;"
