@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from scipy.stats import gumbel_r
 from tools.evidence.sources import ROOT
 from tools.studies import false_alarms
 from tools.studies.false_alarms import by_monitor, code, hours, judged, rate_per_hour, sail
+from tools.studies.monitor_margins import margins
 
 
 def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
@@ -55,6 +57,15 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
     row = judged("adaptive_gpc", sea, runs)
     assert (row["hours"], row["worst"], row["found_in_hours"]) == (6, "drift", {"DRIFT": [2]})
     assert row["maxima"]["drift"] == pytest.approx(0.1 * np.arange(1, 7))
+
+
+def test_what_ends_control_is_found_though_no_monitor_finds_it() -> None:
+    scenario = dict(hours("gpc"))["storm"]
+    low = replace(scenario.sensors, high_level_m=0.5)
+    found_s = margins(scenario.model_copy(update={"sensors": low}), "gpc", 1, 60.0)["found_s"]
+    assert list(found_s) == ["LEVEL_LIMIT"]
+    assert 5.0 < found_s["LEVEL_LIMIT"] < 60.0
+    assert margins(scenario, "gpc", 1, 60.0)["found_s"] == {}
 
 
 @pytest.mark.parametrize(

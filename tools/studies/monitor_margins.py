@@ -4,7 +4,8 @@
     python -m tools.studies.monitor_margins configs/scenarios/*.yaml --minutes 10
 
 In lockstep, with bus, nodes, sensors, retuning and the scenario's operator. One is the threshold. A
-gain's margin is its distance from 1 over the distance at which it is found.
+gain's margin is its distance from 1 over the distance at which it is found. `found_s` has what the
+monitors found, and the fault that ended control, which may be none of theirs (a high-level switch).
 """
 
 import sys
@@ -51,14 +52,14 @@ def shares(monitors: Monitors) -> dict[str, float]:
 
 
 class Onlooker:
-    """Keeps the largest share of each monitor, and when each finding came first."""
+    """Keeps the largest share of each monitor, and when each finding and the fault came first."""
 
     name = "onlooker"
     period_ns = LOOK_TICKS * TICK_NS
 
     def __init__(self, node: ControllerNode) -> None:
         assert node.monitors is not None
-        self._monitors = node.monitors
+        self._node, self._monitors = node, node.monitors
         self.largest: dict[str, float] = {}
         self.found_s: dict[str, float] = {}
 
@@ -73,6 +74,8 @@ class Onlooker:
         if self._monitors.found:
             for finding in Finding(self._monitors.found):
                 self.found_s.setdefault(str(finding.name), now_ns / SECOND_NS)
+        if self._node.mode is Mode.FAULT:
+            self.found_s.setdefault(self._node.fault.name, now_ns / SECOND_NS)
         return ()
 
 
