@@ -13,7 +13,13 @@ from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.runtime.passive_twin import AMPLIFIED, LASTS_PERIODS, MEMORY_PERIODS, PassiveTwin
+from utank_hil.runtime.passive_twin import (
+    AMPLIFIED,
+    DECAY_PERIODS,
+    LASTS_PERIODS,
+    MEMORY_PERIODS,
+    PassiveTwin,
+)
 
 STEP_S = 0.05
 FIRST = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
@@ -179,7 +185,7 @@ def test_twin_that_capsizes_by_a_pressure_that_is_not_hers_begins_anew(
     capsized = 0
     for k in range(round(600.0 / STEP_S)):
         twin.update(0.05 * math.sin(0.5 * k * STEP_S), 0.0, 0.0, pressure_pa)
-        capsized += twin._losing_s <= 0.051 - 6.0 * period_s
+        capsized += twin._losing_s <= 0.051 - 8.0 * period_s
         assert abs(twin.roll_rad) < 1.1
         assert not twin.amplified
     assert capsized >= 1
@@ -245,6 +251,26 @@ def test_roll_that_was_made_on_purpose_is_forgotten_and_a_bad_law_after_it_is_fo
         twin.update(own_rad, 0.0, 0.0, effort_pa)
         amplified.append(twin.amplified)
     assert bad_s < t[np.argmax(amplified)] < bad_s + 6 * PERIOD_S
+
+
+@pytest.mark.parametrize("after_periods", [-0.5, 0.0, 0.5, 1.0, 1.5, 2.0])
+def test_sound_law_is_kept_through_a_lull_after_roll_that_was_made_on_purpose(
+    after_periods: float,
+) -> None:
+    """Of all that it did nothing but the lull is remembered."""
+    ends_s, begins_s = 20 * PERIOD_S, (20 + DECAY_PERIODS + after_periods) * PERIOD_S
+    t = np.arange(0.0, 40 * PERIOD_S, STEP_S)
+    lull = (t > begins_s) & (t < begins_s + 1.5 * PERIOD_S)
+    # the pump halves the roll of the waves; in the lull what it does is all the roll
+    waves_rad = np.where(lull, 0.01, 0.1) * np.sin(0.6 * t)
+    pressure_pa, made_rad = made_by_pump(t, np.full(len(t), -0.05))
+    twin = PassiveTwin(FIRST.ship, FIRST.tank, STEP_S, LEAST_RAD)
+    for time_s, own_rad, effort_pa in zip(t, waves_rad + made_rad, pressure_pa, strict=True):
+        if time_s < ends_s:
+            twin.excuse()
+        twin.update(own_rad, 0.0, 0.0, effort_pa)
+        assert not twin.amplified
+    assert twin.share < 0.6  # it is judged
 
 
 def test_share_is_1_where_the_law_has_lost_and_unknown_where_nothing_is_judged() -> None:

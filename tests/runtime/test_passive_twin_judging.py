@@ -114,7 +114,7 @@ def test_little_roll_is_not_judged() -> None:
     assert math.isnan(twin_of((0.01, 0.0), (0.01, 0.0)).share)
 
 
-def test_roll_on_purpose_is_not_judged_for_six_periods_and_then_forgotten() -> None:
+def test_roll_on_purpose_is_forgotten_after_six_periods_and_judged_after_two_more() -> None:
     twin = twin_of((0.04, 0.01), (0.04, 0.01))
     assert judged(twin, 20)[-1]
     twin.excuse()
@@ -125,9 +125,13 @@ def test_roll_on_purpose_is_not_judged_for_six_periods_and_then_forgotten() -> N
     assert judged(twin, 3) == [False] * 3
     assert (twin.ship_rms_rad, twin.rms_rad) == (0.0, 0.0)
     assert (twin._record_power, twin._twin_record_power) == (0.0, 0.0)
-    twin._power, twin._twin_power = (0.1 * 2.0) ** 2, 0.01  # more is left alone at first again
+    twin._power, twin._twin_power = 0.04, 0.01
     twin._record_power, twin._twin_record_power = 0.04, 0.01
-    assert twin.share == pytest.approx(2.0 / 2.25, rel=0.01)
+    assert judged(twin, 2 * UPDATES - 3) == [False] * (2 * UPDATES - 3)
+    assert math.isnan(twin.share)
+    # 0.72 of the room at the beginning is left
+    assert judged(twin, 20) == [False] * 18 + [True] * 2
+    assert twin.share == pytest.approx(2.0 / (1.25 + math.exp(-1 / 3)), rel=0.02)
 
 
 TABLE = replace(

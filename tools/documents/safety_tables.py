@@ -57,15 +57,17 @@ def false_alarm_rates(result: dict[str, Any]) -> Rows:
 
 
 def twin_errors(result: dict[str, Any]) -> Rows:
-    """The passive ship beside the twin, where a law came nearest to ROLL_AMPLIFIED."""
-    runs = sorted(result["runs"], key=lambda run: -run["share"])
+    """The passive ship beside the twin, where a law in a sea came nearest to ROLL_AMPLIFIED."""
+    nearest: dict[tuple[str, str], dict[str, Any]] = {}
+    for run in sorted(result["runs"], key=lambda run: -run["share"]):
+        nearest.setdefault((run["law"], run["sea"]), run)
     return [
         ["law", "sea", "over its threshold", "roll over the twin's", "over the passive ship's",
          "the same over twelve periods"],
         *(
             [f"`{run['law']}`", run["sea"], *(number(run[name], ".2f") for name in (
                 "share", "ratio_of_twin", "ratio_of_passive_ship", "over_twelve_periods"))]
-            for run in runs
+            for run in nearest.values()
         ),
     ]  # fmt: skip
 

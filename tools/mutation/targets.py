@@ -383,6 +383,10 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "PassiveTwin.update: if self._loss: -> if True:": _LONGER_WAY,
         "PassiveTwin._moment_beside_nm: if self._straight: -> if False:": _LONGER_WAY,
         "PassiveTwin._moment_beside_nm: return moment_nm -> ": _LONGER_WAY,
+        "PassiveTwin._judge: if before_s < -self._anew_s <= self._losing_s: -> if before_s <= "
+        "-self._anew_s <= self._losing_s:": _NEVER_THERE,
+        "PassiveTwin._judge: if before_s < -self._anew_s <= self._losing_s: -> if before_s < "
+        "-self._anew_s < self._losing_s:": _NEVER_THERE,
         "PassiveTwin._judge: on_record = self.amplified or self._record_power > self._record ** 2 "
         "* self._twin_record_power -> on_record = self.amplified or self._record_power >= "
         "self._record ** 2 * self._twin_record_power": _NEVER_THERE,

@@ -3,10 +3,11 @@
     python -m tools.studies.twin_errors [--json]
 
 Of each law in each sea whose statistic "roll over twin" came to 0.75 of its threshold or more in
-docs/evidence/false_alarms.json, the hour with the largest is sailed again, and beside it the ship
-without a controller in the same waves. Own roll over the twin's is then compared with own roll over
-the passive ship's, with the monitor's memories of six and twelve roll periods. An alarm is false
-where the law rolls the ship no more than she would roll without it, over twelve roll periods.
+docs/evidence/false_alarms.json, the hour with the largest is sailed again, and so is every hour in
+which a sound law ended in ROLL_AMPLIFIED; beside it the ship without a controller in the same
+waves. Own roll over the twin's is then compared with own roll over the passive ship's, with the
+monitor's memories of six and twelve roll periods. An alarm is false where the law rolls the ship no
+more than she would roll without it, over twelve roll periods.
 """
 
 import json
@@ -35,6 +36,7 @@ from utank_hil.runtime.passive_twin import MEMORY_PERIODS, RECORD_PERIODS
 from utank_hil.tick import TICK_S
 
 STATISTIC = "roll over twin"
+FINDING = "ROLL_AMPLIFIED"
 NEAR = 0.75
 STEP_S = LOOK_TICKS * TICK_S
 
@@ -47,7 +49,7 @@ class Looker:
 
     def __init__(self, ship: ShipSide, node: ControllerNode | None) -> None:
         self._ship, self._node = ship, node
-        self.rows: list[tuple[float, float, float]] = []
+        self.rows: list[tuple[float, float, float, bool]] = []
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Nothing on the bus is of interest."""
@@ -55,16 +57,17 @@ class Looker:
     def tick(self, now_ns: int) -> Iterable[Frame]:  # noqa: ARG002
         """Look once."""
         share = ratio = math.nan
+        alarm = False
         if self._node is not None and self._node.monitors is not None:
             twin = self._node.monitors.twin
-            share = twin.share
+            share, alarm = twin.share, twin.amplified
             ratio = twin.ship_rms_rad / twin.rms_rad if twin.rms_rad else math.nan
-        self.rows.append((self._ship.plant.roll_rad, share, ratio))
+        self.rows.append((self._ship.plant.roll_rad, share, ratio, alarm))
         return ()
 
 
 def sailed(scenario: Scenario, name: str | None, seed: int) -> FloatArray:
-    """True roll, share and ratio in an hour, shape (n, 3); without a law, of the ship alone."""
+    """True roll, share, ratio, alarm in an hour, shape (n, 4); without a law, of the ship alone."""
     node = None if name is None else controller_of(scenario, name)
     ship = build_ship_side(scenario, seed, () if name is None else scenario.operator)
     looker = Looker(ship, node)
@@ -104,6 +107,7 @@ def compared(case: tuple[str, str, int]) -> dict[str, Any]:
         "law": name,
         "sea": sea,
         "hour": hour,
+        "alarm": bool(active[:, 3].any()),
         "share": float(share[nearest]),
         "at_s": nearest * STEP_S,
         "ratio_of_twin": float(twins[nearest]),
@@ -118,25 +122,35 @@ def compared(case: tuple[str, str, int]) -> dict[str, Any]:
     }
 
 
+def cases(row: dict[str, Any]) -> list[tuple[str, str, int]]:
+    """Hours of one law in one sea that are to be compared."""
+    # an hour in which it was never known has None, which becomes NaN
+    maxima = np.array(row["maxima"].get(STATISTIC, [0.0]), dtype=float)
+    law, sea = row["law"], row["sea"]
+    alarms = [] if (law, sea) in RIGHTLY_FOUND else row["found_in_hours"].get(FINDING, [])
+    nearest = [int(np.nanargmax(maxima)) + 1] if np.nanmax(maxima) >= NEAR else []
+    return [(law, sea, hour) for hour in sorted({*nearest, *alarms})]
+
+
 def main() -> int:
     """Compare, and print."""
     parser = command_line(__doc__)
     parser.add_argument("--workers", type=int, default=2, help="processes (%(default)s)")
     options = parser.parse_args()
     rows = json.loads(RECORD.read_text(encoding="utf-8"))["result"]["runs"]
-    cases = []
-    for row in rows:
-        # an hour in which it was never known has None, which becomes NaN
-        maxima = np.array(row["maxima"].get(STATISTIC, [0.0]), dtype=float)
-        if np.nanmax(maxima) >= NEAR:
-            cases.append((row["law"], row["sea"], int(np.nanargmax(maxima)) + 1))
     spawn = get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(options.workers, mp_context=spawn) as pool:
-        runs = list(pool.map(compared, cases))
+        runs = list(pool.map(compared, (case for row in rows for case in cases(row))))
     sound = [run for run in runs if (run["law"], run["sea"]) not in RIGHTLY_FOUND]
+    alarms = [run["over_twelve_periods"] for run in sound if run["alarm"]]
     show(
         {
             "hours": len(runs),
+            "alarms of sound laws": {
+                "hours": len(alarms),
+                "false": sum(ratio <= 1 for ratio in alarms),
+                "over_twelve_periods_at_least": min(alarms, default=math.nan),
+            },
             "largest_share_while_she_rolls_less": {
                 "all": max(run["largest_share_while_she_rolls_less"] for run in runs),
                 "sound laws": max(run["largest_share_while_she_rolls_less"] for run in sound),

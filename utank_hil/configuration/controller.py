@@ -193,7 +193,7 @@ class ControllerConfig(Section):
         if settings.every_s is not None and settings.every_s < LEAST_PAUSE_S:
             reason = (
                 f"must be {LEAST_PAUSE_S:g} or more, got {settings.every_s:g}: during the pulses, "
-                "and for six roll periods after, no law is compared with the passive ship"
+                "and for eight roll periods after, no law is compared with the passive ship"
             )
             problems.append(("every_s", reason))
         highest_rad_s, excitation = math.pi / period_s, settings.excitation

@@ -50,6 +50,11 @@ RECORD: Final = 1.1
 a group of waves, two laws came to 1.34 and 1.28 over six periods, to 1.05 over twelve at most."""
 MOST_MADE_RAD: Final = 1.0
 """Roll that no pump makes: a pressure was wrong, and the comparison begins anew."""
+DECAY_PERIODS: Final = 6.0
+"""Roll periods in which roll that was made on purpose decays, before it is forgotten."""
+ANEW_PERIODS: Final = 2.0
+"""Roll periods that are remembered before the next judgement: the pump makes its roll from the
+beginning, and in a lull of half a period a sound law came to 2.45 times the twin's."""
 LASTS_PERIODS: Final = 0.25
 """The memory of the mean squares is the patience: longer, and a bad law only rolls her longer."""
 
@@ -98,6 +103,8 @@ class PassiveTwin:
         self._share = period_s / (MEMORY_PERIODS * roll_period_s)
         self._mean_share = period_s / (MEAN_PERIODS * roll_period_s)
         self._patience_s = LASTS_PERIODS * roll_period_s
+        self._decay_s = DECAY_PERIODS * roll_period_s
+        self._anew_s = ANEW_PERIODS * roll_period_s
         self._least_power = least_roll_rad**2
         self._pressure_pa = 0.0
         self._mean_rad = self._twin_mean_rad = 0.0
@@ -186,8 +193,8 @@ class PassiveTwin:
         self._judge()
 
     def excuse(self) -> None:
-        """Roll that is caused on purpose: not judged until it has decayed, and then forgotten."""
-        self._losing_s = -self._patience_s * MEMORY_PERIODS / LASTS_PERIODS
+        """Roll that is caused on purpose: forgotten when it has decayed, and judged anew then."""
+        self._losing_s = -self._decay_s - self._anew_s
         self.amplified = False
 
     def _forget(self) -> None:
@@ -196,12 +203,12 @@ class PassiveTwin:
         self._unknown = UNKNOWN
 
     def _judge(self) -> None:
+        self._unknown -= self._share * self._unknown
         if self._losing_s < 0:
-            self._losing_s = min(self._losing_s + self._period_s, 0.0)
-            if self._losing_s == 0:
+            before_s, self._losing_s = self._losing_s, min(self._losing_s + self._period_s, 0.0)
+            if before_s < -self._anew_s <= self._losing_s:
                 self._forget()
             return
-        self._unknown -= self._share * self._unknown
         ratio = RECOVERED if self.amplified else self._amplified + self._unknown
         least_power = max(self._least_power, ratio * ratio * self._twin_power)
         on_record = self.amplified or self._record_power > self._record**2 * self._twin_record_power
