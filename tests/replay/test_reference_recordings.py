@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.reference_recordings.cases import CASES, record
+from tools.reference_recordings.cases import CASES, FAULTS, Case, record
 from tools.reference_recordings.comparison import LOGS, compare
 from utank_hil.assembly import build_law
 from utank_hil.canbus import ControllerStatus, Fault, Mode, RetuningState, load_catalogue
@@ -101,6 +101,11 @@ def test_answers_of_the_retuner_are_part_of_the_recording() -> None:
         result = replay(entries, config, build_law(config), retuner=True, estimating=True)
     assert result.first is not None
     assert result.different  # it waits for an answer, and goes on without a trial
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_faults_of_every_case_are_such_that_exist(case: Case) -> None:
+    assert len(FAULTS.validate_python(case.faults)) == len(case.faults)
 
 
 def test_a_case_gives_the_same_bytes_every_time(tmp_path: Path) -> None:

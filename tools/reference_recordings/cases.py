@@ -28,7 +28,7 @@ from utank_hil.telemetry.replay_head import replay_head
 SCENARIOS: Final = Path("configs/scenarios")
 CONTROLLERS: Final = Path("configs/controllers")
 _WHOLE_NS: Final = 1 << 62
-_FAULTS: Final = TypeAdapter(tuple[AnyFault, ...])
+FAULTS: Final = TypeAdapter(tuple[AnyFault, ...])
 
 Script = tuple[tuple[float, Action], ...]
 
@@ -145,7 +145,7 @@ CASES: Final = (
          late_s=((3.0, 3.02), (5.0, 5.04)), link_errors_s=(9.5, 9.51, 9.52, 9.53)),
     Case("operator-silent-then-intruder", "gpc", 12, ARM, (
         {"kind": "lost", "message": "OPERATOR_CMD", "at_s": 3.0, "for_s": 6.5},
-        {"kind": "impostor", "message": "PUMP_CMD", "at_s": 10.5, "counter": 13,
+        {"kind": "impostor", "message": "PUMP_CMD", "at_s": 10.5, "ahead": 14,
          "values": {"pressure_pa": 5e3, "control_word": None, "timeout_s": 0.05}},
     )),
     Case("retuned-and-undone", "adaptive_dpc", 213,
@@ -218,7 +218,7 @@ def ship_nodes(case: Case, start_ns: int) -> tuple[list[Node], list[Node]]:
     ship = build_ship_side(scenario, scenario.seed, script)
     faulty = {each.name: FaultyNode(each) for each in ship.nodes}
     bench = Bench(faulty, ship.plant, ship.drive, ship.valve, ship.vessel.version)
-    place_all(_FAULTS.validate_python(case.faults), bench, start_ns, scenario.seed)
+    place_all(FAULTS.validate_python(case.faults), bench, start_ns, scenario.seed)
     return [*faulty.values()], bench.joining
 
 
