@@ -536,6 +536,27 @@ def test_a_law_that_plans_is_told_what_it_may_use() -> None:
     assert law.allowed[-1] == 1.0
 
 
+def test_a_law_that_plans_may_use_as_much_as_it_has_watched_of_two_roll_periods() -> None:
+    monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
+    law = PlanningLaw()
+    bench = ControllerBench(START_NS, law=law, monitors=monitors)
+    samples = round(2 * monitors.thresholds.roll_period_s / law.sample_time_s)
+    sample_ms = round(1e3 * law.sample_time_s)
+    bench.silent.update((SensorMotion, SensorTank))
+    bench.run(20 * sample_ms)
+    assert set(law.allowed) == {0.0}  # what it was given is no measurement
+    bench.silent.clear()
+    bench.run(samples // 2 * sample_ms)
+    assert law.allowed[-1] == pytest.approx(0.5, abs=2 / samples)
+    bench.silent.add(SensorTank)
+    bench.run(20 * sample_ms)
+    assert law.allowed[-1] == law.allowed[-10] == pytest.approx(0.5, abs=4 / samples)
+    bench.silent.clear()
+    bench.run((samples + 8) // 2 * sample_ms)
+    assert law.allowed[-1] == 1.0
+    assert all(after >= before for before, after in pairwise(law.allowed))
+
+
 def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -188,19 +188,13 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "or now_ns - self.start_ns >= QUIET_START_NS -> self._alarming = self._alarming or mode "
         "is not Mode.INIT or now_ns - self.start_ns > QUIET_START_NS": _A_NANOSECOND,
         "ControllerNode.__init__: self._observed_cycles = 0 -> self._observed_cycles = 1": _FIRST,
-        "ControllerNode._look_at_motion: estimate = estimator.sample(now_ns, "
-        "inbox.pressure_pa, (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m), "
-        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS) -> estimate = "
-        "estimator.sample(now_ns, inbox.pressure_pa, (inbox.roll_rad, inbox.roll_rate_rad_s, "
-        "inbox.level_m), fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS)": _AT_50_MS,
+        "ControllerNode._fresh: return max(self.seen.motion_age_ms, self.seen.tank_age_ms) <= "
+        "FRESH_MS -> return max(self.seen.motion_age_ms, self.seen.tank_age_ms) < FRESH_MS": (
+            _AT_50_MS
+        ),
+        "ControllerNode.__init__: self._watched_share = self._watched_step = 1.0 -> "
+        "self._watched_share = self._watched_step = 1.25": "more than all of it is all of it",
         "ControllerNode._control: self._law_pa = 0.0 -> self._law_pa = 1.0": _ROUNDED,
-        "ControllerNode._answer: self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(now_ns), engaged=self._engaged, "
-        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS, "
-        "passive_roll_rad=self.twin_roll_rad) -> self._retuning.update(now_ns, "
-        "self.inbox.stations.take_retuning(now_ns), engaged=self._engaged, "
-        "fresh=max(seen.motion_age_ms, seen.tank_age_ms) < FRESH_MS, "
-        "passive_roll_rad=self.twin_roll_rad)": _AT_50_MS,
         "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
         "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 1.0)), "
         "float(answered.get(VALVE, 0.0)))": _ROUNDED,

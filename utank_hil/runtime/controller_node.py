@@ -48,6 +48,9 @@ from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 NANOSECONDS: Final = 1e-9
 FRESH_MS: Final = 50.0
 """An older measurement is a gap in the record that the ship is identified from."""
+WATCHED_PERIODS: Final = 2.0
+"""Roll periods of measurements after which a plan may use the full pressure. A law knows no waves
+at first: armed after one period, it took the water to the high-level switches in 4 of 50 storms."""
 FRESH_PRESSURE_NS: Final = round(STALE_MS * MILLISECOND_NS)
 """In the place of an older pressure the level is predicted with the command, as the twin's roll."""
 
@@ -241,6 +244,10 @@ class ControllerNode:
         self._all_due = True
         self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
+        self._watched_share = self._watched_step = 1.0
+        if monitors is not None:
+            watched_s = WATCHED_PERIODS * monitors.thresholds.roll_period_s
+            self._watched_share, self._watched_step = 0.0, controller.sample_time_s / watched_s
         self._command_schedule = Schedule(self._commands.cycle_ns)
         self._status_schedule = Schedule(self._status.cycle_ns)
         self._estimate_schedule = Schedule(round(SAMPLE_TIME_S / TICK_S) * TICK_NS)
@@ -277,6 +284,11 @@ class ControllerNode:
         if monitors is not None and self._pump and not monitors.confirmed:
             return monitors.thresholds.unconfirmed_share
         return self._degraded_share
+
+    @property
+    def _fresh(self) -> bool:
+        """Whether the law's measurement is no older than a gap in its record may be."""
+        return max(self.seen.motion_age_ms, self.seen.tank_age_ms) <= FRESH_MS
 
     @property
     def _degraded_share(self) -> float:
@@ -402,7 +414,7 @@ class ControllerNode:
             now_ns,
             inbox.pressure_pa,
             (inbox.roll_rad, inbox.roll_rate_rad_s, inbox.level_m),
-            fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
+            fresh=self._fresh,
         )
         if estimate is not None:
             seen.gm_low = self.estimated.gm_low
@@ -437,8 +449,10 @@ class ControllerNode:
             self._start_anew()
             if not due:
                 return
+            if self._fresh:
+                self._watched_share += self._watched_step
             if self._plans is not None:
-                self._plans.allow(self._degraded_share)
+                self._plans.allow(min(self._degraded_share, self._watched_share))
             self._law_pa, self._law_loss = self._answer(now_ns)
             if not math.isfinite(self._law_pa + self._law_loss):
                 self._law_failed = True
@@ -486,7 +500,6 @@ class ControllerNode:
         if self._answered:
             self._controller.applied(self._applied.copy())  # a law may keep it
         if self._retuning is not None:
-            seen = self.seen
             # what was in charge at the last answer and not since is for one answer out of charge
             self._engaged = self.supervisor.demand is _CONTROL and not (
                 self._engaged and self._interrupted
@@ -496,7 +509,7 @@ class ControllerNode:
                 now_ns,
                 self.inbox.stations.take_retuning(now_ns),
                 engaged=self._engaged,
-                fresh=max(seen.motion_age_ms, seen.tank_age_ms) <= FRESH_MS,
+                fresh=self._fresh,
                 passive_roll_rad=self.twin_roll_rad,
             )
         self._answered = True
