@@ -28,6 +28,25 @@ def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
     assert rate_per_hour([float("nan")] * 50) == 0.0
 
 
+def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
+    draw = np.random.default_rng(2)
+    whole = gumbel_r.rvs(0.6, 0.05, size=50, random_state=draw).tolist()
+    runs = [{"largest": {"drift": each}, "found_s": {}, "code": ""} for each in whole]
+    expected = judged("gpc", "storm", runs)["rate_per_hour"]["drift"]
+    for finding, monitor, counts in (
+        ("LEVEL_LIMIT", "drift", False),
+        ("ROLL_AMPLIFIED", "drift", False),
+        ("ROLL_AMPLIFIED", "roll over twin", True),
+        ("LEVEL_LIMIT", "roll over twin", False),
+        ("SATURATED", "drift", True),
+    ):
+        all_of_it = [run | {"largest": {monitor: run["largest"]["drift"]}} for run in runs]
+        cut = {"largest": {monitor: 0.05}, "found_s": {finding: 3.0}, "code": ""}
+        row = judged("gpc", "storm", [*all_of_it, *[cut] * 9])
+        assert (row["rate_per_hour"][monitor] != pytest.approx(expected)) == counts
+        assert row["maxima"][monitor][-1] == 0.05
+
+
 def test_every_shipped_law_sails_every_sea() -> None:
     for file in (ROOT / "configs/controllers").glob("*.yaml"):
         seas = dict(hours(file.stem))

@@ -10,7 +10,8 @@ same command goes on, in a fresh clone with the hours of docs/evidence. Those of
 kept where the second of that law and sea comes out the same once more: each statistic that they
 have to four digits, and what was found. A Gumbel distribution is fitted to the hourly maxima of
 each law in each sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it
-is the mean. The aim is one in 1000 hours. An hour ends a minute after control has.
+is the mean. The aim is one in 1000 hours. An hour ends a minute after control has; where another
+monitor ended it, its maxima are not those of an hour, and are left out of the fit.
 """
 
 import json
@@ -46,6 +47,9 @@ ORDER_RETUNING_S = 400.0
 ONCE_MORE = 2
 """Hour that is sailed again where the code has changed: one with a retuning."""
 AIM_PER_HOUR = 1e-3
+ENDS = {"ROLL_AMPLIFIED", "LEVEL_LIMIT"}
+"""Findings of this study that end control."""
+ENDED_BY_ITSELF = {"roll over twin": "ROLL_AMPLIFIED"}
 DIGITS = 4
 SEAS = {"calm": 0.2, "ordinary": 0.5, "storm": 1.0}
 """Share of the scenario's wave slope: the storm's is what the laws were made for."""
@@ -179,7 +183,17 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
         ]
         for monitor in monitors
     }
-    rates = {monitor: rate_per_hour(values) for monitor, values in maxima.items()}
+    ended = [ENDS.intersection(run["found_s"]) for run in runs]
+    rates = {
+        monitor: rate_per_hour(
+            [
+                value
+                for value, by in zip(values, ended, strict=True)
+                if not by - {ENDED_BY_ITSELF.get(monitor)}
+            ]
+        )
+        for monitor, values in maxima.items()
+    }
     found: dict[str, list[int]] = {}
     for hour, run in enumerate(runs, 1):
         for finding in run["found_s"]:
