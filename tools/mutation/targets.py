@@ -192,8 +192,14 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "FRESH_MS -> return max(self.seen.motion_age_ms, self.seen.tank_age_ms) < FRESH_MS": (
             _AT_50_MS
         ),
-        "ControllerNode.__init__: self._watched_share = self._watched_step = 1.0 -> "
-        "self._watched_share = self._watched_step = 1.25": "more than all of it is all of it",
+        "ControllerNode.__init__: self._watched_share, self._watched_step = (0.0, 1.0) -> "
+        "self._watched_share, self._watched_step = (0.0, 1.25)": "more than all is all",
+        "ControllerNode._watch: if seen.motion_age_ms > limits.motion_age_ms or seen.tank_age_ms > "
+        "limits.tank_age_ms: -> if seen.motion_age_ms >= limits.motion_age_ms or "
+        "seen.tank_age_ms > limits.tank_age_ms:": _AT_THE_BOUND,
+        "ControllerNode._watch: if seen.motion_age_ms > limits.motion_age_ms or seen.tank_age_ms > "
+        "limits.tank_age_ms: -> if seen.motion_age_ms > limits.motion_age_ms or "
+        "seen.tank_age_ms >= limits.tank_age_ms:": _AT_THE_BOUND,
         "ControllerNode._control: self._law_pa = 0.0 -> self._law_pa = 1.0": _ROUNDED,
         "ControllerNode._answer: return (float(answered.get(PRESSURE, 0.0)), "
         "float(answered.get(VALVE, 0.0))) -> return (float(answered.get(PRESSURE, 1.0)), "

@@ -166,7 +166,8 @@ FAULTS: Final = (
         "Compare the versions in the heartbeats; give all nodes the same catalogue and ship file.",
         Condition(
             Reaction.STOP,
-            "a version in the heartbeats of drive, sensors or valve differs, or none was received",
+            "a version in the heartbeats of drive, sensors, valve or hard-wired inputs differs, or "
+            "none was received",
             lambda seen, _: not seen.versions_match,
             awaited=8,
         ),
@@ -413,7 +414,7 @@ FAULTS: Final = (
     ),
     _row(
         Fault.PROTECTION,
-        "Messages of motion sensor, tank or drive keep arriving damaged or out of order.",
+        "Messages of a sensor, drive, valve or panel keep arriving damaged or out of order.",
         "Look for a second sender of their identifiers, a node that protects them wrongly, and "
         "disturbance on the cable.",
         Condition(
@@ -593,7 +594,8 @@ FAULTS: Final = (
         ),
         Condition(
             Reaction.RAMP,
-            "{overruns_in_ten} of the last ten ticks late",
+            "{overruns_in_ten} of the last ten ticks late; one that comes after the time of the "
+            "next counts for that, too",
             lambda seen, limits: (
                 limits.overruns_in_ten is not None
                 and seen.overruns_in_ten >= limits.overruns_in_ten
