@@ -25,7 +25,14 @@ from firmware_sim.run import SECOND_NS
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
 from tools.printing import command_line, show
-from tools.studies.false_alarms import HOUR_S, RECORD, RIGHTLY_FOUND, hours, ordered
+from tools.studies.false_alarms import (
+    ENDED_BY_ITSELF,
+    HOUR_S,
+    RECORD,
+    RIGHTLY_FOUND,
+    hours,
+    ordered,
+)
 from tools.studies.monitor_margins import LOOK_TICKS, controller_of
 from utank_hil.arrays import FloatArray
 from utank_hil.canbus import Frame
@@ -36,7 +43,7 @@ from utank_hil.runtime.passive_twin import MEMORY_PERIODS, RECORD_PERIODS
 from utank_hil.tick import TICK_S
 
 STATISTIC = "roll over twin"
-FINDING = "ROLL_AMPLIFIED"
+FINDING = ENDED_BY_ITSELF[STATISTIC]
 NEAR = 0.75
 STEP_S = LOOK_TICKS * TICK_S
 
