@@ -18,6 +18,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tools.printing import command_line, show
 from utank_hil.arrays import FloatArray
@@ -35,6 +36,7 @@ PERIOD_NS = 10_000_000
 TURN_NS = 1_000_000_000
 RECORD = (2500, 60)
 SHOWN = ("p50_ns", "p99_ns", "p99_9_ns", "max_ns")
+RESAMPLES = 1000
 
 
 class Talker:
@@ -102,10 +104,12 @@ def compared(turns: int) -> dict[str, Any]:
     """Lateness of both, in turns, and their ratio."""
     bare, statistics = Histogram(), LoopStatistics()
     loop = RealTimeLoop([Talker(f"node {i}", i) for i in range(4)], statistics=statistics)
+    counts = []
     with real_time_scheduling() as report:
         for _ in range(turns):
             run_bare(bare)
             loop.run(duration_ns=TURN_NS)
+            counts.append((bare.counts.copy(), statistics.lateness.counts.copy()))
     rows = {
         "bare lateness": bare.summary(),
         "loop lateness": statistics.lateness.summary(),
@@ -114,8 +118,34 @@ def compared(turns: int) -> dict[str, Any]:
     ratios = {
         name: rows["loop lateness"][name] / max(rows["bare lateness"][name], 1) for name in SHOWN
     }
+    of_turns = np.diff(np.array(counts), axis=0, prepend=0)
+    interval = {"p99_9_ns of loop to bare, 90 % interval": ratio_interval(of_turns)}
     counted = {"overruns": statistics.overruns, "ticks": statistics.ticks}
-    return {**rows, "loop to bare": ratios, **counted, "scheduling": report.lines()}
+    return {**rows, "loop to bare": ratios, **interval, **counted, "scheduling": report.lines()}
+
+
+def ratio_interval(of_turns: npt.NDArray[np.int64]) -> list[float]:
+    """Percentile bootstrap of the ratio at the 99.9th percentile, over turns.
+
+    Parameters
+    ----------
+    of_turns : ndarray of int64, shape (turns, 2, bins)
+        Lateness of bare loop and real-time loop in each turn.
+    """
+    random = np.random.default_rng(1)
+    ratios = []
+    for _ in range(RESAMPLES):
+        drawn = of_turns[random.integers(len(of_turns), size=len(of_turns))].sum(axis=0)
+        bare, loop = (percentile_ns(counts) for counts in drawn)
+        ratios.append(loop / max(bare, 1))
+    return [float(each) for each in np.quantile(ratios, (0.05, 0.95))]
+
+
+def percentile_ns(counts: npt.NDArray[np.int64]) -> int:
+    """The 99.9th percentile of what is counted."""
+    histogram = Histogram()
+    histogram.counts, histogram.max_ns = counts, 1 << 62
+    return histogram.percentile_ns(0.999)
 
 
 def main() -> None:

@@ -230,9 +230,9 @@ PARTS = (
     ),
     Part(
         "cost_realtime",
-        "python -m tools.benchmarks.realtime --seconds 60 --json",
+        "python -m tools.benchmarks.realtime --seconds 200 --json",
         "lateness of the real-time loop against a bare sleep: alone, under load, while retuning",
-        6,
+        20,
     ),
     Part(
         "cost_retuning",
