@@ -157,6 +157,39 @@ def test_frames_of_the_other_pages_are_right(
     assert {key: getattr(message, key) for key in content} == content
 
 
+FRAMES: dict[str, dict[str, float]] = {
+    "DRIVE_STATUS_1": {"pressure_pa": 12000, "speed_rad_s": 0, "state": 0x27, "command_echo": 3},
+    "DRIVE_STATUS_2": {
+        "bus_voltage_v": 800,
+        "current_a": 0,
+        "motor_temperature_c": 0xFF - 40,
+        "drive_temperature_c": 0xFF - 40,
+    },
+    "SENSOR_TANK": {"port_level_m": 0.25, "starboard_level_m": -0.25},
+    "SENSOR_PUMP": {"pressure_pa": 12000, "flow_m3_s": 0xFFFF * 0.001 - 32},
+    "VALVE_STATUS": {"state": 1, "opening": 0.4, "command_echo": 3},
+    "HEARTBEAT_SENSORS": {
+        "state": 2,
+        "catalogue_version": 271,
+        "configuration_version": 1437,
+        "transmit_error_count": 16 * 0xF,
+        "receive_error_count": 16 * 0xF,
+    },
+}
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_frames_to_test_an_encoder_with_are_right(name: str) -> None:
+    row = re.search(
+        rf"^\| {name} \| .* \| (\d+) \| 0x(..) \| ([0-9A-F ]+) \|$", text("device"), re.M
+    )
+    counter, shown = int(row[1]), bytes.fromhex(row[3])
+    names = {each.name for each in DATABASE.get_message_by_name(name).signals}
+    others = dict.fromkeys(names - {"crc", "counter"}, 0.0)
+    assert shown == encoded(name, counter, **others | FRAMES[name])
+    assert int(row[2], 16) == data_id(name, counter)
+
+
 def test_cycles_of_the_pages_are_the_catalogues() -> None:
     found = []
     for page in ("sensor", "drive", "valve", "hardwired", "panel"):

@@ -185,8 +185,8 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "drive reports a fault, or is out of operation enabled for over "
-            "{drive_enabled_within_ms:g} ms, or from its third departure on: one a second is "
-            "forgotten",
+            "{drive_enabled_within_ms:g} ms, or from its third departure on (the count falls by "
+            "one each second)",
             lambda seen, limits: (
                 seen.drive_fault or seen.drive_out_ms > limits.drive_enabled_within_ms
             ),
@@ -464,7 +464,7 @@ FAULTS: Final = (
         Fault.SPIKES,
         "Samples of motion sensor or level gauges had to be discarded again and again.",
         "Check the sensors' cables and supply.",
-        _found(Reaction.RAMP, "five spikes, one a second forgotten", Finding.SPIKES),
+        _found(Reaction.RAMP, "five spikes (the count falls by one each second)", Finding.SPIKES),
     ),
     _row(
         Fault.NOISE,

@@ -27,7 +27,7 @@ PASSIVE_WITHIN_NS: Final = 2_000_000_000
 RESET_WITHIN_MS: Final = 500
 """How long a reset waits for the causes to go: the drive's own fault goes by the reset itself."""
 DEPARTURES: Final = 2.0
-"""A drive that left operation enabled more often counts as out of it; one a second is forgotten."""
+"""More often out of operation enabled, a drive counts as out of it. It falls by one each second."""
 _NEVER_NS: Final = 1 << 62
 
 

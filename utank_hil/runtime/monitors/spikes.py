@@ -105,7 +105,7 @@ class SpikeGates:
 
 
 class SpikeCount:
-    """Leaky count of discarded samples: one a second is forgotten, five in one are too many."""
+    """Leaky count of discarded samples: it falls by one each second; five in one are too many."""
 
     MOST: Final = 4.0
 
