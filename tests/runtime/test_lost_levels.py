@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable
 from itertools import count
 
 import pytest
-from controller_bench import CATALOGUE, VESSEL, ControllerBench
+from controller_bench import CATALOGUE, VESSEL, ControllerBench, ToyLaw
 
 from utank_hil.canbus import Frame, Quality, SensorPump, SensorTank, Switch
-from utank_hil.tick import TICK_NS
+from utank_hil.tick import TICK_NS, TICK_S
 
 RATE_M_S = 0.5
 FREQUENCY_RAD_S = 0.6
@@ -83,6 +83,34 @@ def test_frames_that_come_a_tick_late_or_two_at_once(late_of: int) -> None:
         return frames
 
     assert worst_rate_error(change, always_good) < 0.1
+
+
+@pytest.mark.parametrize("missing", [1, 2, 45])
+def test_in_a_gap_a_law_measures_the_level_that_is_predicted(missing: int) -> None:
+    """The last one, held, looks like water that stands still: a plan then brakes what moves."""
+    bench = ControllerBench(law=ToyLaw(sample_time_s=TICK_S))
+
+    def swing() -> float:
+        angle = FREQUENCY_RAD_S * bench.now_ns * 1e-9
+        level_m = RATE_M_S / FREQUENCY_RAD_S * math.sin(angle)
+        bench.tank = SensorTank(-level_m, level_m, Switch.OFF, Switch.OFF, Quality.GOOD)
+        bench.tick()
+        return level_m
+
+    while bench.now_ns < 40e9:
+        held_m = swing()
+    bench.silent = {SensorTank}
+    for _ in range(2 * missing):
+        level_m = swing()
+    measured_m = bench.law.seen[-1][1]
+    # the first missing one may come a tick late, and is waited for
+    expected_m = held_m if missing == 1 else level_m
+    assert measured_m == pytest.approx(expected_m, abs=0.01 + 0.1 * abs(level_m - held_m))
+    assert abs(level_m - held_m) > (0.2 if missing > 2 else 0.0)
+    bench.silent = set()
+    for _ in range(4):
+        level_m = swing()
+    assert bench.law.seen[-1][1] == pytest.approx(level_m, abs=0.02)
 
 
 def test_no_level_is_predicted_from_a_pressure_that_was_measured_long_ago() -> None:

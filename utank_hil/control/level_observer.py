@@ -64,6 +64,11 @@ class LevelObserver:
         self.rate_m_s = 0.0
 
     @property
+    def alone(self) -> bool:
+        """Whether the model goes on alone: more than one measurement is missing."""
+        return self._ahead > 1
+
+    @property
     def next_due_s(self) -> float:
         """Time from the last measurement to the end of the period that comes next."""
         return (self._ahead + 1) * self._period_s if self._ahead < self._longest else math.inf

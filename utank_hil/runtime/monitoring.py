@@ -1,7 +1,8 @@
 """All monitors of a controller node, fed once a tick; one of them is due in each tick.
 
 Motion, drive, twin and volume are due every 50 ms, all else every 100 ms. So a tick pays for one of
-them, and the gates and the running integral of the rate are all that is done in every tick.
+them, and the gates and the running integral of the rate are all that is done in every tick. What
+was due in ticks that the loop has lost is done in the next one: models of equal steps stay in time.
 """
 
 import math
@@ -38,7 +39,9 @@ from utank_hil.tick import TICK_NS, TICK_S
 
 ROUND_TICKS: Final = 10
 LONG_S: Final = ROUND_TICKS * TICK_S
-SHORT_S: Final = LONG_S / 2
+SHORT_TICKS: Final = ROUND_TICKS // 2
+"""Of more lost ticks no more is made up for: nothing is then done twice with the same sample."""
+SHORT_S: Final = SHORT_TICKS * TICK_S
 SPARE_MS: Final = 30.0
 """An older measurement of the other motion sensor is not changed over to."""
 STALE_MS: Final = 100.0
@@ -249,44 +252,49 @@ class Monitors:
                 spare = self._spare
             _turn(spare.watch, motions.spare.roll_rate_rad_s, motions.spare.heard_ns, elapsed_s)
         _turn(self._used.watch, inbox.roll_rate_rad_s, inbox.motion_ns, elapsed_s)
-        phase = self._phase
-        self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
-        if phase == 0 or phase == 5:
-            self._look_at_motion(now_ns, inbox, seen)
-        elif phase == 1 or phase == 6:
-            self._of_drive = self.drive.update(
-                seen.command_pa,
-                inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else math.nan,
-                inbox.level_m,
-                level_rate_m_s,
-                enabled=seen.drive_enabled,
-                limited=inbox.drive_held_back,
-            )
-        elif phase == 2 or phase == 7:
-            self._look_at_twin(inbox, seen, level_rate_m_s, held_pa, excused=excused)
-        elif phase == 3:
-            self._look_at_water(now_ns, inbox, seen, held_pa)
-        elif phase == 4 or phase == 9:
-            if seen.tank_age_ms <= STALE_MS:
-                port_m, starboard_m = inbox.port_level_m, inbox.starboard_level_m
-                volume = self.volume.update(port_m, starboard_m, SHORT_S)
-                stuck = self._port_stuck.update(port_m, starboard_m)
-                stuck |= self._starboard_stuck.update(starboard_m, port_m)
-                if not volume & _VOLUME:
-                    stuck = 0
-                if gauges_stand_still(self.gates.port, self.gates.starboard):
-                    stuck = _LEVEL_STUCK
-                self._of_volume = volume | stuck
-        else:
-            elapsed_s = (now_ns - self._senders_ns) * 1e-9
-            self._senders_ns = now_ns
-            self._of_senders = self._senders.update(inbox.foreign, elapsed_s)
-            self._of_saturation = self._saturation.update(
-                seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
-            )
-            noisy = self._of_volume & _NOISE
-            if self._spikes.update(self.gates.levels_discarded, LONG_S) and not noisy:
-                self._of_saturation |= _SPIKES
+        due = 1
+        if elapsed_s > 1.5 * TICK_S:
+            due = min(round(elapsed_s / TICK_S), SHORT_TICKS)
+        while due:
+            due -= 1
+            phase = self._phase
+            self._phase = phase + 1 if phase < ROUND_TICKS - 1 else 0
+            if phase == 0 or phase == 5:
+                self._look_at_motion(now_ns, inbox, seen)
+            elif phase == 1 or phase == 6:
+                self._of_drive = self.drive.update(
+                    seen.command_pa,
+                    inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else math.nan,
+                    inbox.level_m,
+                    level_rate_m_s,
+                    enabled=seen.drive_enabled,
+                    limited=inbox.drive_held_back,
+                )
+            elif phase == 2 or phase == 7:
+                self._look_at_twin(inbox, seen, level_rate_m_s, held_pa, excused=excused)
+            elif phase == 3:
+                self._look_at_water(now_ns, inbox, seen, held_pa)
+            elif phase == 4 or phase == 9:
+                if seen.tank_age_ms <= STALE_MS:
+                    port_m, starboard_m = inbox.port_level_m, inbox.starboard_level_m
+                    volume = self.volume.update(port_m, starboard_m, SHORT_S)
+                    stuck = self._port_stuck.update(port_m, starboard_m)
+                    stuck |= self._starboard_stuck.update(starboard_m, port_m)
+                    if not volume & _VOLUME:
+                        stuck = 0
+                    if gauges_stand_still(self.gates.port, self.gates.starboard):
+                        stuck = _LEVEL_STUCK
+                    self._of_volume = volume | stuck
+            else:
+                of_senders_s = (now_ns - self._senders_ns) * 1e-9
+                self._senders_ns = now_ns
+                self._of_senders = self._senders.update(inbox.foreign, of_senders_s)
+                self._of_saturation = self._saturation.update(
+                    seen.command_pa, drive_limited=inbox.drive_held_back, elapsed_s=LONG_S
+                )
+                noisy = self._of_volume & _NOISE
+                if self._spikes.update(self.gates.levels_discarded, LONG_S) and not noisy:
+                    self._of_saturation |= _SPIKES
         used = self._used
         self.found = found = (
             used.watch.found
@@ -364,14 +372,14 @@ class Monitors:
         excused: bool,
     ) -> None:
         twin = self.twin
-        if excused or seen.motion_age_ms > STALE_MS:
+        if excused:
             twin.excuse()
         # the last pressure that was measured may have ended long ago
         pressure_pa = inbox.pressure_pa if seen.pump_age_ms <= STALE_MS else seen.command_pa
         # what a valve that is not open takes from the water acts like a pump
         pressure_pa -= held_pa - self._open_loss * abs(level_rate_m_s) * level_rate_m_s
-        # two motion sensors that disagree now and then are to hide no law that loses meanwhile
-        sure = not self._pair.unclear
+        # gaps of a motion sensor, or two that disagree now and then, hide no law that loses
+        sure = seen.motion_age_ms <= STALE_MS and not self._pair.unclear
         roll_rad, rate_rad_s = inbox.roll_rad, inbox.roll_rate_rad_s
         twin.update(roll_rad, rate_rad_s, level_rate_m_s, pressure_pa, counts=sure)
         self._of_twin = _AMPLIFIED if twin.amplified and self._compares else 0
