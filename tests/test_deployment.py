@@ -135,6 +135,7 @@ def test_unit_does_what_the_page_says_of_it() -> None:
     assert int(value("TimeoutStartSec")) >= 120
     assert int(value("TimeoutStopSec")) >= 30
     assert int(value("OOMScoreAdjust")) <= -900
+    assert value("OOMPolicy") == "continue"
 
 
 def test_network_file_has_the_controllers_bit_rate_and_keys_that_networkd_knows() -> None:

@@ -72,6 +72,9 @@ def faults(
     for name in names:
         if not (any(loaded.chosen([name])) or loaded.shown_elsewhere([name])):
             fail(f"--rows: no row or requirement begins with {name}")
+    if names and not chosen and (bus is None or not any(row.does for row in live)):
+        lack = "--bus is missing" if any(row.does for row in live) else "tests show all of them"
+        fail(f"--rows: nothing to run: {lack}")
     if out is not None:
         prepare_out(out, [f"{row.id}.rrd" for row in chosen])
     began = time.monotonic()

@@ -37,7 +37,8 @@ CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"
 START_S: Final = 180.0
 """In an emulated kernel imports take long."""
 STARTS: Final = 3
-"""A machine that holds processes up may end the run before there is a fault to be tried."""
+"""A machine that holds processes up may end the run before there is a fault to be tried: that, and
+nothing else, has it started anew."""
 ATTEMPTS: Final = 3
 """And may spoil what is judged."""
 DRIVEN_PA: Final = 5e3
@@ -67,6 +68,11 @@ class LiveBench:
         SocketCAN interface.
     folder : Path
         For the controller's files.
+
+    Attributes
+    ----------
+    start : int
+        How many benches it took, this one included.
     """
 
     def __init__(self, bus: str, folder: Path) -> None:
@@ -87,6 +93,7 @@ class LiveBench:
             can_filters=[{"can_id": each, "can_mask": _EXTENDED_MASK, "extended": True}
                          for each in heard],
         )  # fmt: skip
+        self.start = 1
         self.mode: Mode | None = None
         self.fault = ""
         self._status_s = -math.inf
@@ -238,9 +245,11 @@ def _in_charge(bus: str) -> Iterator[LiveBench]:
             try:
                 bench.wait_in_charge()
             except LiveError:
-                if start == STARTS:
+                ended = any(each.poll() is not None for each in (bench.controller, bench.ship))
+                if start == STARTS or ended or bench.log.held_up_s <= HELD_UP_S:
                     raise
             else:
+                bench.start = start
                 yield bench
                 return
 
@@ -279,13 +288,14 @@ def _attempt(row: LiveRow, bus: str) -> tuple[dict[str, Any], float]:
     code = ""
     mode: Mode | None = None
     state: DriveState | None = None
+    start = 0
     act, silences = ACTIONS[row.does]
     try:
         with _in_charge(bus) as bench:
             fault_s = time.time()
             end_s = bench.watch(act(bench))
             times = times_of(bench.log, fault_s, end_s, silences=silences, judged=row.judged)
-            code, mode, state = bench.fault, bench.mode, bench.state
+            code, mode, state, start = bench.fault, bench.mode, bench.state, bench.start
             if bench.in_charge:
                 problems.append("in charge again in the end")
     except LiveError as error:
@@ -300,6 +310,6 @@ def _attempt(row: LiveRow, bus: str) -> tuple[dict[str, Any], float]:
         "zero_ms": times.zero_ms,
         "problems": problems,
         "codes": [code] if code and code != "NONE" else [],
-        "wire": f"at the end {mode!r}, drive {state!r}",
+        "wire": f"start {start}; at the end {mode!r}, drive {state!r}",
     }
     return told, times.held_up_ms

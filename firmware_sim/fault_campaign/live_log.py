@@ -4,6 +4,7 @@ Who listens may be held up by the machine; the times of the frames are not. The 
 others show whether one of them was held up: what came too late meanwhile can't be judged.
 """
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final, Literal
@@ -27,6 +28,14 @@ class LiveLog:
     motions: list[float] = field(default_factory=list)
     modes: list[tuple[float, Mode | None]] = field(default_factory=list)
     states: list[tuple[float, DriveState | None]] = field(default_factory=list)
+
+    @property
+    def held_up_s(self) -> float:
+        """For which the machine held up one of the two, at a time."""
+        return max(
+            _longest_gap_s(self.stream(name), -math.inf, math.inf) - cycle_s
+            for name, cycle_s in CYCLES_S.items()
+        )
 
     def stream(self, name: Stream) -> list[float]:
         """Times of one of the streams."""

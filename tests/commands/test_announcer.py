@@ -15,6 +15,7 @@ from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.commands import announcer as module
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.identified import IdentifiedShips, read_controller
+from utank_hil.commands.lines import Lines
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import ModelSummary, RetuningEvent
 from utank_hil.runtime.alarms import AlarmEvent
@@ -146,6 +147,35 @@ def test_broken_pipe_keeps_no_ship_from_being_kept(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("identified_vessel-*.yaml"))) == 1
 
 
+def test_a_terminal_that_is_held_up_keeps_no_event_from_the_log(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    while True:  # as after Ctrl-S, or with a dead ssh: nobody reads
+        try:
+            os.write(writing, bytes(4096))
+        except BlockingIOError:
+            break
+    os.set_blocking(writing, True)
+    saved = os.dup(2)
+    os.dup2(writing, 2)
+    try:
+        announcer = Announcer(log=tmp_path / "events.jsonl")
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(writing)
+    for _ in range(5):
+        announcer.write(REFUSED, 0)
+
+    def lines() -> int:
+        return (tmp_path / "events.jsonl").read_text().count('"REFUSED"')
+
+    wait_for(lambda: lines() == 5)
+    announcer.stop()
+    os.close(reading)
+    assert announcer.error is None
+
+
 def test_events_are_logged_and_alarms_are_left_to_the_run_to_print(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,7 +213,9 @@ def test_a_ship_that_no_file_may_hold_is_told_and_leaves_no_file(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     nonsense = replace(RETUNED, found=replace(FOUND, inertia_kg_m2=-1.0))
-    module._tell(nonsense, ships(tmp_path))
+    lines = Lines()
+    module._tell(nonsense, ships(tmp_path), lines)
+    lines.close()
     said = capfd.readouterr().err
     assert "could not be written" in said
     assert "inertia_kg_m2" in said

@@ -298,6 +298,24 @@ def test_ended_before_the_end_it_writes_nothing(
     result = commission(monkeypatch, Short, file)
     assert result.exit_code == ExitCode.INTERRUPTED
     assert not record_path(file).exists()
+    passed(file)
+    commission(monkeypatch, Short, file)
+    assert reason(file) == ""  # nothing has moved yet
+
+
+def test_ended_while_the_pump_moves_it_leaves_no_older_record(
+    file: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever sees that the water goes the wrong way, and ends it, is not to arm with that."""
+
+    class Short(AtTheQuay):
+        stop_after_s = 35.0
+
+    passed(file)
+    result = commission(monkeypatch, Short, file)
+    assert result.exit_code == ExitCode.INTERRUPTED
+    assert "Pump and valve move" in capfd.readouterr().err
+    assert "there is no record" in reason(file)
 
 
 @pytest.mark.parametrize("full", [False, True])

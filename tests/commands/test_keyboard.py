@@ -184,6 +184,8 @@ def test_a_reset_that_is_refused_is_said_with_what_lasts(table: Table) -> None:
         ("a", "'a' is arm or accept"),
         ("re", "'re' is reset or retune"),
         ("fly", "'fly' is no action; help lists them"),
+        *((word, "stop") for word in ("s", "st", "sto", "stopp", "stop!", "stop now")),
+        ("sta", "standby"),
     ],
 )
 def test_words_may_be_cut_short_where_that_is_clear(table: Table, typed: str, said: str) -> None:

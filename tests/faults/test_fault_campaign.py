@@ -172,6 +172,33 @@ def test_a_fault_that_changes_nothing_is_not_on_the_bus(seed: int) -> None:
     assert outcome.wire == ""
 
 
+def heard(sea: Sea, row: Row) -> list[tuple[int, int, bytes]]:
+    """The bus of a row up to 8 s after its last fault has begun."""
+    underway = sea._start() if row.from_start else sea._underway
+    bench = underway.bench
+    bench.place(row.faults)
+    bench.join([Watch(bench, row.operator)])
+    last_s = max(fault.at_s for fault in ROWS[row.id].faults)
+    bench.run(bench.lockstep.now_ns + round((last_s + 8.0) * 1e9))
+    return underway.log.frames
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [row.id for row in CAMPAIGN.rows if len(row.faults) > 1])
+def test_of_a_row_with_several_faults_each_is_on_the_bus(name: str) -> None:
+    """A row that needs them all could otherwise pass with one of them."""
+    row = ROWS[name]
+    setup = CAMPAIGN.setups[row.setup]
+    sea = Sea(CAMPAIGN, setup, build_law(setup.config), 1, Window(1.0, 1.0))
+    whole = in_a_copy(lambda: heard(sea, row))
+    for index, fault in enumerate(row.faults):
+        never = fault.model_copy(update={"at_s": 1000.0})
+        faults = (*row.faults[:index], never, *row.faults[index + 1 :])
+        without = row.model_copy(update={"faults": faults})
+        frames = in_a_copy(lambda without=without: heard(sea, without))
+        assert frames != whole, f"without fault {index} nothing is different"
+
+
 def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Observations, int], None]:
     """What a supervisor does in FAULT that leaves it by itself."""
     since: dict[int, int] = {}
@@ -519,6 +546,7 @@ def test_rows_that_take_long_are_left_out_unless_they_are_asked_for(
 
 @pytest.mark.parametrize(("arguments", "words"), [(["--rows", "no-such"], "no row"),
                                                   (["--rows", "F12,motoin"], "motoin"),
+                                                  (["--rows", "live-bus-off"], "--bus is missing"),
                                                   (["none.yaml"], "none.yaml")])  # fmt: skip
 def test_wrong_arguments_are_refused(arguments: list[str], words: str) -> None:
     done = invoke(*arguments)

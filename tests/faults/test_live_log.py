@@ -1,6 +1,7 @@
 """What follows from the frames of a live bus: from logs made by hand."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -74,6 +75,53 @@ def test_a_process_that_was_held_up_shows_in_its_frames(judged: str) -> None:
     times = told(silent, silences="motions", judged="found")
     assert times.held_up_ms < 0.2
     assert times.found_ms == pytest.approx(210.0, abs=0.2)
+
+
+class Bench:
+    """Of a controller that never comes into charge, or in its last start."""
+
+    starts: list["Bench"]
+
+    def __init__(self, *_: object) -> None:
+        self.start, self.log, self.code = 1, log_of(), None
+        self.controller = self.ship = SimpleNamespace(poll=lambda: self.code)
+        self.starts.append(self)
+
+    def close(self) -> None:
+        pass
+
+    def wait_in_charge(self) -> None:
+        if len(self.starts) < live.STARTS:
+            raise live.LiveError("OVERRUN before there was a fault")
+
+
+@pytest.mark.parametrize(
+    ("missing_s", "code", "starts"), [(0.2, None, 3), (0.0, None, 1), (0.2, 1, 1)]
+)
+def test_only_a_start_that_the_machine_spoilt_is_made_again(
+    missing_s: float, code: int | None, starts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program that ends, or a fault that has another cause, fails the row."""
+    made: list[Bench] = []
+
+    class Spoilt(Bench):
+        starts = made
+
+        def __init__(self, *_: object) -> None:
+            super().__init__()
+            self.code = code
+            if missing_s:
+                kept = [t for t in self.log.motions if not 101 < t < 101 + missing_s]
+                self.log.motions[:] = kept
+
+    monkeypatch.setattr(live, "LiveBench", Spoilt)
+    if starts == live.STARTS:
+        with live._in_charge("vcan0") as bench:
+            assert bench.start == starts
+    else:
+        with pytest.raises(live.LiveError, match="OVERRUN"), live._in_charge("vcan0"):
+            raise AssertionError
+    assert len(made) == starts
 
 
 @pytest.mark.parametrize(

@@ -202,6 +202,8 @@ def test_difference_of_seas_is_that_of_their_amplitudes() -> None:
     [
         ({"limits": replace(CONFIG.limits, pressure_pa=60e3)}, "stronger pump"),
         ({"limits": replace(CONFIG.limits, level_m=4.5)}, "larger tank"),
+        ({"limits": replace(CONFIG.limits, pressure_pa=49.0)}, "next to nothing"),
+        ({"limits": replace(CONFIG.limits, rate_pa_s=5e-324)}, "next to nothing"),
         ({"level_output": 1}, "other signals"),
         ({"level_output": None}, "other signals"),
     ],

@@ -14,10 +14,12 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Final
 
+from utank_hil.background import give_way
 from utank_hil.canbus import RetuningState
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
-from utank_hil.commands.terminal import notes, shown
+from utank_hil.commands.lines import Lines
+from utank_hil.commands.terminal import shown
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runtime.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
@@ -26,6 +28,7 @@ LOOK_S: Final = 0.5
 _NICENESS: Final = 5
 _START_S: Final = 30.0
 _END_S: Final = 10.0
+_PRINTED_S: Final = 5.0
 
 
 class Announcer:
@@ -112,12 +115,14 @@ class Announcer:
 def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
     """Tell events until their writer ends or dies; the whole life of the process."""
     with EventReader(ring) as reader, ExitStack() as stack:
-        events = None
+        # a terminal may be held up, and the log must not wait for it
+        lines, events = Lines(), None
+        stack.callback(lines.close, _PRINTED_S)
         if log is not None:
             try:
                 events = EventLog(log)
             except OSError as error:
-                notes.say(str(error), red="no log of events:")
+                lines.say(f"no log of events: {error}")
             else:
                 stack.callback(events.close)
         ready.send_bytes(b"ready")
@@ -126,19 +131,19 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
         os.setsid()
         for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
-        os.nice(_NICENESS)
+        give_way(_NICENESS)
         while True:
             last = reader.ended
             for event in reader.read():
                 if events is not None:
-                    _log(events, event, reader.start_ns)
+                    _log(events, event, reader.start_ns, lines)
                 if isinstance(event, RetuningEvent):  # alarms are printed at once, by the run
-                    _tell(event, ships)
+                    _tell(event, ships, lines)
             if last:
                 break
             time.sleep(LOOK_S)
         if reader.lost:
-            notes.say(red=f"{reader.lost} events were lost")
+            lines.say(f"{reader.lost} events were lost")
 
 
 def _ready(heard: Connection) -> bool:
@@ -149,23 +154,22 @@ def _ready(heard: Connection) -> bool:
         return False
 
 
-def _log(events: EventLog, event: Event, start_ns: int) -> None:
+def _log(events: EventLog, event: Event, start_ns: int, lines: Lines) -> None:
     try:
         events.write(event, start_ns)
     except OSError as error:  # a full disk is no reason to end
-        notes.say(str(error), red="an event was not logged:")
+        lines.say(f"an event was not logged: {error}")
 
 
-def _tell(event: RetuningEvent, ships: IdentifiedShips | None) -> None:
-    failed = kept = ""
+def _tell(event: RetuningEvent, ships: IdentifiedShips | None, lines: Lines) -> None:
+    kept = ""
     if ships is not None and event.found is not None and event.state is RetuningState.RETUNED:
-        # first of all: a terminal may be held up, or gone
         try:
             files = ships.write(event.found)
         except (OSError, ValueError) as error:  # no room; or found beyond what a file may hold
-            failed, kept = "the ship that was found could not be written:", str(error)
+            kept = f"the ship that was found could not be written: {error}"
         else:
             kept = f"the ship that was found: {', '.join(map(shown, files.values()))}"
-    notes.say(f"{event.time_ns * 1e-9:8.1f} s {event_text(event)}")
+    lines.say(f"{event.time_ns * 1e-9:8.1f} s {event_text(event)}")
     if kept:
-        notes.say(kept, red=failed)
+        lines.say(kept)

@@ -86,7 +86,7 @@ def commission(
         guide = Guide(node, lines)
         notes.say(
             f"{loaded.name} on {channel}: about {node.duration_s:.0f} s; Ctrl-C ends it, and then "
-            "nothing is recorded."
+            "nothing is recorded; once pump and valve move, an older record is void."
         )
         with real_time_scheduling() as scheduling:
             for line in scheduling.lines():
@@ -95,7 +95,14 @@ def commission(
                 port.receive()  # what came before is old, and must not look fresh
             RealTimeLoop([node], port, statistics=statistics).run(lambda: guide.look() or stop())
     if node.stage is not Stage.DONE:
-        fail("ended before all was checked; there is no new record", ExitCode.INTERRUPTED)
+        what = "ended before all was checked; there is no new record"
+        if node.stage is Stage.MOVING:  # who ends that may have seen what the record denies
+            try:
+                remove_record(path)
+            except OSError as error:
+                fail(f"{what}, and the one before can't be removed: {error}; remove it")
+            what += ", and the one before is removed"
+        fail(what, ExitCode.INTERRUPTED)
     # the last commissioning counts: what came of the one before is void, whatever happens now
     with suppress(OSError):  # what can't be removed can't be replaced either, and that is said
         remove_record(path)

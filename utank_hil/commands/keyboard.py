@@ -15,7 +15,7 @@ LEAVE_NS: Final = 3_000_000_000
 """So long a panel that is left waits for the answer to a stop."""
 HELP: Final = """\
   arm, disarm          take charge; ramp to zero, pump enabled and passive
-  stop                 zero at once; on a terminal Enter alone does it
+  stop                 zero at once, as what looks like it: s, stop!; on a terminal Enter alone
   standby, passive     pump off; pump enabled at zero pressure
   accept, reset        accept the alarms; leave FAULT when its cause is gone
   take                 take the command from the other station
@@ -24,6 +24,7 @@ HELP: Final = """\
   help, quit           Words may be cut short: d for disarm."""
 
 _READ_BYTES: Final = 4096
+_STOP: Final = Action.STOP.value
 _LONGEST_LINE: Final = 256
 _WORDS: Final = (*(action.value for action in Action), "help", "quit")
 _ANYWHERE: Final = (Action.STOP, Action.ACCEPT, Action.TAKE, Action.FORBID, Action.PERMIT)
@@ -132,7 +133,9 @@ class Keyboard:
                 self._press(Action.STOP)
             return False
         found = [word] if word in _WORDS else [each for each in _WORDS if each.startswith(word)]
-        if len(found) != 1:
+        if word.startswith(_STOP) or _STOP in found:  # typed in a hurry: st, stopp, stop!
+            self._press(Action.STOP)
+        elif len(found) != 1:
             self._say(f"{word!r} is {' or '.join(found) or 'no action; help lists them'}")
         elif found[0] == "help":
             self._say(HELP)

@@ -47,13 +47,13 @@ class Lines:
         with contextlib.suppress(OSError):  # the fault is also the last word of the command
             os.write(self._pipe, f"{line}\n".encode())
 
-    def close(self) -> None:
+    def close(self, within_s: float = _END_S) -> None:
         """Have the last line printed; idempotent."""
         process = self._process
         if process.stdin is not None and not process.stdin.closed:
             process.stdin.close()
             try:
-                process.wait(_END_S)
+                process.wait(within_s)
             except subprocess.TimeoutExpired:  # the terminal takes nothing
                 process.kill()
                 process.wait()

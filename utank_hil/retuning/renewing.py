@@ -48,6 +48,8 @@ RECORD_PERIODS: Final = 12.0
 """Roll periods over which she must have rolled more than the passive ship, too. In the lull after a
 group of waves, a law that halves her roll lost by 1.23 over four periods.
 """
+LEAST_SHARE: Final = 1e-3
+"""Of the pump's limits: a law for less does nothing, and its arithmetic fails at numbers near 0."""
 LEAST_ROLL_RAD: Final = math.radians(0.25)
 """Root mean square of the roll below which nothing is judged."""
 AWAY: Final = 5.0
@@ -207,6 +209,10 @@ class RenewingController(LawExchange):
             and asked.power_w <= most.power_w
         ):
             return "the law is for a stronger pump or a larger tank"
+        if asked.pressure_pa < LEAST_SHARE * most.pressure_pa or (
+            asked.rate_pa_s < LEAST_SHARE * most.rate_pa_s
+        ):
+            return "the law is for a pump that does next to nothing"
         try:
             controller = law.controller()
         except (ValueError, ArithmeticError) as error:

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Final
 
+from utank_hil.background import give_way
 from utank_hil.retuning.desk import Desk
 
 _POLL_S: Final = 0.1
@@ -23,7 +24,7 @@ _SECOND_NS: Final = 1_000_000_000
 def run_watchdog(desks: Sequence[Desk], parent_pid: int, hangs_after_s: float) -> None:
     """Main function of the watchdog: run a worker until the parent is gone."""
     os.setpgid(0, 0)  # out of reach of Ctrl-C: the loop ends this group
-    os.nice(_NICENESS)
+    give_way(_NICENESS)
     watchdog_pid = os.getpid()
     while os.getppid() == parent_pid:
         worker_pid = os.fork()  # safe: one thread, and no resources but the mailboxes

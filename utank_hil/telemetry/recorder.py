@@ -31,6 +31,7 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
+from utank_hil.background import give_way
 from utank_hil.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Kind, records_of
 from utank_hil.telemetry.event_ring import EventReader
@@ -412,7 +413,7 @@ def _main() -> None:
             sys.exit(1)
     try:
         if "rings" not in content:
-            os.nice(_NICENESS)
+            give_way(_NICENESS)
             names = (arguments.ring, arguments.events, arguments.frames)
             content["rings"] = [None if name is None else held_ring(name) for name in names]
         ring, events, frames = content["rings"]
