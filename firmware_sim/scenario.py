@@ -109,7 +109,7 @@ class Scenario(Section):
     voyage: tuple[Waypoint, ...] = ()
     """How course, speed, loading and sea change under way."""
     faults: tuple[AnyFault, ...] = ()
-    """What fails in the runs with a controller, and when; the passive run is sound."""
+    """What fails in simulated runs with a controller, and when; the passive run is sound."""
     retuner_latency_s: NotNegative = 5.0
     """Time that identification and design take in simulated time."""
 

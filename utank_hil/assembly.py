@@ -40,7 +40,7 @@ from utank_hil.runtime.controller_node import (
     EventSink,
     Measure,
 )
-from utank_hil.runtime.inbox import Inbox
+from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.thresholds import thresholds_of
 from utank_hil.runtime.statistics import LoopStatistics
@@ -54,14 +54,12 @@ if TYPE_CHECKING:
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
 
-_SIGNALS: Final[dict[str, Callable[[Inbox, LevelObserver], float]]] = {
-    "roll_rad": lambda inbox, _: inbox.roll_rad,
-    "roll_rate_rad_s": lambda inbox, _: inbox.roll_rate_rad_s,
+_ESTIMATED: Final[dict[str, Callable[[Inbox, LevelObserver], float]]] = {
     # the last one measured, held over a gap, looks like water that stands still
     "level_m": lambda inbox, level: level.level_m if level.alone else inbox.level_m,
     "level_rate_m_s": lambda _, level: level.rate_m_s,
 }
-MEASUREMENTS: Final = tuple(_SIGNALS)
+MEASUREMENTS: Final = tuple(dict.fromkeys((*MEASURED, *_ESTIMATED)))
 """Signals that a law may measure."""
 
 
@@ -76,10 +74,14 @@ def measure_of(names: tuple[str, ...]) -> Measure:
     for name in names:
         if name not in MEASUREMENTS:
             raise ValueError(f"no measurement {name!r}; there are {', '.join(MEASUREMENTS)}")
-    signals = [_SIGNALS[name] for name in names]
 
     def measure(inbox: Inbox, level: LevelObserver) -> FloatArray:
-        return np.array([signal(inbox, level) for signal in signals])
+        return np.array(
+            [
+                _ESTIMATED[name](inbox, level) if name in _ESTIMATED else getattr(inbox, name)
+                for name in names
+            ]
+        )
 
     return measure
 

@@ -340,7 +340,8 @@ def _print_summary(
     console.table(timing_table({name: statistics}))
     for event in node.retuning_events:
         console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
-    console.say(f"ended in {node.mode.name}, fault {fault_text(node.fault)}")
+    what = "waiting for" if node.mode is Mode.INIT else "fault"  # what INIT waits for is no fault
+    console.say(f"ended in {node.mode.name}, {what} {fault_text(node.fault)}")
     if node.law_error:
         console.say(node.law_error, red="the law failed:")
     if node.fallbacks:

@@ -351,7 +351,8 @@ FAULTS: Final = (
     _row(
         Fault.MOTION_SILENT,
         "No usable measurement comes from the motion sensor.",
-        "Check the sensor's supply and bus connection, and the quality that SENSOR_MOTION carries.",
+        "Check the sensor's supply and bus connection, and what SENSOR_MOTION carries: its "
+        "quality, and values that jump, which are discarded.",
         Condition(
             Reaction.RAMP,
             "last good sample older than {motion_age_ms:g} ms",

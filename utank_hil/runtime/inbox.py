@@ -39,6 +39,9 @@ from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.runtime.stations import ADDRESSES, Stations
 
+MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+"""Attributes of the inbox that a law may measure."""
+
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _USABLE = (Quality.GOOD, Quality.DEGRADED)
 _OPEN = Switch.OFF
