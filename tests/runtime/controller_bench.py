@@ -75,6 +75,15 @@ class ToyLaw:
         self.calls.append("reset")
 
 
+@dataclass
+class PlanningLaw(ToyLaw):
+    fallbacks: int = 3
+    allowed: list[float] = field(default_factory=list)
+
+    def allow(self, share: float) -> None:
+        self.allowed.append(share)
+
+
 class ControllerBench:
     """Everything else on the bus, healthy unless a test says otherwise.
 

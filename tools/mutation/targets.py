@@ -422,7 +422,11 @@ class Target:
     behind: tuple[str, ...] = ()
 
 
-_NODE = ("tests/runtime/test_controller_node.py", "tests/runtime/test_controller_faults.py")
+_NODE = (
+    "tests/runtime/test_controller_node.py",
+    "tests/runtime/test_controller_faults.py",
+    "tests/runtime/test_law_that_plans.py",
+)
 _SUPERVISOR = "tests/runtime/test_supervisor.py"
 _MONITORS = "utank_hil/runtime/monitors"
 

@@ -246,8 +246,11 @@ class ControllerNode:
         self._all_due = True
         self._applied = np.zeros(len(commands))
         self._samples = Schedule(round(controller.sample_time_s / TICK_S) * TICK_NS)
+        self._first_share = 0.0
         self._watched_share, self._watched_step = 0.0, 1.0
         if monitors is not None:
+            # as before the water responds: less gained nothing, and hid wrong signs for longer
+            self._first_share = monitors.thresholds.unconfirmed_share
             watched_s = WATCHED_PERIODS * monitors.thresholds.roll_period_s
             self._watched_step = controller.sample_time_s / watched_s
         self._command_schedule = Schedule(self._commands.cycle_ns)
@@ -292,7 +295,7 @@ class ControllerNode:
         """The same where the water obeys."""
         if self._plans is None:
             return self._degraded_share
-        return min(self._degraded_share, self._watched_share)
+        return min(self._degraded_share, max(self._first_share, self._watched_share))
 
     @property
     def _fresh(self) -> bool:
