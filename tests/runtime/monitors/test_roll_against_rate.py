@@ -47,6 +47,24 @@ def test_a_bias_of_the_gyroscope_that_passes_a_commissioning_is_learned(share: f
     assert not late
 
 
+@pytest.mark.parametrize("trim_deg", [0.0, 0.5])
+def test_a_gyroscope_fixed_to_a_trimmed_ship_is_drift_in_a_turn(trim_deg: float) -> None:
+    """As sensor.md says of a turn of 1 degree a second: the rate is not that about her axis."""
+    off_rad_s = math.radians(1.0) * math.tan(math.radians(trim_deg))
+
+    def about_the_axis(
+        _: float, roll_rad: float, rate_rad_s: float, turned_rad: float
+    ) -> list[float]:
+        return [roll_rad, rate_rad_s - off_rad_s, turned_rad - off_rad_s * STEP_S]
+
+    first = found_after(about_the_axis)
+    if trim_deg:
+        assert 8 < first[Finding.DRIFT] < 15
+        assert 45 < first[Finding.DRIFT_LASTS] < 55
+    else:
+        assert not first
+
+
 def found_with(rates: list[float], wrong: range) -> list[int]:
     """Of a ship that rolls at these rates, of which some are measured with the wrong sign."""
     noise, monitor, roll_rad, found = MovingShip(0.0, 0.0), RollAgainstRate(THRESHOLDS), 0.0, []
