@@ -17,11 +17,11 @@ from firmware_sim.run import RECORD_S, Job, Run, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from firmware_sim.worker_pool import WorkerPool, shared, whole_first
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, PassiveDesign
-from utank_hil.runtime import stop_on_signals
+from utank_hil.runners import stop_on_signals
 from utank_hil.telemetry.frame_log import SUFFIX
 
 LOCKSTEP: Final = "lockstep"

@@ -24,7 +24,7 @@ with quietly_interruptible():
             pump_statistics,
             roll_statistics,
         )
-        from utank_hil.arrays import FloatArray
+        from utank_hil.base.arrays import FloatArray
         from utank_hil.canbus import SocketCanPort
         from utank_hil.commands.common import (
             Duration,
@@ -38,7 +38,7 @@ with quietly_interruptible():
         from utank_hil.commands.exit_codes import ExitCode
         from utank_hil.commands.terminal import Terminal, notes
         from utank_hil.commands.timing import timing_table
-        from utank_hil.runtime import (
+        from utank_hil.runners import (
             LoopStatistics,
             Node,
             RealTimeLoop,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.drive_states import DriveStates
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -22,7 +23,6 @@ from utank_hil.canbus import (
     PumpCommand,
 )
 from utank_hil.runtime.housekeeping import Housekeeping
-from utank_hil.tick import TICK_NS
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it

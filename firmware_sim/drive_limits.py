@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from utank_hil.parameters import Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)

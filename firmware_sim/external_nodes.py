@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from firmware_sim.plant import Plant
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Catalogue, DriveStatus1, Frame, Receiver, ValveStatus
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
-from utank_hil.tick import TICK_NS
 
 STALE_NS: Final = 60_000_000
 """Three cycles of the reports, after which the controller too calls a drive or valve silent."""

@@ -10,15 +10,15 @@ from firmware_sim.fault_injection.kinds import AnyFault, place_all
 from firmware_sim.fault_injection.place import Bench
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, build_ship_side
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.control.interface import Controller
 from utank_hil.retuning import Retuner
-from utank_hil.runtime import Lockstep, Node
+from utank_hil.runners import Lockstep, Node
+from utank_hil.runners.lockstep import Trace
 from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.lockstep import Trace
 from utank_hil.runtime.panel import TimedAction
 
 Tap = Callable[[ControllerNode], Node]

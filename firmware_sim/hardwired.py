@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -12,7 +13,6 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.runtime.housekeeping import Housekeeping
-from utank_hil.tick import TICK_NS
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it

@@ -13,7 +13,7 @@ from firmware_sim.bench import BenchResult
 from firmware_sim.place import Place
 from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
 from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
 """Single amplitudes of roll whose exceedance is stated."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from utank_hil.base.parameters import Finite, range_problems, refuse
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import Finite, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ import numpy as np
 
 from firmware_sim import plant_kernel as kernel
 from firmware_sim.waves import SteadyWaves, Waves
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.dynamics.kernels import MAX_IMPULSE, STRIKES
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
@@ -16,7 +17,6 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_NS, TICK_S
 
 SAILING_TICKS = 100
 """The ship's parameters are asked for once in so many ticks: once a second."""

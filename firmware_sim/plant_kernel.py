@@ -8,7 +8,8 @@ between through four ticks' values; for a wave at 3 rad/s that is exact to 2e-8 
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.kernels import (
     CAPSIZED_S,
@@ -22,7 +23,6 @@ from utank_hil.dynamics.kernels import (
     unpacked,
 )
 from utank_hil.dynamics.pump import PumpCoefficients, PumpState, compile_pump
-from utank_hil.tick import TICK_S
 
 STEP_S = 1e-3
 STEPS = round(TICK_S / STEP_S)

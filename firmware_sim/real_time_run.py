@@ -24,12 +24,13 @@ from firmware_sim.run import (
 )
 from firmware_sim.ship_side import ShipSide, build_ship_side
 from firmware_sim.truth import TruthRecorder
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import retuner_process
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.provenance import describe
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import SocketCanPort
-from utank_hil.provenance import describe
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime import (
+from utank_hil.runners import (
     LoopStatistics,
     MonotonicClock,
     Node,
@@ -42,7 +43,6 @@ from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 from utank_hil.telemetry.ring import RingWriter
-from utank_hil.tick import TICK_NS, TICK_S
 
 
 class Meeting(Watch, Protocol):

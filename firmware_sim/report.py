@@ -17,6 +17,7 @@ from firmware_sim.run import COLUMNS, Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
+from utank_hil.base.whole_file import write_whole
 from utank_hil.commands.common import finite, why
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.failures import KILLED
@@ -24,7 +25,6 @@ from utank_hil.commands.report import PAGE, write_page
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.whole_file import write_whole
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
 REPORT_FILES: Final = (PICTURE, RECORDING, FIGURES, PAGE)

@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_sim.report_tables import tables
 from firmware_sim.scenario import PASSIVE
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.commands.report_parts import (
     Report,
     ReportKind,

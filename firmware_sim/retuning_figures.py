@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import Scenario
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.retuning import ModelSummary, RetuningEvent
 

@@ -17,12 +17,13 @@ from firmware_sim.faulty_bench import Tap
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import ShipSide, bare_plant, build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime import LoopStatistics, SchedulingReport
+from utank_hil.runners import LoopStatistics, SchedulingReport
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
@@ -31,7 +32,6 @@ from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 from utank_hil.telemetry.ring import RingWriter
-from utank_hil.tick import TICK_NS
 
 SECOND_NS: Final = 1_000_000_000
 RECORD_NS: Final = ROW_TICKS * TICK_NS

@@ -21,12 +21,12 @@ from firmware_sim.voyage import (
     waypoint_problems,
 )
 from firmware_sim.waves import PassingWaves, SteadyWaves, Waves
+from utank_hil.base.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.configuration import ControllerConfig, Section, Vessel
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.steady_heel import steady_heel
-from utank_hil.parameters import Finite, NotNegative, ParameterError, Problem, Range, refuse
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import wavenumber_rad_m

@@ -21,7 +21,8 @@ from pydantic import (
     model_validator,
 )
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import NotNegative, Problem, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import (
     IttcSpectrum,
@@ -32,7 +33,6 @@ from utank_hil.configuration.spectra import (
     utc,
 )
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import NotNegative, Problem, Range, refuse
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea, Spectrum
 from utank_hil.sea.moment_table import MomentTable
 from utank_hil.sea.passing import PassingSea

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from utank_hil.parameters import NotNegative, Positive, Range, range_problems, refuse
-from utank_hil.tick import TICK_NS
+from utank_hil.base.parameters import NotNegative, Positive, Range, range_problems, refuse
+from utank_hil.base.tick import TICK_NS
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 
 from firmware_sim.sensor_errors import SensorErrors
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -19,7 +20,6 @@ from utank_hil.canbus import (
     Transmitter,
 )
 from utank_hil.runtime.housekeeping import Housekeeping
-from utank_hil.tick import TICK_NS
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it

@@ -28,10 +28,10 @@ from utank_hil.analysis.tank_sizing import (
     size_tank,
     usable_level_m,
 )
+from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.configuration import ControllerConfig, Vessel
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import ParameterError, Problem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Final
 
+from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
 from utank_hil.configuration.ship_keys import weather_criterion_period_s
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import Positive, Problem, Range, range_problems, refuse
 
 _GYRATION_PER_BEAM: Final = (0.1, 1.2)
 _DEPTH_PER_BEAM: Final = (0.01, 1.0)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from firmware_sim.plant import Plant
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,
     Catalogue,
@@ -24,7 +25,6 @@ from utank_hil.canbus import (
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
 from utank_hil.runtime.housekeeping import Housekeeping
-from utank_hil.tick import TICK_NS, TICK_S
 
 NANOSECONDS: Final = 1e-9
 LONGEST_TIMEOUT_S: Final = 0.1

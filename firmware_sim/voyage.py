@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from firmware_sim.scenario_sea import Bearing, Speed
+from utank_hil.base.parameters import Finite, Positive, Problem
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import AnySpectrum
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import Finite, Positive, Problem
 
 
 class Waypoint(Section):

@@ -5,11 +5,11 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import encounter_frequency
 from utank_hil.sea.passing import PassingSea
-from utank_hil.tick import TICK_S
 
 AHEAD_TICKS: Final = 2
 """The plant interpolates the moment between four ticks, the last of which is so far ahead."""

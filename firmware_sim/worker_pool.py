@@ -9,7 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Final, ParamSpec, TypeVar
 
-from utank_hil.runtime.stopping import SIGNALS, signals_waiting
+from utank_hil.runners.stopping import SIGNALS, signals_waiting
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 # full protanopia and deuteranopia, on linear RGB: Machado, Oliveira, Fernandes 2009, table 1
 _LACKING = (

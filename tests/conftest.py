@@ -18,7 +18,7 @@ from hypothesis import settings
 
 import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads
 from utank_hil.pictures import style
-from utank_hil.runtime import process_priority
+from utank_hil.runners import process_priority
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

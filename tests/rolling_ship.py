@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import state_matrices

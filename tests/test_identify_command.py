@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.cli import app
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import pump_model

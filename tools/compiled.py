@@ -1,4 +1,4 @@
-"""Compile the modules that every tick runs through, with mypyc; see `utank_hil.compiled`.
+"""Compile the modules that every tick runs through, with mypyc; see `utank_hil.base.compiled`.
 
 Takes a minute and a C compiler. Any change of the source puts them out of use until the next time.
 
@@ -16,8 +16,8 @@ from typing import Final
 from mypyc.build import mypycify
 from setuptools import Distribution
 
+from utank_hil.base.compiled import CODECS, ROOT, folder, modules_in
 from utank_hil.canbus import enumerations, load_catalogue
-from utank_hil.compiled import CODECS, ROOT, folder, modules_in
 
 PATTERNS: Final = (
     "firmware_sim/drive.py",
@@ -30,24 +30,24 @@ PATTERNS: Final = (
     "utank_hil/control/level_observer.py",
     "utank_hil/control/limiter.py",
     "utank_hil/runtime/alarms.py",
-    "utank_hil/runtime/bus_model.py",
+    "utank_hil/runners/bus_model.py",
     "utank_hil/runtime/controller_node.py",
     "utank_hil/runtime/drive_sequence.py",
     "utank_hil/runtime/faults.py",
-    "utank_hil/runtime/group.py",
+    "utank_hil/runners/group.py",
     "utank_hil/runtime/housekeeping.py",
     "utank_hil/runtime/inbox.py",
     "utank_hil/runtime/judging.py",
-    "utank_hil/runtime/lockstep.py",
+    "utank_hil/runners/lockstep.py",
     "utank_hil/runtime/monitoring.py",
     "utank_hil/runtime/monitors/*.py",
     "utank_hil/runtime/observations.py",
     "utank_hil/runtime/orders.py",
     "utank_hil/runtime/passive_twin.py",
-    "utank_hil/runtime/periodic.py",
+    "utank_hil/base/periodic.py",
     "utank_hil/runtime/stations.py",
     "utank_hil/runtime/supervisor.py",
-    "utank_hil/runtime/wire_time.py",
+    "utank_hil/runners/wire_time.py",
     "utank_hil/telemetry/memory_log.py",
 )
 NOT: Final = frozenset(["utank_hil/runtime/monitors/thresholds.py"])

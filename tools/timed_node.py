@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from utank_hil.canbus import Frame
-from utank_hil.runtime import Node
+from utank_hil.runners import Node
 
 
 class TimedNode:

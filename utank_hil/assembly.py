@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import ParameterError
+from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import SensorTank, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
-from utank_hil.parameters import ParameterError
 from utank_hil.retuning import (
     AdaptiveController,
     Desk,
@@ -32,6 +33,7 @@ from utank_hil.retuning import (
 )
 from utank_hil.retuning.estimate import MOST_NUMBERS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
+from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.runtime.commissioning.node import CommissioningNode
 from utank_hil.runtime.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
 from utank_hil.runtime.controller_node import (
@@ -43,10 +45,8 @@ from utank_hil.runtime.controller_node import (
 from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.thresholds import thresholds_of
-from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
-from utank_hil.tick import TICK_S, is_whole_ticks
 
 if TYPE_CHECKING:
     from utank_hil.retuning.redesign import RetuningTask

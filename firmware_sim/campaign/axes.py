@@ -9,9 +9,9 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from utank_hil.base.parameters import Finite, Positive, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import read_spectra, utc
-from utank_hil.parameters import Finite, Positive, Range, refuse
 
 Value = Any
 """A number, text, time or truth value, or the content of a file that was named."""

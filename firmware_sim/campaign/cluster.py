@@ -10,8 +10,8 @@ from typing import Final
 import dask
 from distributed import Client, LocalCluster, Status
 
-from utank_hil.one_thread import one_thread_each
-from utank_hil.runtime.stopping import signals_waiting
+from utank_hil.base.one_thread import one_thread_each
+from utank_hil.runners.stopping import signals_waiting
 
 LOOPBACK: Final = "127.0.0.1"
 MOST_DEATHS: Final = 10

@@ -23,14 +23,14 @@ from utank_hil.analysis.motion.statistics import (
     pump_statistics,
     roll_statistics,
 )
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.control.interface import PRESSURE
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES
 from utank_hil.runtime.signals import ROW_TICKS
-from utank_hil.tick import TICK_NS, TICK_S
 
 Row = dict[str, str | float]
 Laws = Mapping[str, BuiltLaw]

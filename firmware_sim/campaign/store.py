@@ -21,7 +21,7 @@ from firmware_sim.campaign.metrics import METRICS
 from firmware_sim.campaign.simulations import Row
 from firmware_sim.campaign.study import LoadedStudy
 from firmware_sim.campaign.work import LOST
-from utank_hil.whole_file import errors_name, left_whole
+from utank_hil.base.whole_file import errors_name, left_whole
 
 STUDY, ABOUT, CASES, ROWS = "study.yaml", "study.json", "cases.parquet", "rows"
 SUMMARY, PICTURE = "summary.json", "campaign.png"

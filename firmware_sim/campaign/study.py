@@ -14,6 +14,7 @@ from firmware_sim.campaign.case_name import as_text, case_name, waves_name
 from firmware_sim.campaign.metrics import METRICS
 from firmware_sim.campaign.overrides import WHOLE, Content, OverrideError, changed
 from firmware_sim.scenario import Scenario
+from utank_hil.base.parameters import ParameterError, Positive, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.files import (
     ConfigError,
@@ -24,7 +25,6 @@ from utank_hil.configuration.files import (
     problems_in_words,
 )
 from utank_hil.configuration.yaml_text import Key
-from utank_hil.parameters import ParameterError, Positive, Range, refuse
 
 Scalar = str | float | int | bool
 SEED: Final = "seed"

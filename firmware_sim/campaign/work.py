@@ -14,10 +14,10 @@ from firmware_sim.campaign.overrides import Content, changed
 from firmware_sim.campaign.simulations import Row, rows_of
 from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.control import BuiltLaw
-from utank_hil.parameters import ParameterError
 
 OK: Final = "ok"
 FAILED: Final = "failed"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from utank_hil.base.provenance import describe
 from utank_hil.commands.common import (
     CONFIGS,
     OUT,
@@ -23,7 +24,6 @@ from utank_hil.commands.gate import admit
 from utank_hil.commands.monitor import watch
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.commands.timing import timing_table
-from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
     from firmware_sim.bench import BenchOptions

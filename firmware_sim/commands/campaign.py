@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from utank_hil.base.provenance import describe
 from utank_hil.commands.common import OUT, Json, fail, fail_with, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration import ConfigError
-from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
     from firmware_sim.campaign.study import LoadedStudy

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from utank_hil.base.provenance import describe
 from utank_hil.commands.common import CONFIGS, Json, fail, load, prepare_out, why
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.failures import KILLED
 from utank_hil.commands.terminal import Terminal, notes, shown
-from utank_hil.provenance import describe
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, LiveRow
@@ -61,7 +61,7 @@ def faults(
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window, write_recordings
     from firmware_sim.fault_campaign.verdict import judged
-    from utank_hil.runtime import stop_on_signals
+    from utank_hil.runners import stop_on_signals
 
     loaded = load(campaign, Campaign)
     names = [name.strip() for name in rows.split(",") if name.strip()]

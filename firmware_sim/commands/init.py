@@ -10,11 +10,11 @@ from rich.table import Table
 
 from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_rows
 from utank_hil.analysis.tank_sizing import tank_cost
+from utank_hil.base.parameters import ParameterError
+from utank_hil.base.whole_file import write_whole
 from utank_hil.commands.common import Json, fail, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.terminal import Terminal, new_table, notes, shown
-from utank_hil.parameters import ParameterError
-from utank_hil.whole_file import write_whole
 
 if TYPE_CHECKING:
     from firmware_sim.starter import StarterProject

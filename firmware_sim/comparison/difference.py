@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from utank_hil.analysis.motion.confidence import mean_interval
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 class CompareError(ValueError):

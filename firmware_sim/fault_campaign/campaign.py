@@ -9,13 +9,13 @@ from pydantic import AfterValidator, Field, model_validator
 from firmware_sim.fault_injection.fault import FaultSpan, FaultTime
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.scenario import Scenario, missing_nodes
+from utank_hil.base.parameters import Finite, Positive, refuse
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
-from utank_hil.parameters import Finite, Positive, refuse
 from utank_hil.retuning import EstimateSettings
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
-from utank_hil.tick import TICK_S
 
 _PHASES: Final = 100
 _PHASE_STRIDE: Final = 37

@@ -23,14 +23,14 @@ from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH
 from firmware_sim.worker_pool import end_with
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import estimator_work
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Mode
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.tick import TICK_NS
 
 T = TypeVar("T")
 

@@ -6,6 +6,7 @@ from itertools import pairwise, zip_longest
 from typing import Any
 
 from firmware_sim.faulty_bench import FaultyBench
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Alarm,
     ControllerStatus,
@@ -19,7 +20,6 @@ from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import TimedAction
 from utank_hil.runtime.supervisor import Demand
-from utank_hil.tick import TICK_NS
 
 Heard = tuple[int, int, bytes]
 """Time, identifier and data of a frame on the bus."""

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import Controller
 
 LEANING_PA: Final = 1e4

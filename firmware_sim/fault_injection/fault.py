@@ -8,12 +8,12 @@ from pydantic import AfterValidator
 
 from firmware_sim.fault_injection.faulty_node import NEVER_NS, Span, Spoil, Spoiled
 from firmware_sim.fault_injection.place import Bench
+from utank_hil.base.parameters import Problem, Range
 from utank_hil.canbus import Address, Frame, load_catalogue
 from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.configuration import Section
 from utank_hil.configuration.known_keys import nearest
-from utank_hil.parameters import Problem, Range
 
 SECOND_NS: Final = 1_000_000_000
 LONGEST_FAULT_S: Final = 86_400.0

@@ -17,7 +17,7 @@ from typing import Final, Literal
 
 from firmware_sim.fault_injection.faulty_node import Span
 from utank_hil.canbus import Frame
-from utank_hil.runtime import SimulatedBus
+from utank_hil.runners import SimulatedBus
 
 ERROR_FRAME_BITS: Final = 17
 """Flag and delimiter, at most 20 bits, less the end of frame that is not sent."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from utank_hil.canbus import Frame
-from utank_hil.runtime import Node
-from utank_hil.runtime.hooks import LinkObserver
-from utank_hil.runtime.node import Selective
+from utank_hil.runners import Node
+from utank_hil.runners.hooks import LinkObserver
+from utank_hil.runners.node import Selective
 
 NEVER_NS: Final = 1 << 62
 

@@ -11,10 +11,10 @@ from pydantic import Field
 from firmware_sim.fault_injection.fault import MessageFault, intact
 from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
+from utank_hil.base.parameters import Range
 from utank_hil.canbus import Frame
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.canbus.e2e import data_ids, profile2_crc
-from utank_hil.parameters import Range
 
 _FOREIGN_DATA_IDS: Final = data_ids(127)
 """Of no message of the catalogue."""

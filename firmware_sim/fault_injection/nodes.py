@@ -8,9 +8,9 @@ from pydantic import field_validator
 from firmware_sim.fault_injection.fault import Fault, FaultSpan, NodeName, whole_cycles
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
+from utank_hil.base.parameters import Finite, NotNegative
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import DriveFault
-from utank_hil.parameters import Finite, NotNegative
-from utank_hil.tick import TICK_S
 
 
 class NodeFault(Fault):

@@ -8,7 +8,7 @@ from firmware_sim.fault_injection.breakable_law import LawFailures
 from firmware_sim.fault_injection.faulty_bus import FaultyBus
 from firmware_sim.fault_injection.faulty_node import FaultyNode
 from utank_hil.canbus import DriveFault
-from utank_hil.runtime import Node
+from utank_hil.runners import Node
 
 
 class Pumped(Protocol):

@@ -18,10 +18,10 @@ from firmware_sim.fault_injection.fault import (
 )
 from firmware_sim.fault_injection.faulty_node import Span, Spoil
 from firmware_sim.fault_injection.place import Bench
+from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import field_kind
-from utank_hil.parameters import Finite, Positive, refuse
 
 Change = Callable[[Sequence[Any], float], Sequence[Any]]
 """The values instead of the true ones, so many s after the fault began."""

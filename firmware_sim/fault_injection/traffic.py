@@ -18,9 +18,9 @@ from firmware_sim.fault_injection.faulty_bus import Disturbance, OtherFrame
 from firmware_sim.fault_injection.faulty_node import NEVER_NS, FaultyNode, Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from firmware_sim.fault_injection.signals import value_of, value_problems
+from utank_hil.base.parameters import refuse
 from utank_hil.canbus import Frame, Station, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
-from utank_hil.parameters import refuse
 from utank_hil.runtime.panel import OperatorPanel, TimedAction
 
 BIT_RATE: Final = 250_000
@@ -161,7 +161,7 @@ class Flood(Fault):
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Join the bus."""
-        from utank_hil.runtime import frame_bits
+        from utank_hil.runners import frame_bits
 
         # a standard identifier wins over the extended ones that begin with it
         number = int(self.identifier, 16)

@@ -9,6 +9,7 @@ from message_strategies import CASES, PROTECTED
 
 import utank_hil.canbus
 from utank_hil.analysis.loop.loop_simulation import LEVEL_TICKS
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -22,8 +23,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import data_ids
-from utank_hil.runtime.wire_time import LONGEST_FRAME_BITS
-from utank_hil.tick import TICK_NS
+from utank_hil.runners.wire_time import LONGEST_FRAME_BITS
 
 TABLE = {
     "PUMP_CMD": (0x08FF1080, 20),

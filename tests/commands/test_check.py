@@ -18,9 +18,9 @@ from wrong_values import WRONG
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law, retuner_work
+from utank_hil.base.parameters import ParameterError
 from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, ControllerConfig, Vessel, load_config
-from utank_hil.parameters import ParameterError
 from utank_hil.retuning import SimulatedRetuner
 
 CONFIGS = Path("configs").resolve()

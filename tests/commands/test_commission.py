@@ -26,7 +26,7 @@ from utank_hil.commands.commissioning_record import (
 from utank_hil.commands.common import new_app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.commissioning.checks import Check
 from utank_hil.runtime.panel import Action, TimedAction
 

@@ -14,8 +14,8 @@ import pyarrow.parquet
 import pytest
 from typer.testing import CliRunner, Result
 
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import DBC_PATH
 from utank_hil.commands.common import new_app

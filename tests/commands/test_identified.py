@@ -10,11 +10,11 @@ import pytest
 import yaml
 
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import PredictiveDesign
 from utank_hil.dynamics.restoring import restoring
-from utank_hil.parameters import ParameterError
 from utank_hil.retuning import ModelSummary
 
 CONFIG = Path("configs/controllers/adaptive_dpc.yaml")

@@ -11,10 +11,10 @@ from playwright.sync_api import Browser
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.report import write_report
 from firmware_sim.scenario import Scenario
+from utank_hil.base.provenance import describe
 from utank_hil.configuration import load_config
 from utank_hil.pictures.report_page import LEAST_TEXT_PX, TEXT_PX
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.provenance import describe
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from utank_hil.canbus import Frame
 from utank_hil.cli import app
 from utank_hil.commands import commission, run
-from utank_hil.runtime import real_time_scheduling
+from utank_hil.runners import real_time_scheduling
 
 GPC = Path("configs/controllers/gpc.yaml")
 OLD = Frame(0x123, bytes(8))

@@ -10,13 +10,13 @@ from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.scenario import Scenario
 from firmware_sim.sensor_errors import SensorErrors
 from firmware_sim.ship_side import PASSIVE_SCRIPT, build_ship_side
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import RobustFuzzy
 from utank_hil.dynamics.linear import STATES
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.runtime.signals import SIGNALS
 

@@ -7,10 +7,10 @@ import control
 import numpy as np
 import pytest
 
+from utank_hil.base.parameters import ParameterError
 from utank_hil.control import DesignPlant
 from utank_hil.control.python_law import PythonDesign
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.parameters import ParameterError
 
 PLANT = DesignPlant(
     RollShip(1.9275e9, 4.81875e8, 4.81875e7),

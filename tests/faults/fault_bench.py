@@ -20,7 +20,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.runtime import Lockstep, Node
+from utank_hil.runners import Lockstep, Node
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import Action, TimedAction
 

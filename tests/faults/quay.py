@@ -15,7 +15,7 @@ from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.runtime import Lockstep, Node
+from utank_hil.runners import Lockstep, Node
 from utank_hil.runtime.commissioning.node import REST_S, CommissioningNode, Stage
 from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 

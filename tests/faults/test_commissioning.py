@@ -12,8 +12,9 @@ from quay import ARM_S, another_ship, commissioned, controller, still_water
 
 from firmware_sim.scenario_sea import RegularSea
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_commissioning_node, build_controller_node, build_law
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     DriveFault,
     DriveState,
@@ -27,7 +28,7 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
 from utank_hil.runtime.commissioning.pulse_checks import Each, remedies_of
@@ -38,7 +39,6 @@ from utank_hil.telemetry.bus_records import RECORD
 from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.replay import entries_of, replay
-from utank_hil.tick import TICK_NS
 
 NAVAL = controller("naval_constrained_gpc")
 LEVELS = ("port_level_m", "starboard_level_m")

@@ -8,7 +8,7 @@ from fault_bench import ARMED, SECOND, FaultBench
 
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.canbus import Frame, Mode
-from utank_hil.runtime import Node
+from utank_hil.runners import Node
 
 
 class LosesTicks:

@@ -25,7 +25,7 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.redundancy import Redundancy
 
 CATALOGUE = load_catalogue()

@@ -7,8 +7,8 @@ import pytest
 from fault_bench import CATALOGUE, SECOND, Listener, storm
 
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import ControllerStatus, Fault, Mode, PumpCommand, RetuningState
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import PredictiveLaw
@@ -20,7 +20,7 @@ from utank_hil.retuning import (
     Retuner,
     RetuningSettings,
 )
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.panel import Action, TimedAction
 

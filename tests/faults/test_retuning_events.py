@@ -12,7 +12,7 @@ from utank_hil.retuning import (
     RetuningSettings,
     SimulatedRetuner,
 )
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.event_ring import EventReader, EventWriter
 

@@ -11,8 +11,8 @@ from pydantic import TypeAdapter
 from firmware_sim.fault_injection.kinds import AnyFault
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.scenario import Scenario
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import load_config
 from utank_hil.control import BuiltLaw

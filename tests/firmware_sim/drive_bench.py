@@ -7,6 +7,7 @@ import numpy as np
 from firmware_sim.drive import PumpDrive
 from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     ControlWord,
     DriveStatus1,
@@ -17,7 +18,6 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_NS
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 CATALOGUE = load_catalogue()

@@ -26,12 +26,12 @@ from firmware_sim.report import as_json, endings, exit_code, write_report
 from firmware_sim.report_tables import motion_table, on_board_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
+from utank_hil.base.provenance import describe
 from utank_hil.canbus import Mode
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.control import PassiveDesign
 from utank_hil.pictures import BenchCurve
-from utank_hil.provenance import describe
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.recording import read_recording
 

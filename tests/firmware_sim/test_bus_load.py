@@ -7,7 +7,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.configuration import load_config
-from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runners import Lockstep, SimulatedBus
 
 PAGE = Path("docs/can-catalogue.md")
 ESTIMATES = 2

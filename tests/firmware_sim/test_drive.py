@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from firmware_sim.drive import MISCODED_COMMANDS_TO_TRIP
 from firmware_sim.drive_limits import DriveLimits
 from firmware_sim.plant import Plant
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -24,7 +25,6 @@ from utank_hil.canbus import (
     PumpCommand,
 )
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.tick import TICK_NS
 
 START_NS = 5_123_456_789
 

@@ -9,9 +9,9 @@ from roll_energy import energy
 
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import Scenario
+from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import load_config
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_NS
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 

@@ -20,12 +20,12 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import build_controller_node
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
 from utank_hil.configuration import load_config
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.memory_log import MemoryLog
-from utank_hil.tick import TICK_NS
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 RESOLUTION_PA = 8.0

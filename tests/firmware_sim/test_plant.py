@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 from firmware_sim import plant_kernel as kernel
 from firmware_sim.plant import Plant
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.nonlinear import RollModel
@@ -19,7 +20,6 @@ from utank_hil.dynamics.pump import AT_REST, pump_coast, pump_step
 from utank_hil.dynamics.reference import simulate_reference
 from utank_hil.dynamics.tank import negligible
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_NS, TICK_S
 
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
 CALM = Harmonics(np.zeros(1), np.full(1, 0.5), np.zeros(1))

@@ -9,6 +9,7 @@ from drive_bench import CATALOGUE, VESSEL
 from firmware_sim.plant import Plant
 from firmware_sim.sensor_errors import SensorErrors
 from firmware_sim.sensors import SensorNode
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     Frame,
@@ -20,7 +21,6 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_NS
 
 SWELL = Harmonics(np.array([6e7]), np.array([0.6]), np.array([0.4]))
 EXACT = SensorErrors(0.0, 0.0, 0.0, 0.0, 0.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from firmware_sim.valve import MISCODED_COMMANDS_TO_TRIP, ValveNode
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     FailPosition,
@@ -23,7 +24,6 @@ from utank_hil.canbus import (
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
-from utank_hil.tick import TICK_NS
 
 VESSEL = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
 CATALOGUE = load_catalogue()

@@ -12,10 +12,10 @@ from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.plant import Plant
 from firmware_sim.scenario import PASSIVE, Scenario
 from utank_hil.analysis.loop.sea_response import motion_in_sea
+from utank_hil.base.tick import TICK_NS
 from utank_hil.cli import app
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.dynamics import coupled_model
-from utank_hil.tick import TICK_NS
 
 DURATION_S = 60.0
 

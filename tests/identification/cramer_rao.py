@@ -4,7 +4,7 @@ import numpy as np
 from roll_plant import SAMPLE_TIME_S, Plant
 from scipy.signal import lfilter, ss2tf
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 def cramer_rao(truth: Plant, u: FloatArray, noise: FloatArray) -> FloatArray:

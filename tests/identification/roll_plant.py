@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model
 from utank_hil.identification import random_pulses

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from roll_plant import noisy, plant, pulses, response_error
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     era,

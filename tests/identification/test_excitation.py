@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_plant import SAMPLE_TIME_S, plant
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.control.limits import PumpLimits
 from utank_hil.identification import (

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from roll_plant import SLOW_PUMP, noisy, plant, pulses
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import fit

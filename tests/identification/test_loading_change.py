@@ -12,7 +12,7 @@ from roll_plant import (
     pulses,
 )
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import find_disturbance_frequencies, modal_confidence, okid
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 from cramer_rao import cramer_rao
 from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.control.limits import PumpLimits
 from utank_hil.identification import (

@@ -13,7 +13,7 @@ from rolling_ship import (
 )
 from scipy.signal import welch
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
 from utank_hil.sea import jonswap
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from roll_plant import jonswap_moment
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.noise_model import NoiseModel, low_order_noise_model
 

@@ -18,7 +18,7 @@ from roll_plant import (
     response_error,
 )
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     OkidResult,

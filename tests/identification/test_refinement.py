@@ -17,7 +17,7 @@ from roll_plant import (
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import era, okid, refine
 from utank_hil.identification.refinement import _Modal
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from roll_plant import INERTIA_KG_M2, SAMPLE_TIME_S, SLOW_PUMP, TANK, jonswap_moment, noisy, pulses
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from roll_plant import SAMPLE_TIME_S, noisy, plant, pulses
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ARX
 from utank_hil.identification import IdentificationError, okid, stabilization, validate
 

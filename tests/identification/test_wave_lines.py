@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from roll_plant import FAST_PUMP, SAMPLE_TIME_S, jonswap_moment, noisy, plant, pulses
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import find_disturbance_frequencies
 
 pytestmark = pytest.mark.slow

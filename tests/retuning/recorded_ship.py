@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from shipped_designs import DPC_ROLL_LEVEL, GPC_ROLL
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant, PumpLimits, pump_model
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import coupled_model

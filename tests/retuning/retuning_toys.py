@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Mode, OperatorCommand, RetuningState, Verdict
 from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import (

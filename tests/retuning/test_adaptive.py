@@ -14,7 +14,7 @@ from retuning_toys import (
     states,
 )
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.retuning import Candidate, MotionEstimate, Refusal, law_exchange
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES

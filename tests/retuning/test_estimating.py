@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rolling_ship import PLANT, SAMPLE_TIME_S, SHIP, loaded, motion_in, wave_moment_nm
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.dynamics import RollShip
 from utank_hil.retuning.estimating import EstimateTask, estimate

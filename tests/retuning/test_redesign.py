@@ -10,7 +10,7 @@ from recorded_ship import DELAY_S, LAG_S, TANK, record_of, ship_of, task_of
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.margins import margins
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import pump_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.retuning import Answer, Candidate, Refusal

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import PumpLimits
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from retuning_toys import SAMPLE_NS, ToyRetuner
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign

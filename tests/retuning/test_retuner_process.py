@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from retuning_toys import candidate_of
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.retuning import (
     Answer,
     Candidate,

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import measure_of
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,
     ControllerStatus,
@@ -33,12 +34,11 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
+from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.runtime.controller_node import ControllerNode, ControllerSettings
 from utank_hil.runtime.redundancy import NO_REDUNDANCY
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import SafetyLimits, Supervisor
-from utank_hil.tick import TICK_NS, TICK_S
 
 CATALOGUE = load_catalogue()
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)

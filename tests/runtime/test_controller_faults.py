@@ -12,6 +12,7 @@ from controller_bench import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -32,7 +33,6 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.runtime.supervisor import Demand
-from utank_hil.tick import TICK_NS, TICK_S
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

@@ -18,6 +18,7 @@ from controller_bench import (
 )
 from toy_nodes import FakeClock, ToyPort
 
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -41,13 +42,12 @@ from utank_hil.canbus import (
 )
 from utank_hil.control import DesignPlant
 from utank_hil.retuning import EstimateFigures, RetuningEvent, RetuningOrder
-from utank_hil.runtime import RealTimeLoop
+from utank_hil.runners import RealTimeLoop
+from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.signals import SIGNALS
-from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand
-from utank_hil.tick import TICK_NS
 
 START_NS = 7_000_000_123
 LEVEL = 20e3  # a pressure away from every limit

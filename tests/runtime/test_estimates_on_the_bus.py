@@ -8,8 +8,8 @@ import pytest
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import (
     Fault,
     Frame,
@@ -28,7 +28,7 @@ from utank_hil.retuning import (
     ShipFigures,
 )
 from utank_hil.retuning.adaptive import AdaptiveController
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.sea import SlopeSpectrum

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import measure_of
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -37,7 +38,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import LevelObserver
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.inbox import MEASURED, Inbox
 from utank_hil.runtime.monitors.spikes import SpikeGates
 from utank_hil.runtime.monitors.thresholds import SensorFigures, thresholds_of
@@ -45,7 +46,6 @@ from utank_hil.runtime.motion_sensors import MotionSensors
 from utank_hil.runtime.observations import Observer
 from utank_hil.runtime.orders import NEVER_HEARD_NS
 from utank_hil.runtime.redundancy import Redundancy
-from utank_hil.tick import TICK_NS
 
 NAN = math.nan
 LEVEL_LIMIT_M = 4.88

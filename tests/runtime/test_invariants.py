@@ -20,6 +20,7 @@ from controller_bench import CATALOGUE, LIMITS, MS, VERSION, ControllerBench
 
 from firmware_sim.drive import PumpDrive
 from firmware_sim.drive_limits import DriveLimits
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -38,7 +39,6 @@ from utank_hil.canbus import (
 from utank_hil.runtime.faults import FAULTS, Condition, Reaction
 from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.runtime.supervisor import DISARMED_ZERO_WITHIN_MS, Demand
-from utank_hil.tick import TICK_NS, TICK_S
 
 SEED = 1
 SAFETY = SafetyLimits()

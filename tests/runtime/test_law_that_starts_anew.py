@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from controller_bench import VESSEL, ControllerBench, ToyLaw
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode, Quality, SensorMotion
 from utank_hil.control.stimulation import Stimulation
 

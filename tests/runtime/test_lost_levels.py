@@ -7,8 +7,8 @@ from itertools import count
 import pytest
 from controller_bench import CATALOGUE, VESSEL, ControllerBench, ToyLaw
 
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Quality, SensorPump, SensorTank, Switch
-from utank_hil.tick import TICK_NS, TICK_S
 
 RATE_M_S = 0.5
 FREQUENCY_RAD_S = 0.6

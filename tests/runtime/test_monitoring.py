@@ -10,6 +10,7 @@ import pytest
 from controller_bench import CATALOGUE, VERSION, VESSEL
 from monitors.moving_ship import MovingShip
 
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
@@ -20,7 +21,6 @@ from utank_hil.runtime.monitoring import ROUND_TICKS, Monitors
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.observations import Observations
-from utank_hil.tick import TICK_NS, TICK_S
 
 FRESH = dict.fromkeys(("motion_age_ms", "tank_age_ms", "pump_age_ms"), 0.0)
 

@@ -5,9 +5,9 @@ import math
 import pytest
 from controller_bench import CATALOGUE, MS, VERSION
 
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.runtime.inbox import Inbox
 from utank_hil.runtime.observations import HEEL_TIME_CONSTANT_S, Observer
-from utank_hil.tick import TICK_NS, TICK_S
 
 
 class Table:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime import judging
 from utank_hil.runtime.faults import FAULTS, Condition, Reaction
@@ -14,7 +15,6 @@ from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.observations import MILLISECOND_NS, Observations
 from utank_hil.runtime.safety_limits import SafetyLimits
 from utank_hil.runtime.supervisor import Demand, Supervisor
-from utank_hil.tick import TICK_NS
 
 HEALTHY = Observations(
     motion_age_ms=0,

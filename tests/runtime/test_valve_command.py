@@ -11,7 +11,8 @@ from controller_bench import CATALOGUE, ControllerBench, ToyLaw
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import (
     Address,
     FailPosition,
@@ -35,7 +36,6 @@ from utank_hil.dynamics.valves import Valve
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.valve_command import ValveCommander
-from utank_hil.tick import TICK_S
 
 VESSEL = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
 TANK = VESSEL.tank

@@ -9,9 +9,9 @@ import can
 import pytest
 from can.interfaces.socketcan import SocketcanBus
 
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, PortError, SocketCanPort
-from utank_hil.runtime import RealTimeLoop
-from utank_hil.tick import TICK_NS
+from utank_hil.runners import RealTimeLoop
 
 pytestmark = pytest.mark.socketcan
 

@@ -21,7 +21,7 @@ from retuning_story import (
     tell_story,
 )
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(1800)]

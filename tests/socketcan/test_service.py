@@ -20,7 +20,7 @@ from two_processes import (
 )
 
 from utank_hil.canbus import DriveState, Fault, Mode
-from utank_hil.runtime.process_priority import PRIORITY
+from utank_hil.runners.process_priority import PRIORITY
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(1800)]
 

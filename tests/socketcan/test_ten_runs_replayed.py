@@ -21,15 +21,15 @@ from firmware_sim.run import Job
 from firmware_sim.ship_side import build_ship_side
 from tools.reference_recordings.cases import Case, config_of, scenario_of, ship_nodes
 from utank_hil.assembly import build_law
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControllerStatus, Fault, Mode, SocketCanPort, load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.runtime import RealTimeLoop, heard_by
+from utank_hil.runners import RealTimeLoop, heard_by
 from utank_hil.runtime.panel import Action
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of, replay
 from utank_hil.telemetry.replay_head import causes, recorded_config
-from utank_hil.tick import TICK_NS
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 

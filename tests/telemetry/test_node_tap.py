@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, Refusal
 from utank_hil.retuning.answer import answer_bytes
-from utank_hil.runtime import LoopStatistics
+from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, Kind
 from utank_hil.telemetry.node_tap import NodeTap, RetunerTap
 from utank_hil.telemetry.replay import RecordedRetuner

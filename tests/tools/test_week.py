@@ -8,8 +8,8 @@ import pytest
 
 from firmware_sim.scenario import Scenario
 from tools.studies.week import SCENARIO, Sample, sail, verdict
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import retuning_task
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import load_config
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.retuning import Answer, Candidate, ModelSummary, RetuningSettings

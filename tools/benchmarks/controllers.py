@@ -22,8 +22,9 @@ import numpy as np
 from tools.printing import command_line, show
 from tools.studies.trial_setup import shipped
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_law
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import (
     ClippedValve,
@@ -40,9 +41,8 @@ from utank_hil.control import (
 from utank_hil.dynamics import RollModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import ValveRange
-from utank_hil.runtime.process_priority import real_time_scheduling
+from utank_hil.runners.process_priority import real_time_scheduling
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
-from utank_hil.tick import TICK_S
 
 WARM_UP = 200
 TRACED = 200

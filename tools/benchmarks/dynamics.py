@@ -29,7 +29,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate, simulate_batch
 
 STEP_S = 0.02

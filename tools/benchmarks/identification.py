@@ -21,7 +21,7 @@ from tools.peers.identification_records import (
     record,
 )
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import RecursiveArx, okid
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import fit

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 from tools.printing import command_line, show
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 
 MS = 1_000_000
 

@@ -26,8 +26,10 @@ from firmware_sim.ship_side import build_ship_side
 from tools.evidence.sources import ROOT
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import controller_of
+from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import load_config
-from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.runners.process_priority import real_time_scheduling
 from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
 from utank_hil.runtime.monitors.level_stuck import GaugeStuck, LevelStuck
 from utank_hil.runtime.monitors.motion import RollAgainstRate
@@ -37,8 +39,6 @@ from utank_hil.runtime.monitors.spikes import MotionGate, SpikeGates
 from utank_hil.runtime.monitors.tank_equation import TankEquation
 from utank_hil.runtime.monitors.volume import Volume
 from utank_hil.runtime.passive_twin import PassiveTwin
-from utank_hil.runtime.process_priority import real_time_scheduling
-from utank_hil.tick import TICK_NS
 
 LAW: Final = "gpc"
 AGAIN: Final = 1000

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.frame import Frame
 from utank_hil.retuning import Answer, RetunerProcess
-from utank_hil.runtime import (
+from utank_hil.runners import (
     Histogram,
     LoopStatistics,
     MonotonicClock,

@@ -24,8 +24,8 @@ from scipy.stats import binomtest, chi2
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import PredictiveDesign
@@ -38,7 +38,7 @@ from utank_hil.retuning import (
     ShipFigures,
     make_pulses,
 )
-from utank_hil.runtime import (
+from utank_hil.runners import (
     Lockstep,
     LoopStatistics,
     MonotonicClock,

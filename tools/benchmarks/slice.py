@@ -15,9 +15,9 @@ from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from tools.timed_node import TimedNode
 from utank_hil.assembly import build_controller_node
-from utank_hil.compiled import in_use
+from utank_hil.base.compiled import in_use
 from utank_hil.configuration import load_config
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
 WARM_UP_S = 10

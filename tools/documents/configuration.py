@@ -20,8 +20,8 @@ from pydantic_core import PydanticUndefined
 
 from firmware_sim.campaign.study import Study
 from firmware_sim.scenario import Scenario
+from utank_hil.base.parameters import Range
 from utank_hil.configuration import ControllerConfig, Vessel
-from utank_hil.parameters import Range
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "configuration.md"
 

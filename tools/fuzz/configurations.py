@@ -28,9 +28,9 @@ from firmware_sim.scenario import Scenario
 from tools.evidence.sources import ROOT
 from tools.printing import command_line, show
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.configuration.files import ConfigError, ConfigProblem
-from utank_hil.parameters import ParameterError
 
 KINDS: dict[str, Any] = {
     "ships": Vessel, "controllers": ControllerConfig, "scenarios": Scenario,

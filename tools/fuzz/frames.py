@@ -31,15 +31,15 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Address, Frame, Mode, PumpCommand, load_catalogue
 from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import profile2_crc
 from utank_hil.configuration import load_config
 from utank_hil.control import BuiltLaw
-from utank_hil.runtime import Lockstep
+from utank_hil.runners import Lockstep
 from utank_hil.runtime.inbox import SOURCE_ADDRESS
 from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.tick import TICK_NS
 
 SESSION_TICKS = 1500
 CYCLE_S = 4.0

@@ -15,7 +15,7 @@ from scipy import sparse
 from tools.peers.plan_programmes import HOUR, STORM
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import Vessel
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.limits import PumpLimits

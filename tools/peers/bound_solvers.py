@@ -5,7 +5,7 @@ import numpy as np
 
 from tools.peers import peers_environment
 from tools.peers.bound_programme import BoundProgramme
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 with peers_environment():
     import osqp

@@ -41,7 +41,7 @@ from tools.peers.identification_records import (
 from tools.peers.memory import peak_mb
 from tools.peers.published_identification import PUBLISHED, Identify
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import era, find_disturbance_frequencies, okid, refine
 from utank_hil.identification.ship_fit import fit_ship
 

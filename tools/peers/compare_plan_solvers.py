@@ -28,7 +28,7 @@ from tools.peers.plan_programmes import (
 from tools.peers.plan_solvers import SOLVERS, Quadprog
 from tools.peers.turns import Costs, in_turns, percentiles_us
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.law import ConstrainedLaw
 
 PROJECT, STEP = "DAQP, kept and warm (ours)", "our whole step"

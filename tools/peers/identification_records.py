@@ -11,7 +11,7 @@ import control
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics import RollShip, Tank, coupled_model

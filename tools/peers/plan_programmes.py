@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.constrained.plan_programme import LEVEL_SPACING
 from utank_hil.sea import EffectiveSlope, Sea, load_ndbc
-from utank_hil.tick import TICK_S
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 CONTROLLER = CONFIGS / "controllers" / "constrained_gpc.yaml"

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from tools.peers import peers_environment
 from tools.peers.plan_programmes import Programme, ProgrammeFamily
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.active_set import ActiveSetSolver
 
 with peers_environment():

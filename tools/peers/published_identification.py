@@ -11,7 +11,7 @@ import numpy as np
 
 from tools.peers import peers_environment
 from tools.peers.identification_records import Matrices
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 with peers_environment():
     import pandas as pd

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from rich.progress import Progress
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 Task = TypeVar("Task")
 

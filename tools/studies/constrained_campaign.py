@@ -42,7 +42,7 @@ from tools.studies.trial_setup import (
 from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ConstrainedDesign, PumpLimits
 from utank_hil.control.constrained.law import ConstrainedLaw

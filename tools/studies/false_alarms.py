@@ -34,8 +34,8 @@ from firmware_sim.scenario import Scenario
 from tools.evidence.sources import ROOT, digest_of, imported
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
+from utank_hil.base.one_thread import one_thread_each
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.one_thread import one_thread_each
 from utank_hil.runtime.panel import Action, TimedAction
 
 CACHE = ROOT / ".cache" / "false_alarms"

@@ -35,7 +35,7 @@ from tools.studies.trial_setup import (
 )
 from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.analysis.motion.confidence import mean_interval
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import ConstrainedDesign, DesignPlant, PredictiveDesign
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.lqg import kalman_predictor

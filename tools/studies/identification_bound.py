@@ -31,7 +31,7 @@ from tools.peers.identification_records import (
     sampled_plant,
 )
 from tools.printing import command_line, show
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.identification import era, okid, refine
 from utank_hil.identification.ship_fit import fit_ship

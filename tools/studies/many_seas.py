@@ -37,8 +37,8 @@ from utank_hil.analysis.loop.clairvoyant import NoHistoryError
 from utank_hil.analysis.loop.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
+from utank_hil.base.one_thread import one_thread_each
 from utank_hil.control.sea_model import SeaModel
-from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum, jonswap
 
 GPC, CONSTRAINED, TUNED, UNTOLD = "GPC, roll", "constrained", "self-tuned", "no sea known"

@@ -17,16 +17,16 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, works_of
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.retuning import SimulatedRetuner
-from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.monitoring import Monitors
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.motion_sign import MOST as SIGN_SUM
 from utank_hil.runtime.monitors.tank_equation import STUCK_GAIN
-from utank_hil.tick import TICK_NS
 
 LOOK_TICKS = 5
 AFTER_S = 60.0

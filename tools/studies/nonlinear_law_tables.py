@@ -27,7 +27,8 @@ from utank_hil.analysis.capsize.survival import controlled_run
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.margins import radius_and_peak
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.control import (
     ClippedValve,
     DesignPlant,
@@ -41,7 +42,6 @@ from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.valves import ValveRange, duct_valve_loss
 from utank_hil.sea import EffectiveSlope, Harmonics, Sea
-from utank_hil.tick import TICK_S
 
 Rows = dict[str, dict[str, float]]
 FIRST = shipped("gpc").vessel

@@ -29,9 +29,9 @@ from tools.studies.renewed_voyage import motion_between
 from tools.studies.trial_setup import CONFIGS, chosen, shipped
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.base.one_thread import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState
 from utank_hil.configuration import load_config
-from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import Spectrum
 
 LAWS: Final = {"GPC, roll": "gpc", "constrained": "constrained_gpc", "renewed": "self_tuning"}

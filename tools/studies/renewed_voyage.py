@@ -29,7 +29,7 @@ from tools.studies.trial_setup import CONFIGS, measured_hour, shipped
 from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of, self_tuned
 from utank_hil.analysis.motion.confidence import mean_interval
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.retuning import EstimateSettings

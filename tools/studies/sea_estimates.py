@@ -23,7 +23,7 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
 from tools.printing import command_line, show
 from tools.studies.trial_setup import CONFIGS
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.configuration import load_config
 from utank_hil.identification.multitaper import bandwidth_rad_s, coefficients

@@ -45,7 +45,7 @@ from utank_hil.analysis.loop.sea_trial import (
     TrialShip,
 )
 from utank_hil.analysis.motion.confidence import mean_interval
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import ConstrainedDesign, PumpLimits
 from utank_hil.control.constrained.law import ConstrainedLaw

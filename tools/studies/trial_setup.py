@@ -19,10 +19,10 @@ from firmware_sim.scenario import Scenario
 from tools.printing import command_line
 from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, run_trials
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.configuration.files import located
 from utank_hil.control import BuiltLaw, ConstrainedDesign, PumpLimits
-from utank_hil.parameters import ParameterError
 from utank_hil.sea import Spectrum, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"

@@ -34,13 +34,13 @@ from tools.studies.false_alarms import (
     ordered,
 )
 from tools.studies.monitor_margins import LOOK_TICKS, controller_of
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Frame
-from utank_hil.one_thread import one_thread_each
-from utank_hil.runtime import Lockstep, SimulatedBus
+from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.passive_twin import MEMORY_PERIODS, RECORD_PERIODS
-from utank_hil.tick import TICK_S
 
 STATISTIC = "roll over twin"
 FINDING = ENDED_BY_ITSELF[STATISTIC]

@@ -28,12 +28,12 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, retuner_work
+from utank_hil.base.one_thread import one_thread_each
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.one_thread import one_thread_each
 from utank_hil.retuning import RetuneFunction, RetuningSettings, SimulatedRetuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S
-from utank_hil.runtime import Lockstep, Node
+from utank_hil.runners import Lockstep, Node
 from utank_hil.runtime.panel import Action, TimedAction
 
 SCENARIO = Path("configs/scenarios/load_change.yaml")

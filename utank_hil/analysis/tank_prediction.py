@@ -24,7 +24,7 @@ from utank_hil.analysis.loop.sea_response import (
 )
 from utank_hil.analysis.shaft_power import mean_shaft_power_w
 from utank_hil.analysis.tank_sizing import MOST_STABILITY_SHARE, stability_taken
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics.linear import coupled_model

@@ -5,7 +5,7 @@ decode, over the frame's CRC byte, counter byte and three 16-bit words. They tak
 cantools' time, which control loop and lockstep runs need. Tests compare both with cantools.
 
 `make compiled` has mypyc compile the same text, for which its names have types; see
-`utank_hil.compiled`.
+`utank_hil.base.compiled`.
 """
 
 import math
@@ -16,8 +16,8 @@ from enum import IntEnum
 from types import NoneType, UnionType
 from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
+from utank_hil.base.compiled import compiled_codecs
 from utank_hil.canbus.e2e import WORD_TABLES, first_byte_table
-from utank_hil.compiled import compiled_codecs
 
 T = TypeVar("T", bound=tuple[Any, ...])
 

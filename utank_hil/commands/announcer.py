@@ -14,14 +14,14 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Final
 
-from utank_hil.background import give_way
+from utank_hil.base.background import give_way
 from utank_hil.canbus import RetuningState
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.commands.terminal import shown
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime.stopping import SIGNALS, signals_waiting
+from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from utank_hil.assembly import build_commissioning_node
+from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
 from utank_hil.commands.commissioning_record import (
     make_record,
@@ -23,11 +24,10 @@ from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.retuning.law_exchange import RetuningEvent
-from utank_hil.runtime import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
+from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.runtime.alarms import AlarmEvent
 from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
 from utank_hil.runtime.faults import fault_text
-from utank_hil.tick import TICK_S
 
 SAY_TICKS: Final = 500
 """Between two lines about one stage."""

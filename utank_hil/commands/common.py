@@ -13,6 +13,8 @@ import typer
 from pydantic import BaseModel
 from typer.core import TyperGroup
 
+from utank_hil.base.parameters import ParameterError
+from utank_hil.base.provenance import headline
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.terminal import notes
 from utank_hil.configuration.files import (
@@ -22,8 +24,6 @@ from utank_hil.configuration.files import (
     load_config,
     located,
 )
-from utank_hil.parameters import ParameterError
-from utank_hil.provenance import headline
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 

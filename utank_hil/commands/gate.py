@@ -10,13 +10,13 @@ import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
+from utank_hil.base.tick import TICK_S
 from utank_hil.commands.common import fail, fail_with
 from utank_hil.commands.terminal import notes
 from utank_hil.configuration import ControllerConfig
 from utank_hil.configuration.files import located
 from utank_hil.control import BuiltLaw
-from utank_hil.parameters import ParameterError
-from utank_hil.tick import TICK_S
 
 MOST_STEP_S: Final = TICK_S / 2
 STEPS_TIMED: Final = 5

@@ -7,16 +7,16 @@ from typing import Any, Final
 
 import yaml
 
+from utank_hil.base.parameters import refuse
+from utank_hil.base.provenance import headline
+from utank_hil.base.whole_file import left_whole
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import refuse
-from utank_hil.provenance import headline
 from utank_hil.retuning import ModelSummary
 from utank_hil.runtime.redundancy import NO_REDUNDANCY
-from utank_hil.whole_file import left_whole
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.assembly import retuning_task
+from utank_hil.base.provenance import describe
 from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.identified import (
@@ -20,7 +21,6 @@ from utank_hil.commands.terminal import Terminal, notes, say_cut
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
-from utank_hil.provenance import describe
 from utank_hil.retuning import Candidate
 from utank_hil.retuning.redesign import RetuningTask, identify, judge
 

@@ -62,7 +62,7 @@ def watch(
     send : callable, optional
         Sends what there is to see since the last call, and returns whether more may come.
     """
-    from utank_hil.runtime import stop_on_signals
+    from utank_hil.runners import stop_on_signals
     from utank_hil.telemetry.viewer import open_viewer
 
     with stop_on_signals() as stopped, ExitStack() as stack:

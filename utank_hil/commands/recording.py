@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.runtime.signals import SIGNALS
@@ -64,7 +64,7 @@ class RunRecording:
     events : str, optional
         Name of the run's ring of events, to be recorded beside the rows.
     about : mapping, optional
-        Where it comes from (`utank_hil.provenance`).
+        Where it comes from (`utank_hil.base.provenance`).
     head : mapping, optional
         Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional

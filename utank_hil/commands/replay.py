@@ -11,11 +11,11 @@ from typing import Annotated, Any
 import typer
 
 from utank_hil.assembly import build_law
+from utank_hil.base.parameters import ParameterError
 from utank_hil.commands.common import Json, fail, load
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.terminal import Terminal
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.parameters import ParameterError
 from utank_hil.telemetry.bus_logs import (
     BUS_SUFFIXES,
     begins_with_the_controller,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import yaml
 from rich.table import Table
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.pictures.roll_statistics import draw_roll_statistics
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.analysis.motion.statistics import roll_statistics
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.commands.report_parts import Report, about_section, roll_figure
 from utank_hil.pictures import BenchCurve, draw_bench

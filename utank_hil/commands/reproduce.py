@@ -9,11 +9,11 @@ import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from utank_hil.base.whole_file import write_whole
 from utank_hil.commands.common import OUT, Json, fail, prepare_out, print_json
 from utank_hil.commands.terminal import Terminal, new_table, notes
 from utank_hil.thesis.figure import Figure, Verdict, as_json, greatest
 from utank_hil.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
-from utank_hil.whole_file import write_whole
 
 PAGE: Final = "gallery.html"
 NUMBERS: Final = "figures.json"

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
+from utank_hil.base.provenance import describe
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.commands import event_log
 from utank_hil.commands.announcer import Announcer
@@ -29,9 +30,8 @@ from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.control import BuiltLaw
-from utank_hil.provenance import describe
 from utank_hil.retuning import Desk
-from utank_hil.runtime import (
+from utank_hil.runners import (
     LoopStatistics,
     Node,
     RealTimeLoop,

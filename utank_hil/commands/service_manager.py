@@ -6,8 +6,8 @@ import socket
 from collections.abc import Mapping
 from typing import Final
 
-from utank_hil.closing import Closing
-from utank_hil.tick import TICK_NS
+from utank_hil.base.closing import Closing
+from utank_hil.base.tick import TICK_NS
 
 _FEEDS: Final = 4
 """Signs of life in the watchdog's time."""

@@ -3,7 +3,7 @@
 from rich.table import Table
 
 from utank_hil.commands.terminal import new_table
-from utank_hil.runtime import LoopStatistics
+from utank_hil.runners import LoopStatistics
 
 
 def timing_table(loops: dict[str, LoopStatistics]) -> Table:

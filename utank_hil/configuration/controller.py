@@ -10,6 +10,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+from utank_hil.base.parameters import Problem, Range, refuse
+from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.laws import Law, sample_time
 from utank_hil.configuration.vessel import Vessel
@@ -18,14 +20,12 @@ from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.steady_heel import greatest_held_pa
-from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.retuning.estimator import EstimateSettings
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
-from utank_hil.runtime.bus_model import SimulatedBus
+from utank_hil.runners.bus_model import SimulatedBus
 from utank_hil.runtime.monitors.thresholds import SensorFigures
 from utank_hil.runtime.safety_limits import SafetyLimits
-from utank_hil.tick import TICK_S, is_whole_ticks
 
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 

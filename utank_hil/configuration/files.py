@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.configuration.error_words import words_for
 from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
-from utank_hil.parameters import ParameterError, Problem
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 

@@ -17,6 +17,7 @@ from pydantic import BeforeValidator, Discriminator, Tag
 from utank_hil.analysis.auto_tuning import AutoDesign
 from utank_hil.analysis.loop.scaled_law import LINEAR_KINDS
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
+from utank_hil.base.parameters import refuse
 from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
 from utank_hil.control.constrained.design import ConstrainedDesign
@@ -25,7 +26,6 @@ from utank_hil.control.pump_with_valve import PumpWithValveDesign
 from utank_hil.control.registry import LAWS
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
 from utank_hil.control.state_space import StateSpaceDesign
-from utank_hil.parameters import refuse
 
 GROUP: Final = "utank_hil.laws"
 

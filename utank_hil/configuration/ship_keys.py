@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import PlainSerializer, WrapValidator
 
+from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import ParameterError, Problem, Range, refuse
 
 NOT_GIVEN = math.nan
 """No key of a file can have this value."""

@@ -19,10 +19,10 @@ from pydantic import (
     model_validator,
 )
 
+from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.configuration.files import Section
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.sea import (
     MeasuredSpectra,
     Spectrum,

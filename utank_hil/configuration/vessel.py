@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
+from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.configuration.files import Section
 from utank_hil.configuration.plausibility import vessel_problems, vessel_warnings
 from utank_hil.configuration.ship_keys import ShipFromFile, in_written_keys
@@ -17,7 +18,6 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.steady_heel import RightingRange, righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
-from utank_hil.parameters import Problem, Range, refuse
 from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.runtime.safety_limits import SafetyLimits
 

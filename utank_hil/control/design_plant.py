@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import Final
 
+from utank_hil.base.parameters import NotNegative, range_problems, refuse
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import pump_model
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import ValveRange
-from utank_hil.parameters import NotNegative, range_problems, refuse
 
 _LIMITS: Final = PumpLimits()
 

@@ -39,7 +39,9 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.slope import slope_at_rest
@@ -47,8 +49,6 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
-from utank_hil.parameters import NotNegative, Positive, SampleTime, range_problems, refuse
-from utank_hil.tick import TICK_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import SampleTime, range_problems, refuse
 from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.parameters import SampleTime, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from utank_hil.parameters import NotNegative, Range, Share, range_problems, refuse
+from utank_hil.base.parameters import NotNegative, Range, Share, range_problems, refuse
 
 _Limit = Annotated[float, Range(above=0, infinite=True)]
 

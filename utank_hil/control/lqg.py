@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.gain import GainLaw
 from utank_hil.dynamics.sampling import LinearModel

@@ -16,11 +16,11 @@ from typing import Annotated
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import Finite, NotNegative, Range, range_problems, refuse
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import Finite, NotNegative, Range, range_problems, refuse
 
 _WAVES = np.geomspace(0.05, 5.0, 4000)
 

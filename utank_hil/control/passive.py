@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Range, SampleTime, range_problems, refuse
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
-from utank_hil.parameters import Range, SampleTime, range_problems, refuse
 
 
 @dataclass(slots=True, eq=False)

@@ -16,7 +16,8 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import ParameterError
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, LawDesign
 from utank_hil.control.semi_active import (
@@ -27,7 +28,6 @@ from utank_hil.control.semi_active import (
     throttled,
     valve_range,
 )
-from utank_hil.parameters import ParameterError
 
 
 class PumpWithValve(ClippedValve):

@@ -21,11 +21,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw, Controller, LinearLaw
 from utank_hil.control.predictive.design import measured_problems
 from utank_hil.control.state_space import StateSpaceLaw
-from utank_hil.parameters import ParameterError, refuse
 
 _PROBE, _COMPARED, _ALIKE = 1e-3, 50, 1e-3  # impulse, steps, share of the largest answer
 _METHODS = ("step", "applied", "reset")

@@ -23,10 +23,10 @@ from typing import Annotated
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import NotNegative, Positive, Problem, Range, range_problems, refuse
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.parameters import NotNegative, Positive, Problem, Range, range_problems, refuse
 from utank_hil.sea import Spectrum
 
 # seconds, not samples: a sea is as narrow at any sample time

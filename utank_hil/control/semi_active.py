@@ -22,18 +22,18 @@ from typing import Final, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
-from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.valves import ValveRange
-from utank_hil.parameters import (
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import (
     NotNegative,
     ParameterError,
     SampleTime,
     range_problems,
     refuse,
 )
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE, BuiltLaw, Controller, LawDesign
+from utank_hil.dynamics.linear import STATES
+from utank_hil.dynamics.valves import ValveRange
 
 FLOW: Final = "level_rate_m_s"
 

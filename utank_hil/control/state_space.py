@@ -14,14 +14,14 @@ from typing import Literal
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import Finite, Problem, SampleTime, range_problems, refuse
 from utank_hil.control.arx import discrete_matrices
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw
 from utank_hil.control.predictive.design import measured_problems
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.transfer import state_space_response
-from utank_hil.parameters import Finite, Problem, SampleTime, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,13 +20,8 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.interface import BuiltLaw
-from utank_hil.dynamics.linear import STATES, coupled_matrices
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import (
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import (
     Positive,
     Problem,
     Range,
@@ -34,6 +29,11 @@ from utank_hil.parameters import (
     range_problems,
     refuse,
 )
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import BuiltLaw
+from utank_hil.dynamics.linear import STATES, coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import Tank
 
 FACTOR = (0.25, 3.0)  # range of the correction m: beyond it the model is of another ship
 _ROLL, _LEVEL = STATES.index("roll_rad"), STATES.index("level_m")

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
-from utank_hil.parameters import Positive, range_problems, refuse
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Positive, range_problems, refuse
 
 
 @dataclass(frozen=True, slots=True)

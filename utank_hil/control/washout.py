@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray
+from utank_hil.base.arrays import ComplexArray
 from utank_hil.control.interface import Controller, LinearLaw
 from utank_hil.dynamics.sampling import LinearModel
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import prange
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.jit import njit
 from utank_hil.dynamics.nonlinear import RollCoefficients
 from utank_hil.dynamics.reference import INSIDE_M, REST_M_S

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 def body_to_earth(roll_rad: float, pitch_rad: float, yaw_rad: float) -> FloatArray:

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from utank_hil.parameters import Positive, Problem, range_problems, refuse
+from utank_hil.base.parameters import Positive, Problem, range_problems, refuse
 
 
 class PumpCoefficients(NamedTuple):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import Impact, RollModel
 
 REST_M_S = 1e-4  # a slower rebound ends at rest, which bounds the number of bounces

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from utank_hil.parameters import Finite, Problem, Range, range_problems, refuse
+from utank_hil.base.parameters import Finite, Problem, Range, range_problems, refuse
 
 RollLimit = Annotated[float, Range(above=0, most=0.7)]
 """Limit on roll in rad, at most 0.7 (40 degrees): up to there the IS Code 2008 (part A, 2.2.1)

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.kinematics import body_to_earth, euler_rates
 from utank_hil.dynamics.restoring import Restoring, restoring
 from utank_hil.dynamics.ship import RollShip

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import RollModel
 
 _HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))

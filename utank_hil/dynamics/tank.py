@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from utank_hil.parameters import (
+from utank_hil.base.parameters import (
     Finite,
     NotNegative,
     Positive,

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray
+from utank_hil.base.arrays import ComplexArray
 from utank_hil.dynamics.sampling import LinearModel
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import Positive, Problem, Range, range_problems, refuse
 
 AIR_DENSITY_KG_M3 = 1.225
 STOPPING_S = 1e-3

@@ -16,7 +16,7 @@ does not contain.
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 

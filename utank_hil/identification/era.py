@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import lstsq, svdvals
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 
 if TYPE_CHECKING:

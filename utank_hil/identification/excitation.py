@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.limits import PumpLimits
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.persistence import input_excitation

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 def logged_samples(

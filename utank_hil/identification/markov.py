@@ -12,7 +12,7 @@ Identification, 6.3. Beyond p the terms beta_k and alpha_k are zero.
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.identification.era import Realization, realize
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.markov import markov_gradient

@@ -33,7 +33,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import minimize
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.restoring import restoring

@@ -7,7 +7,7 @@ nearly independent.
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 
 _PADDING = 8  # finer grid of the transform: a coefficient is that of its frequency
 

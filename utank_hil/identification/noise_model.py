@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import chdtrc
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 
 _ROUNDING = 1e-12  # smallest significant innovation, relative to the errors' power

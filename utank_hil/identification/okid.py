@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.errors import IdentificationError

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import lapack
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.lag_regression import LagRegression
 
 _EXCITED = 1e-10  # smallest pivot of the lagged inputs' Gram matrix: singular values of 1e-5

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
 
 _SMALLEST, _LARGEST = 1e-60, 1e60  # range in which products of squares stay finite

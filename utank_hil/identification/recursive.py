@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 
 _START = 1e3  # root of the initial covariance, for scaled coefficients

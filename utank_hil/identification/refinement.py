@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.identification.lag_regression import LagRegression, segment_bounds
 from utank_hil.identification.modal import (
     ModalConfidence,

@@ -30,13 +30,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.identification.errors import IdentificationError
 from utank_hil.identification.okid import OkidResult
-from utank_hil.tick import TICK_S
 
 _BAND_RAD_S = 2.5  # above it ship and tank hardly respond
 _LINES = 64  # frequencies in the band; an ARX model of order 120 resolves no more

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 _SPREAD = 2.0  # standard deviation of the logarithm about its level: a factor of 7
 _LENGTH = 0.3  # Matern's length over the logarithm of frequency: a third of an octave

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.era import era
 from utank_hil.identification.modal import ModalParameters, modal_assurance, modal_parameters
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.errors import IdentificationError

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize_scalar
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import channel_scale, stacked_record

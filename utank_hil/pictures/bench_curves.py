@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import RetuningState
 from utank_hil.pictures.style import COLORS, DASHES, HIGHLIGHT, WIDEST_IN, WRONG, picture
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.transfer import state_space_response
 from utank_hil.identification import (

@@ -11,7 +11,7 @@ from utank_hil.analysis.loop.comparison import NO_TANK, PASSIVE, Loop
 from utank_hil.analysis.loop.margins import loop_response
 from utank_hil.analysis.loop.robustness import PEAK_SENSITIVITY
 from utank_hil.analysis.loop.sea_response import roll_response_without_tank
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.dynamics.ship import RollShip

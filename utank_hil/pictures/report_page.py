@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from utank_hil.base.whole_file import write_whole
 from utank_hil.pictures.style import DPI, TEXT_PT
-from utank_hil.whole_file import write_whole
 
 LEAST_TEXT_PX: Final = 9.0
 TEXT_PX: Final = TEXT_PT / 72 * DPI

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from utank_hil.provenance import headline
-from utank_hil.whole_file import write_whole
+from utank_hil.base.provenance import headline
+from utank_hil.base.whole_file import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,7 +76,7 @@ def picture(
     size_in : tuple of float
         Width and height in inches.
     about : mapping, optional
-        Where it comes from (`utank_hil.provenance`), kept in the file's text ``Description``.
+        Where it comes from (`utank_hil.base.provenance`), kept in the file's text ``Description``.
 
     Yields
     ------

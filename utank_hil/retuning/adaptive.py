@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.control import LinearLaw
 from utank_hil.retuning.admission import Admission, WarmUp

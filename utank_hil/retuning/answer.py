@@ -10,7 +10,7 @@ from zlib import crc32
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.retuning.answer import LONGEST_BYTES, Answer, Refusal, answer_bytes, read_answer
 from utank_hil.retuning.mailbox import Mailbox
 from utank_hil.retuning.retuner import Work

@@ -9,10 +9,10 @@ from typing import Annotated, Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.canbus import Verdict
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import Range, range_problems, refuse
 from utank_hil.sea import SlopeSpectrum
 
 MOST_BANDS: Final = 1000

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.control import DesignPlant
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion

@@ -11,12 +11,12 @@ from typing import Annotated, Final
 
 import numpy as np
 
+from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
-from utank_hil.parameters import Positive, Range, range_problems, refuse
 from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 class SampleHistory:

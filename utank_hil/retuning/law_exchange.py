@@ -32,7 +32,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES, WarmUp
 from utank_hil.retuning.answer import Answer, ModelSummary, Refusal

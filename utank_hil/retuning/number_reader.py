@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 class NumberReader:

@@ -7,7 +7,7 @@ never taken. Imports little, because the configuration needs it at every start o
 import math
 from typing import Final
 
-from utank_hil.parameters import Problem
+from utank_hil.base.parameters import Problem
 
 VALIDATION_SHARE: Final = 0.2
 """Share of the record, at its end, for the validation of the model."""

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.limiter import CommandLimiter

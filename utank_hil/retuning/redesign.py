@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import (
     DesignPlant,
     LinearLaw,

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.self_tuning import self_tuned
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control import DesignPlant
 from utank_hil.retuning.answer import Refusal
 from utank_hil.retuning.estimate import MotionEstimate

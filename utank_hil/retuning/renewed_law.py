@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.limits import PumpLimits

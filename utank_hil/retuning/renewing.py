@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.limits import PumpLimits

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.retuning.answer import Answer, answer_bytes, read_answer
 
 RetuneFunction = Callable[[FloatArray], Answer]

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Final, Literal
 
+from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.dynamics.ship import RollLimit
-from utank_hil.parameters import Positive, Range, range_problems, refuse
 
 EARLIEST_VERDICT_S: Final = 30.0
 """Shortest time after which a trial is judged: a few roll periods."""

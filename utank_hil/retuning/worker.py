@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Final
 
-from utank_hil.background import give_way
+from utank_hil.base.background import give_way
 from utank_hil.retuning.desk import Desk
 
 _POLL_S: Final = 0.1

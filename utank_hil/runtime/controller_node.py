@@ -7,7 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.periodic import Schedule
+from utank_hil.base.tick import TICK_NS, TICK_S, is_whole_ticks
 from utank_hil.canbus import (
     Address,
     Alarm,
@@ -28,6 +30,7 @@ from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
 from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
+from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.runtime.alarms import AlarmEvent, AlarmList, Gravity, active_faults, all_stopping
 from utank_hil.runtime.drive_sequence import DriveSequence
 from utank_hil.runtime.faults import FAULTS
@@ -37,13 +40,10 @@ from utank_hil.runtime.judging import all_halving, first_stopping
 from utank_hil.runtime.monitoring import STALE_MS, Monitors
 from utank_hil.runtime.monitors.thresholds import DEGRADED_SHARE
 from utank_hil.runtime.observations import MILLISECOND_NS, Observer
-from utank_hil.runtime.periodic import Schedule
 from utank_hil.runtime.redundancy import Redundancy
 from utank_hil.runtime.signals import SIGNALS, put_quick, put_slow
-from utank_hil.runtime.statistics import LoopStatistics
 from utank_hil.runtime.supervisor import Demand, Supervisor
 from utank_hil.runtime.valve_command import ValveCommander
-from utank_hil.tick import TICK_NS, TICK_S, is_whole_ticks
 
 NANOSECONDS: Final = 1e-9
 FRESH_MS: Final = 50.0

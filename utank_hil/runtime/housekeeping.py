@@ -2,6 +2,7 @@
 
 import math
 
+from utank_hil.base.periodic import Schedule
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -10,7 +11,6 @@ from utank_hil.canbus import (
     Heartbeat,
     NodeState,
 )
-from utank_hil.runtime.periodic import Schedule
 
 NANOSECONDS = 1e-9
 

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
 from utank_hil.control.design_plant import DesignPlant
@@ -35,7 +36,6 @@ from utank_hil.runtime.monitors.volume import Volume
 from utank_hil.runtime.motion_sensors import MotionSensors
 from utank_hil.runtime.observations import MEAN_FRAME_BITS, Observations
 from utank_hil.runtime.passive_twin import PassiveTwin
-from utank_hil.tick import TICK_NS, TICK_S
 
 ROUND_TICKS: Final = 10
 LONG_S: Final = ROUND_TICKS * TICK_S

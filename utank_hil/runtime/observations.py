@@ -5,10 +5,10 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from utank_hil.base.periodic import Schedule
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus.enumerations import DriveFault, DriveState, Mode
 from utank_hil.runtime.inbox import Inbox
-from utank_hil.runtime.periodic import Schedule
-from utank_hil.tick import TICK_NS, TICK_S
 
 MILLISECOND_NS: Final = 1_000_000
 LOAD_LOOK_NS: Final = 10 * TICK_NS

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from utank_hil.base.parameters import NotNegative, range_problems, refuse
+from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
     Alarm,
     Catalogue,
@@ -14,10 +16,8 @@ from utank_hil.canbus import (
     OperatorCommand,
     Station,
 )
-from utank_hil.parameters import NotNegative, range_problems, refuse
 from utank_hil.runtime.housekeeping import Housekeeping
 from utank_hil.runtime.stations import ADDRESSES
-from utank_hil.tick import TICK_NS
 
 EDGE_NS = 500_000_000
 """How long an edge-triggered button stays pressed: longer than two lost messages. So long the arm

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.dynamics.ship import RollLimit
-from utank_hil.parameters import Range, range_problems, refuse
 
 _HeelLimit = Annotated[float, Range(above=0, most=0.28)]
 _Silence = Annotated[float, Range(above=0, most=1000)]

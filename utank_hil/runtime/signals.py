@@ -4,7 +4,7 @@ from collections.abc import Callable
 from struct import Struct
 from typing import Any, Final
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 _SOURCES: Final = {
     "time_s": "time_s",

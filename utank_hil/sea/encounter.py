@@ -11,7 +11,7 @@ negative for a wave that the ship overtakes.
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 

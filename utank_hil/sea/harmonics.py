@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 BLOCK = 1 << 19  # cosines evaluated at a time in `at`: 4 MB
 

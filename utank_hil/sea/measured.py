@@ -7,7 +7,7 @@ from datetime import datetime
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.sea.spectrum import Spectrum, band_edges
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea.spectrum import Spectrum
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.sea.measured import MeasuredSpectra
 
 PAIR = re.compile(r"(\S+)\s*\(\s*([^()\s]+)\s*\)")

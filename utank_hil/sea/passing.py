@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.sea.sea import COMPONENTS, Sea, drawn_components
 from utank_hil.sea.spectrum import Spectrum
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
-from utank_hil.parameters import NotNegative, range_problems, refuse
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import NotNegative, range_problems, refuse
 from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum

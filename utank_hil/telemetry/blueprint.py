@@ -151,7 +151,7 @@ def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[
     ----------
     columns : sequence of str
     about : mapping or None
-        Where they come from (`utank_hil.provenance`).
+        Where they come from (`utank_hil.base.provenance`).
     """
     told = (about or {}).get("configuration", {})
     vessel = told.get("vessel") or {}

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from utank_hil.base.tick import TICK_NS
+from utank_hil.base.whole_file import left_whole
 from utank_hil.canbus import (
     Address,
     AddressClaim,
@@ -22,8 +24,6 @@ from utank_hil.canbus import (
 )
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.replay import Entry
-from utank_hil.tick import TICK_NS
-from utank_hil.whole_file import left_whole
 
 if TYPE_CHECKING:
     import can

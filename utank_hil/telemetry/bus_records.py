@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 PAYLOAD_BYTES: Final = 8
 RECORD: Final = np.dtype(

@@ -12,8 +12,8 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from utank_hil.base.closing import Closing
 from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
-from utank_hil.closing import Closing
 from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runtime.alarms import AlarmEvent

@@ -16,10 +16,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.closing import Closing
+from utank_hil.base.closing import Closing
+from utank_hil.base.whole_file import errors_name
 from utank_hil.telemetry.bus_records import RECORD, Records, pack, unpack
 from utank_hil.telemetry.rotation import part_of, whole_of
-from utank_hil.whole_file import errors_name
 
 SUFFIX: Final = ".frames"
 BLOCK_NS: Final = 500_000_000

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.recording import read_recording
 

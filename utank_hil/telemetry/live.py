@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import rerun as rr
 
-from utank_hil.closing import Closing
+from utank_hil.base.closing import Closing
 from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.event_ring import EventReader, is_event_ring
@@ -37,7 +37,7 @@ class LiveRun:
     pid : int
         Its process.
     about : mapping
-        Where its rows come from (`utank_hil.provenance`); empty if it does not say.
+        Where its rows come from (`utank_hil.base.provenance`); empty if it does not say.
     """
 
     ring: str

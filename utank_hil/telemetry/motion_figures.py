@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 import rerun as rr
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.telemetry.scene import due_rows
 from utank_hil.telemetry.viewer import TIMELINE
 

@@ -9,7 +9,7 @@ from functools import cache
 from struct import Struct
 from typing import Any, Final
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.retuning import Retuner
 from utank_hil.retuning.answer import Answer, answer_bytes

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import rerun as rr
 
-from utank_hil.arrays import FloatArray
-from utank_hil.closing import Closing
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.closing import Closing
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.event_ring import Event
 from utank_hil.telemetry.rerun_log import (
@@ -37,7 +37,7 @@ class RecordingPart(Closing):
     columns : sequence of str
         Names of a row's values.
     about : mapping, optional
-        Where it comes from (`utank_hil.provenance`).
+        Where it comes from (`utank_hil.base.provenance`).
 
     Raises
     ------

@@ -31,8 +31,8 @@ from typing import Any, Final, NoReturn
 
 import numpy as np
 
-from utank_hil.background import give_way
-from utank_hil.closing import Closing
+from utank_hil.base.background import give_way
+from utank_hil.base.closing import Closing
 from utank_hil.telemetry.bus_records import RECORD, Kind, records_of
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLogWriter

@@ -13,7 +13,8 @@ import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import RerunWarning
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.whole_file import write_whole
 from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.telemetry.blueprint import MOST_SHADES, columns_of, make_blueprint, run_color
 from utank_hil.telemetry.rerun_log import (
@@ -33,7 +34,6 @@ from utank_hil.telemetry.rerun_log import (
 from utank_hil.telemetry.scene import scene_size
 from utank_hil.telemetry.units import column_of, field_of
 from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
-from utank_hil.whole_file import write_whole
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
@@ -60,7 +60,7 @@ def write_recording(
     events : mapping of str to sequence of RetuningEvent, optional
         Retuning events by run, `time_ns` on the clock of `time_s`.
     about : mapping, optional
-        Where it comes from (`utank_hil.provenance`).
+        Where it comes from (`utank_hil.base.provenance`).
 
     Raises
     ------
@@ -152,7 +152,7 @@ def _in_order(parts: list[dict[str, FloatArray]]) -> dict[str, FloatArray]:
 
 
 def read_about(path: Path) -> dict[str, Any]:
-    """Read where a recording comes from (`utank_hil.provenance`).
+    """Read where a recording comes from (`utank_hil.base.provenance`).
 
     Raises
     ------

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from utank_hil.arrays import FloatArray
 from utank_hil.assembly import build_controller_node, build_law
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.retuning.answer import Answer, read_answer
-from utank_hil.runtime import LoopStatistics
+from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay_head import causes

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from utank_hil.base.provenance import commit, describe, version
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
-from utank_hil.provenance import commit, describe, version
 from utank_hil.telemetry import law_values
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
@@ -63,7 +63,7 @@ def replay_head(
     Returns
     -------
     dict
-        ``about`` (`utank_hil.provenance`), ``retuner``, ``estimating``, ``commissioned``,
+        ``about`` (`utank_hil.base.provenance`), ``retuner``, ``estimating``, ``commissioned``,
         ``packages``, ``catalogue`` (its version), ``law`` (every number of it), ``files`` (content
         of the data files).
     """

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pyarrow as pa  # it ships no annotations
 import rerun as rr
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.event_ring import Event, event_text, warns
 from utank_hil.telemetry.motion_figures import NEEDED, MotionFigures
@@ -27,7 +27,7 @@ from utank_hil.telemetry.viewer import TIMELINE
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
 ABOUT: Final = "about"
-"""Property of a recording that says where it comes from (`utank_hil.provenance`), as JSON."""
+"""Property of a recording that says where it comes from (`utank_hil.base.provenance`), as JSON."""
 LIVE_RUN: Final = "live"
 """Name of a run while it goes on, and in what was recorded of it."""
 ARCHETYPE: Final = "telemetry"
@@ -83,7 +83,7 @@ class RunLog:
     columns : sequence of str
         Names of a row's values; `time_s` must be among them.
     about : mapping, optional
-        Where it comes from (`utank_hil.provenance`); with the ship in it there is a scene.
+        Where it comes from (`utank_hil.base.provenance`); with the ship in it there is a scene.
     batch_s : float, optional
         As in `Scene`; by default pictures are sent at once.
     color : tuple of int

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 import rerun as rr
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.runtime.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
@@ -57,7 +57,7 @@ class SceneSize:
 
     @classmethod
     def of(cls, about: Mapping[str, Any] | None) -> "SceneSize | None":
-        """From where a recording comes from (`utank_hil.provenance`); None if that says nothing."""
+        """Return the size that the provenance of a recording states; None if it states none."""
         vessel = ((about or {}).get("configuration") or {}).get("vessel")
         if vessel is None:
             return None

@@ -14,13 +14,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.whole_file import left_whole
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import entries_of
 from utank_hil.telemetry.signal_table import signal_table
 from utank_hil.telemetry.units import column_of
-from utank_hil.whole_file import left_whole
 
 TABLE_SUFFIXES: Final = (".csv", ".parquet")
 SUFFIXES: Final = (".rrd", SUFFIX, *BUS_SUFFIXES, *TABLE_SUFFIXES)

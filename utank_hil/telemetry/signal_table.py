@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import AddressClaim, DriveStatus2, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES, Codec
 from utank_hil.telemetry.bus_records import Kind

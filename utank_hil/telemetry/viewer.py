@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import quote, urlsplit
 
-from utank_hil.closing import Closing
+from utank_hil.base.closing import Closing
 
 TIMELINE: Final = "time"
 """Of all recordings."""

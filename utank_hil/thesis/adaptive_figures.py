@@ -9,7 +9,7 @@ import numpy as np
 
 from utank_hil.analysis.loop.margins import margins
 from utank_hil.analysis.loop.printed_laws import SAMPLE_TIME_S, held_model
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.control.predictive.gains import design_dpc, design_gpc
 from utank_hil.dynamics.linear import pump_model

@@ -7,7 +7,7 @@ import numpy as np
 
 from utank_hil.analysis.capsize.contest import PATTI_B, WAVE_RAD_S
 from utank_hil.analysis.capsize.threshold import capsize_threshold, without_tank
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from utank_hil.thesis.patti_b import MIDDLE_NM, PASSIVE_NM, STRONG_NM, WEAK_NM

@@ -8,7 +8,7 @@ import numpy as np
 from utank_hil.analysis.capsize.contest import PATTI_B, law_factory
 from utank_hil.analysis.capsize.threshold import without_tank
 from utank_hil.analysis.motion.response import simulated_response
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import WaveMoment
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from utank_hil.thesis.linear_contest import PASSIVE as PASSIVE_TANK

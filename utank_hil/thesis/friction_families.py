@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.motion.stimulation import tuned_tank
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, simulate
 from utank_hil.dynamics.harmonic import HarmonicResponse, harmonic_response
 from utank_hil.dynamics.linear import coupled_matrices

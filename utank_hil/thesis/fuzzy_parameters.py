@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.capsize.contest import PATTI_B, WAVE_RAD_S, law_factory
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.direct import DirectFuzzyController, RobustFuzzy, SmallGainFuzzy
 from utank_hil.dynamics import WaveMoment
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Verdict

@@ -16,7 +16,7 @@ from utank_hil.analysis.loop.printed_laws import (
     SAMPLE_TIME_S,
     held_model,
 )
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.predictive.gains import design_dpc
 from utank_hil.control.predictive.law import PredictiveLaw

@@ -19,7 +19,7 @@ from utank_hil.analysis.loop.printed_laws import (
     SAMPLE_TIME_S,
     held_model,
 )
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import Controller, LinearLaw
 from utank_hil.control.lqg import design_lqr

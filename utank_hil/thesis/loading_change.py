@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from utank_hil.analysis.loop.printed_laws import SAMPLE_TIME_S, held_model
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.predictive.law import PredictiveLaw

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.basis import WIDTH, FuzzyBasis
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Verdict
 

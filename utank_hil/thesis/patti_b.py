@@ -15,7 +15,7 @@ from utank_hil.analysis.capsize.contest import (
 )
 from utank_hil.analysis.capsize.survival import Survival, controlled_run
 from utank_hil.analysis.capsize.threshold import without_tank
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.fuzzy.direct import DirectFuzzyController
 from utank_hil.control.interface import Controller
 from utank_hil.dynamics import RollModel, WaveMoment

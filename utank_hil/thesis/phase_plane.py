@@ -8,7 +8,7 @@ import numpy as np
 
 from utank_hil.analysis.capsize.contest import PATTI_B
 from utank_hil.analysis.capsize.threshold import equilibria, safe_basin, without_tank
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, simulate
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict

@@ -13,7 +13,7 @@ from utank_hil.analysis.motion.stimulation import (
     stimulate_on_still_water,
     tuned_tank,
 )
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
 from utank_hil.dynamics import RollModel, simulate
 from utank_hil.dynamics.ship import RollShip

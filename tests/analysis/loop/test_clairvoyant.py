@@ -9,12 +9,12 @@ from shipped_designs import GPC_ROLL
 
 from utank_hil.analysis.loop.clairvoyant import NoHistoryError, clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
+from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant, PumpLimits
 from utank_hil.control.constrained.active_set import ActiveSetSolver
 from utank_hil.dynamics.linear import STATES, pump_model
 from utank_hil.dynamics.sampling import LinearModel, transition_and_step
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
-from utank_hil.tick import TICK_S
 
 LIMITS = PumpLimits(level_m=3.0)
 MOMENT = Sea.irregular(jonswap(4.7, 10.0), 3, components=128).roll_moment(

@@ -19,9 +19,9 @@ from utank_hil.analysis.loop.sea_trial import (
     run_trials,
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
+from utank_hil.base.tick import TICK_S
 from utank_hil.control import DesignPlant, PredictiveLaw, PumpLimits
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
-from utank_hil.tick import TICK_S
 
 LIMITS = PumpLimits(pressure_pa=30e3)
 GPC = Entrant("gpc", GPC_ROLL.law(DesignPlant(SHIP, TANK)), ("roll_rad",), LIMITS)

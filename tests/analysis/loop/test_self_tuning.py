@@ -20,12 +20,12 @@ from utank_hil.analysis.loop.self_tuning import (
     unknown_sea,
 )
 from utank_hil.assembly import build_law
+from utank_hil.base.tick import TICK_S
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import EffectiveSlope, Sea, jonswap
-from utank_hil.tick import TICK_S
 
 CONTROLLERS = Path("configs/controllers")
 SHIPPED = load_config(CONTROLLERS / "constrained_gpc.yaml", ControllerConfig)

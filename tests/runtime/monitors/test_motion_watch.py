@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 from moving_ship import THRESHOLDS
 
+from utank_hil.base.tick import TICK_S
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.motion_watch import MotionWatch
 from utank_hil.runtime.monitors.spikes import MotionGate
-from utank_hil.tick import TICK_S
 
 STEP_S = 0.05
 LOOSE = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=100.0, rate_noise_rad_s=100.0)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.analysis.capsize.threshold import Equilibrium, equilibria, erosion, safe_basin
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate
 
 NEAR = 0.02  # distance of a trajectory's start from the saddle, relative to its heel

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.simulate import WaveComponents, WaveMoment
 
 

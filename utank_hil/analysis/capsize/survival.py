@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.interface import Controller
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.nonlinear import RollModel

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from utank_hil.analysis.capsize.sea_stack import stacked_seas
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
 from utank_hil.dynamics.tank import negligible

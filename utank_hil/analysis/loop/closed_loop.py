@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.transfer import state_space_response

@@ -33,7 +33,7 @@ from typing import Final
 import numpy as np
 from scipy.fft import next_fast_len
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import Controller
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg import LQGLaw

@@ -10,7 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
@@ -20,7 +21,6 @@ from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
-from utank_hil.tick import TICK_S
 
 LEVEL_TICKS: Final = 2
 """Cycle of SENSOR_TANK, in ticks."""

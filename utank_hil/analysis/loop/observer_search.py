@@ -30,7 +30,7 @@ from utank_hil.analysis.loop.robustness import (
     ship_variants,
 )
 from utank_hil.analysis.loop.scaled_law import NoLawError
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.design_plant import DesignPlant

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from utank_hil.analysis.loop.performance_index import performance_index
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.predictive.gains import design_dpc, design_gpc

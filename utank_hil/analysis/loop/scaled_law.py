@@ -21,11 +21,11 @@ from typing import Final, Literal, NamedTuple, get_args
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.analysis.loop.trade import scaled
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.control.predictive.design import PredictiveDesign, Predictor
 from utank_hil.dynamics.linear import STATES
-from utank_hil.tick import TICK_S
 
 LinearKind = Literal["gpc", "dpc", "lqg"]
 LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.interface import LinearLaw
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import Harmonics

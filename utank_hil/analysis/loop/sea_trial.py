@@ -25,15 +25,15 @@ from utank_hil.analysis.loop.loop_simulation import (
     simulate_loop,
 )
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.one_thread import one_thread_each
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import LinearLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.tank import Tank
-from utank_hil.one_thread import one_thread_each
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum
-from utank_hil.tick import TICK_S
 
 NO_TANK, PASSIVE, CLAIRVOYANT = "no tank", "passive", "clairvoyant"
 _BOUND_TICKS = 20  # the clairvoyant commands every 0.2 s

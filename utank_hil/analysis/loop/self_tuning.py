@@ -38,7 +38,9 @@ from utank_hil.analysis.loop.robustness import (
     robustness,
 )
 from utank_hil.analysis.loop.scaled_law import NoLawError
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Range, range_problems, refuse
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.design_plant import DesignPlant
@@ -49,9 +51,7 @@ from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES, pump_model, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import Range, range_problems, refuse
 from utank_hil.sea import ittc
-from utank_hil.tick import TICK_S
 
 _PRESSURE_COST: Final = 0.106
 _LEVEL_COST: Final = 0.33

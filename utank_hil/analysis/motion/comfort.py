@@ -20,7 +20,7 @@ from utank_hil.analysis.motion.motion_sickness import (
     motion_sickness_dose,
     motion_sickness_incidence,
 )
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 STANDING: Final = 0.25

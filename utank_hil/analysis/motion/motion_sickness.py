@@ -10,7 +10,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 
 SETTLE_PERIODS = 60  # wave periods before the analysed one

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from utank_hil.base.parameters import Problem
 from utank_hil.configuration.plausibility.drive import (
     holding,
     of_motor,
@@ -32,7 +33,6 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.steady_heel import righting_range
 from utank_hil.dynamics.tank import Tank
-from utank_hil.parameters import Problem
 
 __all__ = ["free_surface_nm_rad", "holding", "tank_problems", "vessel_problems", "vessel_warnings"]
 

@@ -16,7 +16,7 @@ using recursive LDL' updates, IEEE Transactions on Automatic Control 67 (2022) 4
 import daqp
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 _OPTIMAL = 1
 

@@ -13,7 +13,16 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import (
+    NotNegative,
+    Positive,
+    Range,
+    SampleTime,
+    Share,
+    range_problems,
+    refuse,
+)
 from utank_hil.control.constrained.horizon import condense
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.constrained.sea_plant import sea_plant
@@ -25,15 +34,6 @@ from utank_hil.control.predictive.design import measured_problems, per_output
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.parameters import (
-    NotNegative,
-    Positive,
-    Range,
-    SampleTime,
-    Share,
-    range_problems,
-    refuse,
-)
 
 # A step must end well inside its tick, whatever is measured. With each of these at its most, a sea
 # model of the greatest order, and random measurements of up to 100 times any motion, which use up

@@ -21,13 +21,13 @@ from typing import Annotated
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
+from utank_hil.base.parameters import Positive, Range, range_problems, refuse
 from utank_hil.control.constrained.horizon import Horizon
 from utank_hil.control.constrained.plan_programme import PlanProgramme
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
-from utank_hil.parameters import Positive, Range, range_problems, refuse
 
 _FOLLOWED = 0.02  # of the greatest pressure: a mean command this near to the plan's counts as it
 

@@ -10,7 +10,7 @@ a slack s that the level may exceed its limit by::
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.constrained.active_set import ActiveSetSolver
 from utank_hil.control.constrained.horizon import Horizon
 from utank_hil.control.limits import PumpLimits

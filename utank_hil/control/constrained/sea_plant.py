@@ -6,7 +6,7 @@ moment runs straight. A heel (wind, cargo, turning) is a moment that wanders slo
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.sea_model import SeaModel
 from utank_hil.dynamics.linear import STATES, state_matrices

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 
 SETS = 3
 # neighbouring sets cross at a membership of one half (the thesis gives no width)

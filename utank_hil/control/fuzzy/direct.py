@@ -26,8 +26,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from utank_hil.base.parameters import NotNegative, Positive, Problem, Range
 from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
-from utank_hil.parameters import NotNegative, Positive, Problem, Range
 
 _Gamma = Annotated[float, Range(above=0, below=1)]
 

@@ -23,9 +23,9 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import Finite, Positive, Problem, Range
 from utank_hil.control.fuzzy.law import FuzzyController, FuzzyInputs, FuzzyLaw
-from utank_hil.parameters import Finite, Positive, Problem, Range
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,14 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
-from utank_hil.control.design_plant import DesignPlant
-from utank_hil.control.fuzzy.basis import FuzzyBasis
-from utank_hil.control.interface import BuiltLaw, Controller
-from utank_hil.control.slope import slope_at_rest
-from utank_hil.control.tracking_error import ErrorDynamics
-from utank_hil.dynamics.linear import STATES
-from utank_hil.parameters import (
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import (
     NotNegative,
     Positive,
     Problem,
@@ -27,7 +21,13 @@ from utank_hil.parameters import (
     range_problems,
     refuse,
 )
-from utank_hil.tick import TICK_S
+from utank_hil.base.tick import TICK_S
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.fuzzy.basis import FuzzyBasis
+from utank_hil.control.interface import BuiltLaw, Controller
+from utank_hil.control.slope import slope_at_rest
+from utank_hil.control.tracking_error import ErrorDynamics
+from utank_hil.dynamics.linear import STATES
 
 _OBEYED = 0.9  # part of a command that must have left for the law to learn from what followed
 _REACH = 2.0  # the inputs are held within so many times their ranges

@@ -15,7 +15,16 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.parameters import (
+    NotNegative,
+    Positive,
+    Problem,
+    Range,
+    SampleTime,
+    range_problems,
+    refuse,
+)
 from utank_hil.control.arx import ARX
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import BuiltLaw, LinearLaw
@@ -26,15 +35,6 @@ from utank_hil.control.washout import WashableLaw, WashoutLaw
 from utank_hil.dynamics.linear import STATES, state_matrices
 from utank_hil.dynamics.sampling import LinearModel, noise_covariance, sample
 from utank_hil.dynamics.ship import RollShip
-from utank_hil.parameters import (
-    NotNegative,
-    Positive,
-    Problem,
-    Range,
-    SampleTime,
-    range_problems,
-    refuse,
-)
 
 MOST_ORDER: Final = 500
 """Of a predictor: its law has as many states per output, and judging it takes their cube."""

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.arx import ARX
 from utank_hil.control.predictive.law import PredictiveLaw
 from utank_hil.control.predictive.multistep import Prediction, predict

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from utank_hil.arrays import ComplexArray, FloatArray
+from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.dynamics.sampling import LinearModel
 
 

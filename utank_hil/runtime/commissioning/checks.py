@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.runtime.commissioning.pulses import PulsePlan, ValveStroke

@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Mode
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE
@@ -21,7 +22,6 @@ from utank_hil.runtime.commissioning.pulse_checks import judge_pulses
 from utank_hil.runtime.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
 from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.runtime.faults import fault_text
-from utank_hil.tick import TICK_NS, TICK_S
 
 ROW_TICKS: Final = 5
 ROW_S: Final = ROW_TICKS * TICK_S

@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from utank_hil.arrays import FloatArray
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
-from utank_hil.tick import TICK_S
 
 LEVEL_SHARE: Final = 0.2
 """Greatest level of the plan, as a share of the limit of the level."""

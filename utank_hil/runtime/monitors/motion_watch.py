@@ -3,12 +3,12 @@
 import math
 from typing import Final
 
+from utank_hil.base.tick import TICK_S
 from utank_hil.runtime.monitors.finding import Finding
 from utank_hil.runtime.monitors.motion import RollAgainstRate
 from utank_hil.runtime.monitors.noise import Noise, SecondDifference
 from utank_hil.runtime.monitors.spikes import MotionGate, SpikeCount
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
-from utank_hil.tick import TICK_S
 
 _REPEATS: Final = int(Finding.MOTION_REPEATS)
 _NOISE: Final = int(Finding.NOISE)

@@ -2,10 +2,10 @@
 
 from typing import Final
 
+from utank_hil.base.tick import TICK_S
 from utank_hil.runtime.monitors.repetition import Repetition
 from utank_hil.runtime.monitors.standstill import Standstill
 from utank_hil.runtime.monitors.thresholds import MonitorThresholds
-from utank_hil.tick import TICK_S
 
 STEP_SAMPLES: Final = 5
 """So many in a row are no spike but a step, which is taken."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from toy_nodes import BIT_NS, MS, SelectiveNode, ToyNode, frame
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime import Lockstep, NodeError, SimulatedBus, frame_bits
+from utank_hil.runners import Lockstep, NodeError, SimulatedBus, frame_bits
 
 
 class RandomNode(ToyNode):

@@ -6,9 +6,9 @@ from math import gcd
 from typing import Final
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime.errors import NodeError
-from utank_hil.runtime.hooks import LinkObserver, LoadObserver, Stoppable
-from utank_hil.runtime.node import Node, Selective
+from utank_hil.runners.errors import NodeError
+from utank_hil.runners.hooks import LinkObserver, LoadObserver, Stoppable
+from utank_hil.runners.node import Node, Selective
 
 OUTSIDE: Final = -1
 """Sender index of a frame from outside the group."""

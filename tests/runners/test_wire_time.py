@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime import frame_bits
+from utank_hil.runners import frame_bits
 
 frames = st.builds(
     Frame,

@@ -11,10 +11,10 @@ from typing import Final
 
 from utank_hil.canbus.frame import Frame
 from utank_hil.canbus.port import Port, PortError
-from utank_hil.runtime.clock import Clock, MonotonicClock
-from utank_hil.runtime.group import OUTSIDE, NodeGroup
-from utank_hil.runtime.node import Node
-from utank_hil.runtime.statistics import LoopStatistics
+from utank_hil.runners.clock import Clock, MonotonicClock
+from utank_hil.runners.group import OUTSIDE, NodeGroup
+from utank_hil.runners.node import Node
+from utank_hil.runners.statistics import LoopStatistics
 
 _NEVER_NS: Final = 1 << 63
 _REAL_TIME: Final = (os.SCHED_FIFO, os.SCHED_RR)

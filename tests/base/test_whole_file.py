@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from utank_hil.base.whole_file import left_whole, write_whole
 from utank_hil.pictures.report_page import write_report_page
 from utank_hil.pictures.style import picture
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.whole_file import left_whole, write_whole
 
 ROOM = 1024
 

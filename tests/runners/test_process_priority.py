@@ -7,13 +7,13 @@ import threading
 
 import pytest
 
-from utank_hil.runtime import real_time_scheduling
+from utank_hil.runners import real_time_scheduling
 
 pytestmark = pytest.mark.slow
 
 STATE = """
 import gc, json, os, pathlib, resource, sys
-from utank_hil.runtime import real_time_scheduling
+from utank_hil.runners import real_time_scheduling
 
 def state():
     status = pathlib.Path("/proc/self/status").read_text().splitlines()

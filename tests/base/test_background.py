@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from utank_hil import background
+from utank_hil.base import background
 
 
 def told_by_a_child(score: Path) -> str:

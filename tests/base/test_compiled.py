@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil import compiled
+from utank_hil.base import compiled
 
 RUN = """
 import hashlib, json, pickle
@@ -17,9 +17,9 @@ from pathlib import Path
 from firmware_sim.bench import jobs_of
 from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.scenario import Scenario
-from utank_hil.compiled import in_use
+from utank_hil.base.compiled import in_use
 from utank_hil.configuration import load_config
-from utank_hil.runtime import lockstep
+from utank_hil.runners import lockstep
 
 scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
 # the bench sends its jobs to other processes
@@ -54,7 +54,7 @@ def test_modules_are_found_only_if_current_and_not_switched_off(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wanted: str, current: bool
 ) -> None:
     made = compiled.folder() if current else Path("0123456789abcdef")
-    module = tmp_path / made.name / "utank_hil" / f"tick{EXTENSION_SUFFIXES[0]}"
+    module = tmp_path / made.name / "utank_hil" / "base" / f"tick{EXTENSION_SUFFIXES[0]}"
     module.parent.mkdir(parents=True)
     module.touch()
     monkeypatch.setattr(compiled, "_MADE", tmp_path)
@@ -63,9 +63,9 @@ def test_modules_are_found_only_if_current_and_not_switched_off(
     compiled.use_if_current()
     assert compiled.in_use() == (current and wanted != "0")
     if compiled.in_use():
-        spec = sys.meta_path[0].find_spec("utank_hil.tick", None)
+        spec = sys.meta_path[0].find_spec("utank_hil.base.tick", None)
         assert spec.origin == str(module)
-        assert sys.meta_path[0].find_spec("utank_hil.arrays", None) is None
+        assert sys.meta_path[0].find_spec("utank_hil.base.arrays", None) is None
 
 
 @pytest.mark.evidence

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
-ROOT: Final = Path(__file__).resolve().parents[1]
+ROOT: Final = Path(__file__).resolve().parents[2]
 PACKAGES: Final = ("utank_hil", "firmware_sim")
 CODECS: Final = "utank_hil_codecs"
 """Compiled module of what `utank_hil.canbus.codec` writes for the messages of the catalogue."""

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from firmware_sim.scenario import Scenario
-from utank_hil.configuration import ControllerConfig, Vessel
-from utank_hil.parameters import (
+from utank_hil.base.parameters import (
     NotNegative,
     ParameterError,
     Positive,
@@ -23,6 +22,7 @@ from utank_hil.parameters import (
     range_problems,
     refuse,
 )
+from utank_hil.configuration import ControllerConfig, Vessel
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from heapq import heappop, heappush
 from typing import Final
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime.wire_time import INTERMISSION_BITS, frame_bits
+from utank_hil.runners.wire_time import INTERMISSION_BITS, frame_bits
 
 WINDOW_NS: Final = 1_000_000_000
 """Length of the windows of the bus load."""

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from toy_nodes import BIT_NS, MS, frame
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime import SimulatedBus, frame_bits
+from utank_hil.runners import SimulatedBus, frame_bits
 
 SECOND_NS = 1000 * MS
 

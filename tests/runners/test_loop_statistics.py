@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.runtime import Histogram, LoopStatistics
+from utank_hil.runners import Histogram, LoopStatistics
 
 durations = st.lists(st.integers(0, 100) | st.integers(0, 2**36 - 1), min_size=1, max_size=200)
 

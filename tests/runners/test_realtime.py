@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from toy_nodes import MS, START_NS, FakeClock, SelectiveNode, ToyNode, ToyPort, frame
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime import (
+from utank_hil.runners import (
     LoopStatistics,
     MonotonicClock,
     NodeError,
@@ -306,7 +306,7 @@ def test_half_a_second_on_the_real_clock():
 
 LOOP_PROCESS = """
 import sys, threading
-from utank_hil.runtime import RealTimeLoop, real_time_scheduling
+from utank_hil.runners import RealTimeLoop, real_time_scheduling
 
 class Watcher:
     name, period_ns, threads = "watcher", 5_000_000, 0

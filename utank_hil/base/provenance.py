@@ -21,7 +21,7 @@ from pydantic import BaseModel
 
 PROGRAM: Final = "utank-hil"
 UNKNOWN: Final = "unknown"
-_ROOT: Final = Path(__file__).resolve().parents[1]
+_ROOT: Final = Path(__file__).resolve().parents[2]
 _GIT_S: Final = 5.0
 
 

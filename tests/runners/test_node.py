@@ -1,6 +1,6 @@
 from toy_nodes import SelectiveNode, ToyNode
 
-from utank_hil.runtime.node import heard_by
+from utank_hil.runners.node import heard_by
 
 SENSORS, DRIVE = SelectiveNode("sensors"), SelectiveNode("drive", hears=frozenset({1}))
 PANEL = SelectiveNode("panel", hears=frozenset({1, 2}))

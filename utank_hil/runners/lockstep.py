@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from utank_hil.canbus.frame import Frame
-from utank_hil.runtime.bus_model import BusStatistics, SimulatedBus
-from utank_hil.runtime.group import NodeGroup
-from utank_hil.runtime.node import Node
+from utank_hil.runners.bus_model import BusStatistics, SimulatedBus
+from utank_hil.runners.group import NodeGroup
+from utank_hil.runners.node import Node
 
 Trace = Callable[[int, str, Frame], None]
 """Called as (time in ns, sender's name, frame) at the end of every frame."""
