@@ -8,7 +8,3 @@ from utank_hil.pictures.bench_curves import BenchBar as BenchBar
 from utank_hil.pictures.bench_curves import BenchCurve as BenchCurve
 from utank_hil.pictures.bench_curves import draw_bench as draw_bench
 from utank_hil.pictures.capsize_maps import draw_capsize_maps as draw_capsize_maps
-from utank_hil.pictures.loops import draw_bode as draw_bode
-from utank_hil.pictures.loops import draw_nyquist as draw_nyquist
-from utank_hil.pictures.records import draw_phase as draw_phase
-from utank_hil.pictures.records import draw_time as draw_time

@@ -36,10 +36,6 @@ DASHES: Final[tuple[str | tuple[float, tuple[float, ...]], ...]] = (
     "-",
 )
 """Of the curves with these colours, so that they can be distinguished in print without them."""
-STROKES: Final[tuple[dict[str, Any], ...]] = tuple(
-    {"color": color, "linestyle": dashes} for color, dashes in zip(COLORS, DASHES, strict=True)
-)
-"""Both, as a plot takes them."""
 DPI: Final = 130
 TEXT_PT: Final = 10.0
 WIDEST_IN: Final = 10.0

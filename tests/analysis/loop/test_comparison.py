@@ -1,10 +1,8 @@
-"""Laws side by side, and the pictures of them."""
+"""Laws side by side."""
 
 import io
 import math
-from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
 from rich.console import Console
@@ -14,11 +12,7 @@ from shipped_designs import GPC_ROLL
 from utank_hil.analysis.loop.comparison import Loop, compare, comparison_table
 from utank_hil.analysis.loop.sea_response import CalmSeaError
 from utank_hil.analysis.loop.trade import trade
-from utank_hil.control import PD_MEASURED, DesignPlant, PredictiveLaw, design_pd
-from utank_hil.dynamics import Tank
-from utank_hil.pictures.loops import draw_bode, draw_nyquist
-from utank_hil.pictures.records import draw_phase, draw_time
-from utank_hil.pictures.style import COLORS
+from utank_hil.control import DesignPlant, PredictiveLaw
 from utank_hil.sea import Harmonics
 
 pytestmark = pytest.mark.slow
@@ -31,7 +25,6 @@ WRONG = Loop(
     PredictiveLaw(np.zeros((1, 1, 1)), np.full((1, 1, 1), 1e8), np.zeros((1, 1, 1)), 0.2),
     ("roll_rad",),
 )
-SIDES = ((0x00, 0x72, 0xB2), (0xD5, 0x5E, 0x00))
 
 
 def test_reductions_are_those_of_the_root_mean_squares():
@@ -61,59 +54,6 @@ def test_the_table_says_what_the_rows_hold():
     assert f"{math.degrees(rows[2].motion.roll_rms_rad):.2f}" in gpc
     assert f"{rows[2].roll_below_passive:.1%}" in gpc
     assert "unstable" in wrong
-
-
-def pixels(path: Path, rgb: tuple[int, int, int]) -> np.ndarray:
-    image = matplotlib.image.imread(path)[..., :3]
-    return np.argwhere(np.abs(image - np.array(rgb) / 255).max(axis=-1) < 0.02)
-
-
-def test_bode_and_nyquist_draw_a_curve_for_each_law(tmp_path: Path):
-    loops = [GPC, Loop("PD", design_pd(SHIP, TANK), PD_MEASURED)]
-    for draw in (draw_bode, draw_nyquist):
-        path = draw(loops, DesignPlant(SHIP, TANK), tmp_path / "two.png", "Two laws")
-        assert path == tmp_path / "two.png"
-        assert all(len(pixels(path, rgb)) > 1000 for rgb in SIDES)
-
-
-def test_bode_of_a_ship_with_hardly_any_water_peaks_at_her_roll_frequency(tmp_path: Path):
-    zero = PredictiveLaw(np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), 0.2)
-    tank = Tank(17.1, 4.88, 1e-3, 1e-3, damping_ratio=0.9)
-    path = draw_bode(
-        [Loop("none", zero, ("roll_rad",))], DesignPlant(SHIP, tank), tmp_path / "b.png", ""
-    )
-    rows, columns = pixels(path, SIDES[0]).T
-    curve = columns < 0.6 * columns.max()  # leaves the legend out
-    peak = columns[curve][rows[curve] == rows[curve].min()].mean()
-    # the axis goes from a fifth to five times the roll frequency, so the peak is in its middle
-    assert peak == pytest.approx((columns.min() + columns.max()) / 2, rel=0.01)
-
-
-def test_more_laws_than_colours_are_refused(tmp_path: Path):
-    for draw in (draw_bode, draw_nyquist):
-        with pytest.raises(ValueError, match=f"got {len(COLORS)}"):
-            draw([GPC] * len(COLORS), DesignPlant(SHIP, TANK), tmp_path / "many.png", "Many")
-
-
-def test_records_are_drawn_over_time_and_in_the_plane(tmp_path: Path):
-    time = np.linspace(0, 60, 600)
-    roll = {"passive": np.sin(time), "GPC": 0.5 * np.sin(time)}
-    path = draw_time(
-        time, {"Roll (°)": roll, "Level (m)": {"GPC": roll["GPC"]}}, tmp_path / "t.png", "T"
-    )
-    blue = pixels(path, SIDES[0])
-    assert len(blue) > 1000
-    plane = {name: (x, np.cos(time)) for name, x in roll.items()}
-    path = draw_phase(plane, ("Roll (°)", "Roll rate (°/s)"), tmp_path / "p.png", "P")
-    assert len(pixels(path, SIDES[0])) > 1000
-
-
-def test_no_record_and_too_many_are_refused(tmp_path: Path):
-    time = np.zeros(2)
-    for number in (0, len(COLORS) + 1):
-        records = {str(n): time for n in range(number)}
-        with pytest.raises(ValueError, match=f"got {number}"):
-            draw_time(time, {"x": records}, tmp_path / "t.png", "None")
 
 
 @pytest.mark.parametrize("amplitude_nm", [0.0, 1.0])
