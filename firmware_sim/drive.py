@@ -22,7 +22,7 @@ from utank_hil.canbus import (
     Frame,
     PumpCommand,
 )
-from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.nodes.housekeeping import Housekeeping
 
 if TYPE_CHECKING:
     from firmware_sim.plant import Plant  # compiled: a scenario is read without it

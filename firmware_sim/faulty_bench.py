@@ -15,11 +15,11 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.control.interface import Controller
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import TimedAction
 from utank_hil.retuning import Retuner
 from utank_hil.runners import Lockstep, Node
 from utank_hil.runners.lockstep import Trace
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import TimedAction
 
 Tap = Callable[[ControllerNode], Node]
 """What is put on the bus for a controller."""

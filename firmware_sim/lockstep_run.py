@@ -20,10 +20,10 @@ from firmware_sim.ship_side import ShipSide
 from firmware_sim.truth import TRUTH, TruthRecorder
 from utank_hil.assembly import works_of
 from utank_hil.base.tick import TICK_NS
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, SimulatedBus
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 

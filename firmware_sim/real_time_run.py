@@ -29,6 +29,8 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.provenance import describe
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import SocketCanPort
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runners import (
     LoopStatistics,
@@ -38,8 +40,6 @@ from utank_hil.runners import (
     heard_by,
     real_time_scheduling,
 )
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
 from utank_hil.telemetry.ring import RingWriter

@@ -22,11 +22,11 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import TimedAction
+from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.retuning import RetuningEvent
 from utank_hil.runners import LoopStatistics, SchedulingReport
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import TimedAction
-from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped

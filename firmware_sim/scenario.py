@@ -27,7 +27,7 @@ from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.steady_heel import steady_heel
-from utank_hil.runtime.panel import TimedAction
+from utank_hil.nodes.panel import TimedAction
 from utank_hil.sea import Harmonics
 from utank_hil.sea.encounter import wavenumber_rad_m
 

@@ -14,8 +14,8 @@ from firmware_sim.valve import ValveNode
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import Vessel
 from utank_hil.dynamics.tank import negligible
+from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Node
-from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
 NODE_NAMES: Final = ("sensors", "sensors_2", "hardwired", "drive", "valve", "panel")
 """The emulated nodes, in the order in which they tick; hardware may take the place of each.

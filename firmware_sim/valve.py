@@ -24,7 +24,7 @@ from utank_hil.canbus import (
 )
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
-from utank_hil.runtime.housekeeping import Housekeeping
+from utank_hil.nodes.housekeeping import Housekeeping
 
 NANOSECONDS: Final = 1e-9
 LONGEST_TIMEOUT_S: Final = 0.1

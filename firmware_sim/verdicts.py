@@ -11,8 +11,8 @@ from firmware_sim.run import Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.ship_side import PASSIVE_SCRIPT
 from utank_hil.canbus import Fault, Mode
-from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.panel import Action
+from utank_hil.nodes.panel import Action
+from utank_hil.safety.faults import fault_text
 
 LEAST_IN_CHARGE: Final = 0.9
 """Least share of the time ordered by the operator in which the controller must be in charge."""

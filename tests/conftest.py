@@ -36,7 +36,7 @@ LONGEST = (
     *("faults/test_fault_campaign.py", "telemetry/test_recorder.py", "tools/test_week.py"),
     *("retuning/test_retuner_process.py", "test_cli.py", "test_imports.py"),
     *("firmware_sim/test_bench.py", "faults/test_lockstep_faults.py", "commands/test_check.py"),
-    *("runtime/test_supervisor.py", "commands/test_report.py", "tools/test_vcan.py"),
+    *("safety/test_supervisor.py", "commands/test_report.py", "tools/test_vcan.py"),
     *("firmware_sim/test_design_command.py", "retuning/test_redesign.py"),
 )
 """Files of 15 s of CPU and more: a worker that begins one at the end is waited for."""

@@ -35,7 +35,7 @@ from utank_hil.commands.run import run
 from utank_hil.configuration import ControllerConfig
 from utank_hil.runners import RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.assembly import build_controller_node
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.ring import RingWriter
 
 assert SocketCanPort

@@ -19,6 +19,17 @@ from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
+from utank_hil.nodes.commissioning.node import CommissioningNode
+from utank_hil.nodes.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
+from utank_hil.nodes.controller import (
+    ControllerNode,
+    ControllerSettings,
+    EventSink,
+    Measure,
+)
+from utank_hil.nodes.inbox import MEASURED, Inbox
+from utank_hil.nodes.monitoring import Monitors
+from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import (
     AdaptiveController,
     Desk,
@@ -34,19 +45,8 @@ from utank_hil.retuning import (
 from utank_hil.retuning.estimate import MOST_NUMBERS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runners.statistics import LoopStatistics
-from utank_hil.runtime.commissioning.node import CommissioningNode
-from utank_hil.runtime.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
-from utank_hil.runtime.controller_node import (
-    ControllerNode,
-    ControllerSettings,
-    EventSink,
-    Measure,
-)
-from utank_hil.runtime.inbox import MEASURED, Inbox
-from utank_hil.runtime.monitoring import Monitors
-from utank_hil.runtime.monitors.thresholds import thresholds_of
-from utank_hil.runtime.supervisor import Supervisor
-from utank_hil.runtime.valve_command import ValveCommander
+from utank_hil.safety.monitors.thresholds import thresholds_of
+from utank_hil.safety.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from utank_hil.retuning.redesign import RetuningTask

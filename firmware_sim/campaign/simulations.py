@@ -30,7 +30,7 @@ from utank_hil.control import BuiltLaw, DesignPlant
 from utank_hil.control.interface import PRESSURE
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES
-from utank_hil.runtime.signals import ROW_TICKS
+from utank_hil.nodes.signals import ROW_TICKS
 
 Row = dict[str, str | float]
 Laws = Mapping[str, BuiltLaw]

@@ -13,9 +13,9 @@ from utank_hil.base.parameters import Finite, Positive, refuse
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Fault
 from utank_hil.configuration import ControllerConfig, Section
+from utank_hil.nodes.panel import TimedAction
+from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
-from utank_hil.runtime.panel import TimedAction
-from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
 
 _PHASES: Final = 100
 _PHASE_STRIDE: Final = 37
@@ -23,7 +23,7 @@ _PHASE_STRIDE: Final = 37
 
 def _fault_name(name: str) -> str:
     if name not in Fault.__members__:
-        raise ValueError("is no fault of utank_hil/runtime/faults.py")
+        raise ValueError("is no fault of utank_hil/safety/faults.py")
     return name
 
 

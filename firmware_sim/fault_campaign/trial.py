@@ -28,9 +28,9 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Mode
 from utank_hil.control import BuiltLaw
+from utank_hil.nodes.panel import Action, TimedAction
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import SimulatedRetuner
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.signals import SIGNALS
 
 T = TypeVar("T")
 

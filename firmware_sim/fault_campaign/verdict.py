@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from firmware_sim.fault_campaign.campaign import Row, Setup
 from firmware_sim.fault_campaign.trial import Outcome
-from utank_hil.runtime.faults import FAULTS, Reaction
+from utank_hil.safety.faults import FAULTS, Reaction
 
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""

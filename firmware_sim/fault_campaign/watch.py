@@ -17,9 +17,9 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.codec import FRAME_BYTES
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import TimedAction
-from utank_hil.runtime.supervisor import Demand
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import TimedAction
+from utank_hil.safety.supervisor import Demand
 
 Heard = tuple[int, int, bytes]
 """Time, identifier and data of a frame on the bus."""

@@ -21,7 +21,7 @@ from firmware_sim.fault_injection.signals import value_of, value_problems
 from utank_hil.base.parameters import refuse
 from utank_hil.canbus import Frame, Station, load_catalogue
 from utank_hil.canbus.codec import FRAME_BYTES
-from utank_hil.runtime.panel import OperatorPanel, TimedAction
+from utank_hil.nodes.panel import OperatorPanel, TimedAction
 
 BIT_RATE: Final = 250_000
 _SHARE = Annotated[float, Field(gt=0, le=1)]

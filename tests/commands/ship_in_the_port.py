@@ -8,8 +8,8 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.canbus import Frame
 from utank_hil.configuration import load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners.group import OUTSIDE, NodeGroup
-from utank_hil.runtime.panel import Action, TimedAction
 
 STORM = Path("configs/scenarios/storm.yaml")
 

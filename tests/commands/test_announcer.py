@@ -18,7 +18,7 @@ from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.lines import Lines
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.retuning import ModelSummary, RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.telemetry.event_ring import EventReader
 from utank_hil.telemetry.ring import RingError
 

@@ -26,9 +26,9 @@ from utank_hil.commands.commissioning_record import (
 from utank_hil.commands.common import new_app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.commissioning.checks import Check
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.commissioning.checks import Check
-from utank_hil.runtime.panel import Action, TimedAction
 
 SHIPS = Path("configs/ships").resolve()
 GOOD = Check("roll", "roll, by what it does to the water", 1.01, 1.0, 0.3, "1", "Turn it round.")

@@ -12,8 +12,8 @@ import pytest
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.commands.event_log import EventLog
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.faults import FAULTS
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import FAULTS
 
 
 def test_events_are_lines_with_both_clocks_and_words(tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.commands.keyboard import LEAVE_NS, Keyboard
-from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.panel import SILENT_NS, Action, OperatorPanel
+from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
+from utank_hil.safety.faults import fault_text
 
 CATALOGUE = load_catalogue()
 STEP_NS = 100_000_000

@@ -8,8 +8,8 @@ import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode
 from utank_hil.commands.lines import Lines
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.faults import FAULTS
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import FAULTS
 
 START_NS = 7_000_000_000
 

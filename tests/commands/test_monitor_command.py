@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from utank_hil.cli import app
 from utank_hil.commands import run
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.ring import RingWriter

@@ -21,7 +21,7 @@ from utank_hil.cli import app
 from utank_hil.commands import recording as module
 from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.recorder import RecorderError, RecorderReport
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.ring import RingReader

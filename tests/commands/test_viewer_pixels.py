@@ -16,8 +16,8 @@ from playwright.sync_api import Browser
 from tools.documents import screenshot
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.commands.monitor import LOOKS
-from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
+from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.blueprint import _PALETTE, MOST_SHADES, WATCH_SHARES
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.scene import HULL, LIMIT, SEA, WATER

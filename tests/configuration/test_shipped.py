@@ -16,9 +16,9 @@ from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
 from utank_hil.control import RobustFuzzy
 from utank_hil.dynamics.linear import STATES
+from utank_hil.nodes.panel import Action, TimedAction
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.signals import SIGNALS
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 CONTROLLERS = sorted((CONFIGS / "controllers").glob("*.yaml"))

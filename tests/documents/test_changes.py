@@ -98,5 +98,5 @@ def test_the_files_of_the_page_are_those_that_change(walked: Path) -> None:
 def test_the_change_passes_its_tests_and_those_of_the_bus(walked: Path) -> None:
     run(walked, "tools.documents.write", "--check")
     tests = {name for name in rows(walked) if name.startswith("tests/")}
-    tests |= {"tests/runtime/test_faults.py"} | {f"tests/canbus/test_{name}.py" for name in ALSO}
+    tests |= {"tests/safety/test_faults.py"} | {f"tests/canbus/test_{name}.py" for name in ALSO}
     run(walked, "pytest", "-p", "no:cacheprovider", "-m", "not slow", *sorted(tests))

@@ -24,9 +24,9 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.enumerations import Address
 from utank_hil.commands.panel import LOOK_NS
-from utank_hil.runtime.faults import FAULTS
-from utank_hil.runtime.panel import EDGE_NS, SILENT_NS
-from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.nodes.panel import EDGE_NS, SILENT_NS
+from utank_hil.safety.faults import FAULTS
+from utank_hil.safety.safety_limits import SafetyLimits
 
 PAGES = Path("docs/how-to")
 DATABASE = cantools.database.load_file("utank_hil/canbus/utank.dbc")

@@ -20,9 +20,9 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep, Node
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import Action, TimedAction
 
 CATALOGUE = load_catalogue()
 SECOND = 1_000_000_000

@@ -15,9 +15,9 @@ from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.nodes.commissioning.node import REST_S, CommissioningNode, Stage
+from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
 from utank_hil.runners import Lockstep, Node
-from utank_hil.runtime.commissioning.node import REST_S, CommissioningNode, Stage
-from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
 
 ARM_S = REST_S + 2.0
 

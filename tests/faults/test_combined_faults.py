@@ -18,8 +18,8 @@ from utank_hil.canbus import DriveFault, load_catalogue
 from utank_hil.canbus.codec import field_kind
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import BuiltLaw
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.redundancy import Redundancy
+from utank_hil.nodes.panel import Action, TimedAction
+from utank_hil.nodes.redundancy import Redundancy
 
 pytestmark = pytest.mark.slow
 

@@ -32,11 +32,11 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.failures import KILLED
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.control.limiter import CommandLimiter
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.faults import FAULTS
-from utank_hil.runtime.monitors.drive import DriveFollowing
-from utank_hil.runtime.observations import Observations
-from utank_hil.runtime.supervisor import Supervisor
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.safety.faults import FAULTS
+from utank_hil.safety.monitors.drive import DriveFollowing
+from utank_hil.safety.observations import Observations
+from utank_hil.safety.supervisor import Supervisor
 
 
 def test_every_requirement_has_rows_or_says_what_shows_it_and_stands_in_the_document() -> None:

@@ -27,8 +27,8 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.codec import Codec
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.panel import Action, TimedAction
 
 pytestmark = pytest.mark.slow
 

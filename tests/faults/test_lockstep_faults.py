@@ -33,7 +33,7 @@ from utank_hil.canbus import (
     SensorPump,
     SensorTank,
 )
-from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.nodes.panel import Action, TimedAction
 
 T0 = 6 * SECOND
 TICK = 10 * MS

@@ -25,8 +25,8 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import ControllerConfig
+from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.redundancy import Redundancy
 
 CATALOGUE = load_catalogue()
 T0_S = 12.0

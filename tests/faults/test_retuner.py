@@ -12,6 +12,8 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import ControllerStatus, Fault, Mode, PumpCommand, RetuningState
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import PredictiveLaw
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.retuning import (
     Answer,
     Candidate,
@@ -21,8 +23,6 @@ from utank_hil.retuning import (
     RetuningSettings,
 )
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import Action, TimedAction
 
 pytestmark = pytest.mark.slow
 

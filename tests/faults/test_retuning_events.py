@@ -6,6 +6,7 @@ from fault_bench import storm
 from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import RetuningState
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.retuning import (
     Refusal,
     RetuningEvent,
@@ -13,7 +14,6 @@ from utank_hil.retuning import (
     SimulatedRetuner,
 )
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.event_ring import EventReader, EventWriter
 
 SECOND = 1_000_000_000

@@ -16,7 +16,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import load_config
 from utank_hil.control import BuiltLaw
-from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.nodes.panel import Action, TimedAction
 
 SECOND = 1_000_000_000
 FLIPPED = {"kind": "sign", "message": "SENSOR_MOTION", "signals": ["roll_rad", "roll_rate_rad_s"]}

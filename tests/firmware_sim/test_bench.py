@@ -31,8 +31,8 @@ from utank_hil.canbus import Mode
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.control import PassiveDesign
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures import BenchCurve
-from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.recording import read_recording
 
 pytestmark = pytest.mark.slow

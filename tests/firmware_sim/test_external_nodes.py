@@ -23,8 +23,8 @@ from utank_hil.assembly import build_controller_node
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Fault, Frame, Mode, load_catalogue
 from utank_hil.configuration import load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.memory_log import MemoryLog
 
 STORM = load_config(Path("configs/scenarios/storm.yaml"), Scenario)

@@ -8,9 +8,9 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node
 from utank_hil.canbus import Frame
 from utank_hil.configuration import load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep, Node
 from utank_hil.runners.node import Selective
-from utank_hil.runtime.panel import Action, TimedAction
 
 SECOND_NS = 1_000_000_000
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from firmware_sim.real_time_run import ControllerRun, ShipRun, join
 from firmware_sim.run import COLUMNS, RECORD_S, Run, ShipFigures
 from firmware_sim.truth import TRUTH
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 
 START_NS = 5_000_000_000
 

@@ -13,10 +13,10 @@ from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Address, Fault, Mode, PumpCommand, ValveCommand, load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.panel import Action, OperatorPanel, TimedAction
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.panel import Action, OperatorPanel, TimedAction
-from utank_hil.runtime.signals import SIGNALS
 
 SCENARIO = load_config(Path("configs/scenarios/semi_active.yaml"), Scenario)
 SECOND_NS = 1_000_000_000

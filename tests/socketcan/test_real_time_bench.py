@@ -18,7 +18,7 @@ from utank_hil.assembly import build_law
 from utank_hil.canbus import Mode
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
-from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recording import read_recording
 from utank_hil.telemetry.replay import entries_of, replay

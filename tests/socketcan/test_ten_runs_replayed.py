@@ -24,8 +24,8 @@ from utank_hil.assembly import build_law
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import ControllerStatus, Fault, Mode, SocketCanPort, load_catalogue
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.panel import Action
 from utank_hil.runners import RealTimeLoop, heard_by
-from utank_hil.runtime.panel import Action
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of, replay

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import rerun.blueprint as rrb
 
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.blueprint import (
     _COLOR_NAMES,
     ESTIMATES,

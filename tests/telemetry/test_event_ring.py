@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
 from utank_hil.retuning import ModelSummary, RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text, warns
 from utank_hil.telemetry.ring import RingError
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recorder import FrameRecording, RecorderProcess

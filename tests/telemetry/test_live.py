@@ -17,8 +17,8 @@ from rerun.error_utils import RerunWarning
 
 from utank_hil.canbus import RetuningState
 from utank_hil.commands.monitor import _chosen
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.event_ring import EventWriter
 from utank_hil.telemetry.live import LiveRun, LiveStream, live_runs
 from utank_hil.telemetry.recording import _read_chunks, read_about, read_recording
@@ -85,7 +85,7 @@ def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
 def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = (
         "import time; from utank_hil.telemetry.ring import RingWriter;"
-        "from utank_hil.runtime.signals import SIGNALS;"
+        "from utank_hil.nodes.signals import SIGNALS;"
         "ring = RingWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)

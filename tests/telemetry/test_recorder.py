@@ -19,8 +19,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus import Mode, RetuningState
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runtime.signals import SIGNALS
 from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind
 from utank_hil.telemetry.event_ring import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog

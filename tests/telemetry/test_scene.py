@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.highlight import highlight_s
 from utank_hil.telemetry.recording import _read_chunks, write_recording
 from utank_hil.telemetry.scene import PERIOD_S, SceneSize, scene_size

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.units import UNITS, column_of, field_of
 
 STEMS = st.from_regex(r"[a-z]{1,8}(_[a-z]{3,8}){0,2}", fullmatch=True)

@@ -8,7 +8,7 @@ from PIL import Image
 
 from tools.documents import animation
 from tools.documents.animation import animate
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.recording import write_recording
 from utank_hil.telemetry.scene import HULL, PUMP, WATER
 

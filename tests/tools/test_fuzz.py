@@ -5,7 +5,7 @@ from tools.fuzz.frames import FuzzError
 from utank_hil.canbus import Frame, Mode
 from utank_hil.canbus.endpoints import Receiver
 from utank_hil.configuration import files
-from utank_hil.runtime.inbox import Inbox
+from utank_hil.nodes.inbox import Inbox
 
 
 @pytest.mark.slow

@@ -30,15 +30,15 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import load_config
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.process_priority import real_time_scheduling
-from utank_hil.runtime.monitors.drive import DriveFollowing, Saturation
-from utank_hil.runtime.monitors.level_stuck import GaugeStuck, LevelStuck
-from utank_hil.runtime.monitors.motion import RollAgainstRate
-from utank_hil.runtime.monitors.motion_watch import MotionWatch
-from utank_hil.runtime.monitors.senders import Senders
-from utank_hil.runtime.monitors.spikes import MotionGate, SpikeGates
-from utank_hil.runtime.monitors.tank_equation import TankEquation
-from utank_hil.runtime.monitors.volume import Volume
-from utank_hil.runtime.passive_twin import PassiveTwin
+from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
+from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
+from utank_hil.safety.monitors.motion import RollAgainstRate
+from utank_hil.safety.monitors.motion_watch import MotionWatch
+from utank_hil.safety.monitors.senders import Senders
+from utank_hil.safety.monitors.spikes import MotionGate, SpikeGates
+from utank_hil.safety.monitors.tank_equation import TankEquation
+from utank_hil.safety.monitors.volume import Volume
+from utank_hil.safety.passive_twin import PassiveTwin
 
 LAW: Final = "gpc"
 AGAIN: Final = 1000

@@ -31,6 +31,8 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import PredictiveDesign
 from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import sample
+from utank_hil.nodes.panel import Action, TimedAction
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import (
     AdaptiveController,
     RetunerProcess,
@@ -46,8 +48,6 @@ from utank_hil.runners import (
     RealTimeLoop,
     real_time_scheduling,
 )
-from utank_hil.runtime.panel import Action, TimedAction
-from utank_hil.runtime.signals import SIGNALS
 
 SCENARIO = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "adaptive.yaml"
 CONTROLLER = "gpc-roll"

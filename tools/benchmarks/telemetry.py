@@ -28,8 +28,8 @@ from utank_hil.assembly import build_controller_node
 from utank_hil.base.provenance import describe
 from utank_hil.commands.recording import RunRecording
 from utank_hil.configuration import load_config
+from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.signals import ROW_TICKS, SIGNALS
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.recording import read_recording, write_recording
 from utank_hil.telemetry.ring import RingReader, RingWriter

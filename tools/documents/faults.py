@@ -1,11 +1,11 @@
-"""The fault tables of docs/safety.md, made from the rows of utank_hil/runtime/faults.py."""
+"""The fault tables of docs/safety.md, made from the rows of utank_hil/safety/faults.py."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
 
 from tools.documents.marked import DOCS, written_anew
-from utank_hil.runtime.faults import FAULTS, FaultRow
-from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.safety.faults import FAULTS, FaultRow
+from utank_hil.safety.safety_limits import SafetyLimits
 
 PAGE = DOCS / "safety.md"
 

@@ -5,7 +5,7 @@ from typing import Final
 
 from tools.documents.marked import DOCS, written_anew
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.runtime.monitors.thresholds import MonitorThresholds, thresholds_of
+from utank_hil.safety.monitors.thresholds import MonitorThresholds, thresholds_of
 
 PAGE = DOCS / "monitors.md"
 CONTROLLERS: Final = ("gpc", "naval_constrained_gpc", "patti_b_constrained_gpc")

@@ -37,9 +37,9 @@ from utank_hil.canbus.catalogue import DBC_PATH, read_data_ids
 from utank_hil.canbus.e2e import profile2_crc
 from utank_hil.configuration import load_config
 from utank_hil.control import BuiltLaw
+from utank_hil.nodes.inbox import SOURCE_ADDRESS
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
-from utank_hil.runtime.inbox import SOURCE_ADDRESS
-from utank_hil.runtime.panel import Action, TimedAction
 
 SESSION_TICKS = 1500
 CYCLE_S = 4.0

@@ -1,7 +1,7 @@
 """Change the safety code in every small way and see whether a test fails.
 
     python -m tools.mutation.run                          # all files; hours
-    python -m tools.mutation.run --file utank_hil/runtime/supervisor.py
+    python -m tools.mutation.run --file utank_hil/safety/supervisor.py
     python -m tools.mutation.run --changed main               # only lines that differ from it
     python -m tools.mutation.run --not-judged --within 60     # only what no evidence has judged
     python -m tools.mutation.run --json                       # as evidence

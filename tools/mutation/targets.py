@@ -29,7 +29,7 @@ _AT_THE_BOUND = "a value at the bound is the bound"
 _SHORTCUT = "all conditions are looked at, in the same order, where some would do"
 _TEN_OR_MORE = "it is zero, or ten or more"
 NO_DIFFERENCE: dict[str, dict[str, str]] = {
-    "utank_hil/runtime/monitors/standstill.py": {
+    "utank_hil/safety/monitors/standstill.py": {
         "Standstill.__init__: self._same = self.still = 0 -> ": _SET_FIRST,
         "Standstill.__init__: self._same = self.still = 0 -> self._same = self.still = 1": (
             _SET_FIRST
@@ -46,7 +46,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "STILL_ALONE -> return one > 0 and other > 1 or one >= STILL_ALONE or other >= "
         "STILL_ALONE": _TEN_OR_MORE,
     },
-    "utank_hil/runtime/supervisor.py": {
+    "utank_hil/safety/supervisor.py": {
         "Supervisor.__init__: self._enabling_until_ns = 0 -> self._enabling_until_ns = 1": (
             "PASSIVE is never at the beginning of the clock"
         ),
@@ -62,7 +62,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Supervisor._continue_reset: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
         "Supervisor._begin_arming: seen.drive_out_ms = 0.0 -> seen.drive_out_ms = 1.0": _OF_40_MS,
     },
-    "utank_hil/runtime/judging.py": {
+    "utank_hil/safety/judging.py": {
         "_to_look_at: states = tuple((coded for coded in conditions if not coded[1].findings)) -> "
         "states = tuple((coded for coded in conditions if True))": _SHORTCUT,
         "_to_look_at: return lambda seen: conditions if seen.found & mask else states -> "
@@ -82,7 +82,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "_ENDING))) -> first_lasting: Final = _first_of(_ENDING + tuple((c for c in _AWAITED if "
         "True)))": _SHORTCUT,
     },
-    "utank_hil/runtime/safety_limits.py": {
+    "utank_hil/safety/safety_limits.py": {
         "SafetyLimits: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
     },
@@ -101,7 +101,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Receiver.accept: if counter == self._expected: -> if False:": "the short way for most",
         "Receiver.accept: if self._bucket: -> if True:": "draining an empty bucket does nothing",
     },
-    "utank_hil/runtime/orders.py": {
+    "utank_hil/nodes/orders.py": {
         ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(2 << 62)": _LONG_AGO,
         ": NEVER_HEARD_NS: Final = -(1 << 62) -> NEVER_HEARD_NS: Final = -(1 << 63)": _LONG_AGO,
         "Orders.accept: heard = order or self.receiver.intact(frame) -> "
@@ -111,11 +111,11 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "now_ns - self.heard_ns > self._gap_ns: -> "
         "if self._anew or now_ns - self.heard_ns > self._gap_ns:": _ANEW,
     },
-    "utank_hil/runtime/hardwired.py": {
+    "utank_hil/nodes/hardwired.py": {
         "HardwiredHeard.accept: heard = inputs or self.receiver.intact(frame) -> "
         "heard = self.receiver.intact(frame)": _LONGER_WAY,
     },
-    "utank_hil/runtime/inbox.py": {
+    "utank_hil/nodes/inbox.py": {
         "Inbox.__init__: self._second_beat = 0 -> self._second_beat = 1": (
             "no heartbeat has either identifier"
         ),
@@ -148,7 +148,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Inbox._count_cycles: if behind_ns > self._tank_patience_ns: -> "
         "if behind_ns >= self._tank_patience_ns:": _A_NANOSECOND,
     },
-    "utank_hil/runtime/controller_node.py": {
+    "utank_hil/nodes/controller.py": {
         "ControllerNode.__init__: self._engaged = self._interrupted = False -> "
         "self._engaged = self._interrupted = True": "nobody is in charge at the first answer",
         "ControllerNode._note_causes: if first_stopping(seen, supervisor.limits): -> if True:": (
@@ -256,7 +256,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
     "firmware_sim/drive_states.py": {
         "DriveStates.command: return -> ": "in FAULT no other word has a transition",
     },
-    "utank_hil/runtime/monitors/level_stuck.py": {
+    "utank_hil/safety/monitors/level_stuck.py": {
         "LevelStuck.restart: self._moved_m = self._rate_m_s = 0.0 -> ": _SET_FIRST,
         "LevelStuck.restart: self._moved_m = self._rate_m_s = 0.0 -> "
         "self._moved_m = self._rate_m_s = 1.0": _SET_FIRST,
@@ -265,19 +265,19 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
             _NEVER_THERE
         ),
     },
-    "utank_hil/runtime/monitors/noise.py": {
+    "utank_hil/safety/monitors/noise.py": {
         "within: return -most if value < -most else most if value > most else value -> "
         "return -most if value <= -most else most if value > most else value": _AT_THE_BOUND,
         "within: return -most if value < -most else most if value > most else value -> "
         "return -most if value < -most else most if value >= most else value": _AT_THE_BOUND,
     },
-    "utank_hil/runtime/monitors/spikes.py": {
+    "utank_hil/safety/monitors/spikes.py": {
         "SpikeGate.__init__: self._value_ns = -(1 << 62) -> self._value_ns = -(2 << 62)": _LONG_AGO,
         "SpikeGate.__init__: self._value_ns = -(1 << 62) -> self._value_ns = -(1 << 63)": _LONG_AGO,
         "SpikeGate.__init__: self._in_a_row = 0 -> ": _SET_FIRST,
         "SpikeGate.__init__: self._in_a_row = 0 -> self._in_a_row = 1": _SET_FIRST,
     },
-    "utank_hil/runtime/monitors/senders.py": {
+    "utank_hil/safety/monitors/senders.py": {
         "Stream.update: if receiver.changes: -> if True:": (
             "a shortcut: without changes nothing is taken off"
         ),
@@ -286,7 +286,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "self._damaged_s = [-3.141592653589793] * DAMAGED_FRAMES": _LONG_AGO,
         "Senders.update: if stream.damaged: -> if True:": "no frames more are no change",
     },
-    "utank_hil/runtime/monitors/drive.py": {
+    "utank_hil/safety/monitors/drive.py": {
         "DriveFollowing.__init__: self._enabled = False -> self._enabled = True": (
             "what has just begun may begin again"
         ),
@@ -300,19 +300,19 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "Saturation.update: side = math.copysign(1.0, command_pa) -> "
         "side = math.copysign(1.25, command_pa)": "only its sign is used",
     },
-    "utank_hil/runtime/monitors/motion.py": {
+    "utank_hil/safety/monitors/motion.py": {
         "Stuck.update: self._sum_rad = keep * (self._sum_rad + left_rad) -> "
         "self._sum_rad = keep * (self._sum_rad - left_rad)": "the same sum with the other sign",
         "RollAgainstRate.update: if abs(summed_rad) < 0.5 * limit_rad: -> "
         "if abs(summed_rad) <= 0.5 * limit_rad:": _NEVER_THERE,
     },
-    "utank_hil/runtime/monitors/motion_sign.py": {
+    "utank_hil/safety/monitors/motion_sign.py": {
         "SignTest._judge: if evidence < STEP and self._elapsed_s < LONGEST_S: -> "
         "if evidence <= STEP and self._elapsed_s < LONGEST_S:": _NEVER_THERE,
         "SignTest._judge: if judged and evidence >= LEAST: -> "
         "if judged and evidence > LEAST:": _NEVER_THERE,
     },
-    "utank_hil/runtime/monitors/repetition.py": {
+    "utank_hil/safety/monitors/repetition.py": {
         ": MIXED: Final = 7.0 -> MIXED: Final = 8.75": "any mixture is as good",
         "Repetition.take: sample = roll_rad + MIXED * rate_rad_s -> "
         "sample = roll_rad - MIXED * rate_rad_s": "any mixture is as good",
@@ -323,7 +323,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "len(kept) -> self._lag = 1 if before is None else (place - before) % len(kept) or "
         "len(kept)": "no sample counts that is the last",
     },
-    "utank_hil/runtime/monitors/motion_watch.py": {
+    "utank_hil/safety/monitors/motion_watch.py": {
         "MotionWatch.__init__: self._last_rate_rad_s = 0.0 -> self._last_rate_rad_s = 1.0": (
             "the first sample has none before it to be compared with"
         ),
@@ -331,7 +331,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
             "how far she turned before the first sample is not used"
         ),
     },
-    "utank_hil/runtime/monitors/motion_pair.py": {
+    "utank_hil/safety/monitors/motion_pair.py": {
         "MotionPair._compare: over = abs(self._roll_rad) > self._roll_limit_rad or "
         "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) >= "
         "self._roll_limit_rad or abs(self._rate_rad_s) > self._rate_limit_rad_s": _NEVER_THERE,
@@ -339,7 +339,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "abs(self._rate_rad_s) > self._rate_limit_rad_s -> over = abs(self._roll_rad) > "
         "self._roll_limit_rad or abs(self._rate_rad_s) >= self._rate_limit_rad_s": _NEVER_THERE,
     },
-    "utank_hil/runtime/monitors/thresholds.py": {
+    "utank_hil/safety/monitors/thresholds.py": {
         "SensorFigures: @dataclass(frozen=True, slots=True) -> "
         "@dataclass(frozen=False, slots=True)": _NOBODY_SETS,
         "MonitorThresholds: @dataclass(frozen=True, slots=True) -> "
@@ -352,7 +352,7 @@ NO_DIFFERENCE: dict[str, dict[str, str]] = {
         "math.radians(UNCONFIRMED_HEEL_DEG) -> least = UNCONFIRMED_SHARE * heel_rad < "
         "math.radians(UNCONFIRMED_HEEL_DEG)": _AT_THE_BOUND,
     },
-    "utank_hil/runtime/passive_twin.py": {
+    "utank_hil/safety/passive_twin.py": {
         "PassiveTwin.__init__: def __init__(self, ship: RollShip, tank: Tank, period_s: float, "
         "least_roll_rad: float, open_loss: float=0.0, *, room: float=1.0) -> None: -> def "
         "__init__(self, ship: RollShip, tank: Tank, period_s: float, least_roll_rad: float, "
@@ -423,19 +423,19 @@ class Target:
 
 
 _NODE = (
-    "tests/runtime/test_controller_node.py",
-    "tests/runtime/test_controller_faults.py",
-    "tests/runtime/test_law_that_plans.py",
+    "tests/nodes/test_controller.py",
+    "tests/nodes/test_controller_faults.py",
+    "tests/nodes/test_law_that_plans.py",
 )
-_SUPERVISOR = "tests/runtime/test_supervisor.py"
-_MONITORS = "utank_hil/runtime/monitors"
+_SUPERVISOR = "tests/safety/test_supervisor.py"
+_MONITORS = "utank_hil/safety/monitors"
 
 TARGETS = (
-    Target("utank_hil/runtime/supervisor.py", (_SUPERVISOR,), _NODE),
-    Target("utank_hil/runtime/judging.py", (_SUPERVISOR,), ("tests/runtime/test_alarms.py",)),
+    Target("utank_hil/safety/supervisor.py", (_SUPERVISOR,), _NODE),
+    Target("utank_hil/safety/judging.py", (_SUPERVISOR,), ("tests/safety/test_alarms.py",)),
     Target(
-        "utank_hil/runtime/safety_limits.py",
-        (_SUPERVISOR, "tests/runtime/test_safety_limits.py"),
+        "utank_hil/safety/safety_limits.py",
+        (_SUPERVISOR, "tests/safety/test_safety_limits.py"),
         _NODE,
     ),
     Target("utank_hil/control/limits.py", ("tests/control/test_limiter.py",)),
@@ -443,93 +443,93 @@ TARGETS = (
     Target(
         "utank_hil/canbus/endpoints.py",
         ("tests/canbus/test_endpoints.py",),
-        ("tests/canbus/test_codec.py", "tests/runtime/test_orders.py"),
+        ("tests/canbus/test_codec.py", "tests/nodes/test_orders.py"),
     ),
     Target("utank_hil/canbus/e2e.py", ("tests/canbus/test_e2e.py",)),
     Target(
-        "utank_hil/runtime/inbox.py",
-        ("tests/runtime/test_inbox.py",),
+        "utank_hil/nodes/inbox.py",
+        ("tests/nodes/test_inbox.py",),
         (
-            "tests/runtime/test_lost_levels.py",
-            "tests/runtime/test_valve_command.py",
-            "tests/runtime/test_stations.py",
-            "tests/runtime/test_monitoring.py",
+            "tests/nodes/test_lost_levels.py",
+            "tests/nodes/test_valve_command.py",
+            "tests/nodes/test_stations.py",
+            "tests/safety/test_monitoring.py",
             *_NODE,
         ),
     ),
-    Target("utank_hil/runtime/command_echo.py", ("tests/runtime/test_command_echo.py",)),
+    Target("utank_hil/nodes/command_echo.py", ("tests/nodes/test_command_echo.py",)),
     Target(
-        "utank_hil/runtime/orders.py",
-        ("tests/runtime/test_orders.py",),
-        ("tests/runtime/test_stations.py", "tests/runtime/test_inbox.py", *_NODE),
+        "utank_hil/nodes/orders.py",
+        ("tests/nodes/test_orders.py",),
+        ("tests/nodes/test_stations.py", "tests/nodes/test_inbox.py", *_NODE),
     ),
     Target(
-        "utank_hil/runtime/stations.py",
-        ("tests/runtime/test_stations.py",),
-        ("tests/runtime/test_inbox.py", *_NODE),
+        "utank_hil/nodes/stations.py",
+        ("tests/nodes/test_stations.py",),
+        ("tests/nodes/test_inbox.py", *_NODE),
     ),
-    Target("utank_hil/runtime/hardwired.py", ("tests/runtime/test_hardwired.py",), _NODE),
+    Target("utank_hil/nodes/hardwired.py", ("tests/nodes/test_hardwired.py",), _NODE),
     Target("firmware_sim/drive.py", ("tests/firmware_sim/test_drive.py",)),
     Target("firmware_sim/drive_states.py", ("tests/firmware_sim/test_drive_states.py",)),
     Target(
-        "utank_hil/runtime/controller_node.py",
+        "utank_hil/nodes/controller.py",
         (
-            "tests/runtime/test_alarms.py",
-            "tests/runtime/test_valve_command.py",
-            "tests/runtime/test_pump_that_is_off.py",
-            "tests/runtime/test_law_that_starts_anew.py",
-            "tests/runtime/test_estimates_on_the_bus.py",
+            "tests/safety/test_alarms.py",
+            "tests/nodes/test_valve_command.py",
+            "tests/nodes/test_pump_that_is_off.py",
+            "tests/nodes/test_law_that_starts_anew.py",
+            "tests/nodes/test_estimates_on_the_bus.py",
             *_NODE,
         ),
         (
-            "tests/runtime/test_lost_levels.py",
-            "tests/runtime/test_monitoring.py",
-            "tests/runtime/test_lockstep.py",
-            "tests/runtime/test_invariants.py",
+            "tests/nodes/test_lost_levels.py",
+            "tests/safety/test_monitoring.py",
+            "tests/runners/test_lockstep.py",
+            "tests/nodes/test_invariants.py",
             "tests/firmware_sim/test_vessel_without_pump.py",
             "tests/faults/test_retuning_events.py",
         ),
     ),
     Target(
         f"{_MONITORS}/level_stuck.py",
-        ("tests/runtime/monitors/test_level_stuck.py",),
-        ("tests/runtime/monitors/test_tank_equation.py",),
+        ("tests/safety/monitors/test_level_stuck.py",),
+        ("tests/safety/monitors/test_tank_equation.py",),
     ),
-    Target(f"{_MONITORS}/volume.py", ("tests/runtime/monitors/test_volume.py",)),
-    Target(f"{_MONITORS}/noise.py", ("tests/runtime/monitors/test_noise.py",)),
+    Target(f"{_MONITORS}/volume.py", ("tests/safety/monitors/test_volume.py",)),
+    Target(f"{_MONITORS}/noise.py", ("tests/safety/monitors/test_noise.py",)),
     Target(
         f"{_MONITORS}/spikes.py",
-        ("tests/runtime/monitors/test_spikes.py",),
-        ("tests/runtime/test_monitoring.py",),
+        ("tests/safety/monitors/test_spikes.py",),
+        ("tests/safety/test_monitoring.py",),
     ),
-    Target(f"{_MONITORS}/senders.py", ("tests/runtime/monitors/test_senders.py",)),
+    Target(f"{_MONITORS}/senders.py", ("tests/safety/monitors/test_senders.py",)),
     Target(
         f"{_MONITORS}/drive.py",
-        ("tests/runtime/monitors/test_drive_following.py",),
-        ("tests/runtime/monitors/test_drive_of_the_first_ship.py",),
+        ("tests/safety/monitors/test_drive_following.py",),
+        ("tests/safety/monitors/test_drive_of_the_first_ship.py",),
     ),
     Target(
         f"{_MONITORS}/motion.py",
-        ("tests/runtime/monitors/test_motion_sums.py",),
-        ("tests/runtime/monitors/test_roll_against_rate.py",),
+        ("tests/safety/monitors/test_motion_sums.py",),
+        ("tests/safety/monitors/test_roll_against_rate.py",),
     ),
     Target(
         f"{_MONITORS}/motion_sign.py",
-        ("tests/runtime/monitors/test_motion_sign.py",),
-        ("tests/runtime/monitors/test_motion_sums.py",),
+        ("tests/safety/monitors/test_motion_sign.py",),
+        ("tests/safety/monitors/test_motion_sums.py",),
     ),
-    Target(f"{_MONITORS}/standstill.py", ("tests/runtime/monitors/test_standstill.py",)),
-    Target(f"{_MONITORS}/repetition.py", ("tests/runtime/monitors/test_repetition.py",)),
+    Target(f"{_MONITORS}/standstill.py", ("tests/safety/monitors/test_standstill.py",)),
+    Target(f"{_MONITORS}/repetition.py", ("tests/safety/monitors/test_repetition.py",)),
     Target(
         f"{_MONITORS}/motion_watch.py",
-        ("tests/runtime/monitors/test_motion_watch.py",),
-        ("tests/runtime/test_monitoring.py",),
+        ("tests/safety/monitors/test_motion_watch.py",),
+        ("tests/safety/test_monitoring.py",),
     ),
-    Target(f"{_MONITORS}/motion_pair.py", ("tests/runtime/monitors/test_motion_pair.py",)),
-    Target(f"{_MONITORS}/thresholds.py", ("tests/runtime/monitors/test_thresholds.py",)),
+    Target(f"{_MONITORS}/motion_pair.py", ("tests/safety/monitors/test_motion_pair.py",)),
+    Target(f"{_MONITORS}/thresholds.py", ("tests/safety/monitors/test_thresholds.py",)),
     Target(
-        "utank_hil/runtime/passive_twin.py",
-        ("tests/runtime/test_passive_twin_judging.py",),
-        ("tests/runtime/test_passive_twin.py",),
+        "utank_hil/safety/passive_twin.py",
+        ("tests/safety/test_passive_twin_judging.py",),
+        ("tests/safety/test_passive_twin.py",),
     ),
 )

@@ -18,9 +18,9 @@ from firmware_sim.ship_side import build_ship_side
 from utank_hil.assembly import build_controller_node, build_law, works_of
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, Node
-from utank_hil.runtime.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head

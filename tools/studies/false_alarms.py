@@ -36,7 +36,7 @@ from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.runtime.panel import Action, TimedAction
+from utank_hil.nodes.panel import Action, TimedAction
 
 CACHE = ROOT / ".cache" / "false_alarms"
 RECORD = ROOT / "docs" / "evidence" / "false_alarms.json"

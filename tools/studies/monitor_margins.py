@@ -20,13 +20,13 @@ from utank_hil.assembly import build_controller_node, works_of
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.monitoring import Monitors
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, SimulatedBus
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.monitoring import Monitors
-from utank_hil.runtime.monitors.finding import Finding
-from utank_hil.runtime.monitors.motion_sign import MOST as SIGN_SUM
-from utank_hil.runtime.monitors.tank_equation import STUCK_GAIN
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.motion_sign import MOST as SIGN_SUM
+from utank_hil.safety.monitors.tank_equation import STUCK_GAIN
 
 LOOK_TICKS = 5
 AFTER_S = 60.0

@@ -38,9 +38,9 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import Frame
+from utank_hil.nodes.controller import ControllerNode
 from utank_hil.runners import Lockstep, SimulatedBus
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.passive_twin import MEMORY_PERIODS, RECORD_PERIODS
+from utank_hil.safety.passive_twin import MEMORY_PERIODS, RECORD_PERIODS
 
 STATISTIC = "roll over twin"
 FINDING = ENDED_BY_ITSELF[STATISTIC]

@@ -31,10 +31,10 @@ from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.canbus import Frame
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.retuning import RetuneFunction, RetuningSettings, SimulatedRetuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S
 from utank_hil.runners import Lockstep, Node
-from utank_hil.runtime.panel import Action, TimedAction
 
 SCENARIO = Path("configs/scenarios/load_change.yaml")
 SECOND_NS = 1_000_000_000

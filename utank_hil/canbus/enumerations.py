@@ -35,7 +35,7 @@ class Mode(IntEnum):
 class Fault(IntEnum):
     """What stopped the controller, or degrades it.
 
-    A code that is found has one row in the fault table, `utank_hil.runtime.faults`; the others are
+    A code that is found has one row in the fault table, `utank_hil.safety.faults`; the others are
     reserved, so that finding them needs no other catalogue. A number that was once sent keeps its
     meaning.
     """

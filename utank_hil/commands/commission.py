@@ -23,11 +23,11 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.commissioning.node import CommissioningNode, Stage
-from utank_hil.runtime.faults import fault_text
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import fault_text
 
 SAY_TICKS: Final = 500
 """Between two lines about one stage."""

@@ -15,7 +15,7 @@ from utank_hil.base.provenance import PROGRAM, commit, version
 from utank_hil.canbus import load_catalogue
 from utank_hil.commands.common import finite
 from utank_hil.configuration import ControllerConfig
-from utank_hil.runtime.commissioning.checks import Check
+from utank_hil.nodes.commissioning.checks import Check
 
 SUFFIX: Final = ".commissioning.json"
 EMULATED: Final = ("vcan", "vxcan")

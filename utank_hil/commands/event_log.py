@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.faults import FAULTS
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import FAULTS
 from utank_hil.telemetry.event_ring import Event
 
 NAME: Final = "log-{}.jsonl"

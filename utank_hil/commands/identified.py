@@ -15,8 +15,8 @@ from utank_hil.configuration.plausibility import tank_problems
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
+from utank_hil.nodes.redundancy import NO_REDUNDANCY
 from utank_hil.retuning import ModelSummary
-from utank_hil.runtime.redundancy import NO_REDUNDANCY
 
 VESSEL: Final = "identified_vessel.yaml"
 CONTROLLER: Final = "identified_controller.yaml"

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from utank_hil.canbus import AlarmState, ControllerStatus, Fault, Mode, Station
-from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.panel import SILENT_NS, Action, OperatorPanel
+from utank_hil.nodes.panel import SILENT_NS, Action, OperatorPanel
+from utank_hil.safety.faults import fault_text
 
 ANSWER_NS: Final = 1_000_000_000
 """So long after a reset its answer has come: 500 ms for the button, 100 ms for the status."""

@@ -8,7 +8,7 @@ from typing import Final
 
 from utank_hil.commands.common import fail
 from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.runtime.alarms import AlarmEvent
+from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.telemetry.event_ring import event_text
 
 _END_S: Final = 10.0

@@ -16,8 +16,8 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.keyboard import HELP, Keyboard
 from utank_hil.commands.lines import printed_lines
 from utank_hil.configuration.vessel import Vessel
+from utank_hil.nodes.panel import OperatorPanel
 from utank_hil.runners import RealTimeLoop, stop_on_signals
-from utank_hil.runtime.panel import OperatorPanel
 
 LOOK_NS = 2 * TICK_NS
 """Between two looks at the keyboard: a frame leaves within 50 ms of its button."""

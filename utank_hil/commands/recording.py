@@ -9,7 +9,7 @@ from typing import Any, Final
 from utank_hil.base.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import IN_A_SLOT, ROW
 from utank_hil.telemetry.frame_log import SUFFIX
 from utank_hil.telemetry.recorder import NEEDS_RERUN, RecorderError, RecorderProcess

@@ -19,7 +19,7 @@ from utank_hil.pictures.report_page import (
     ReportTable,
     Verdict,
 )
-from utank_hil.runtime.faults import fault_text
+from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of
 

@@ -30,6 +30,8 @@ from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.signals import ROW_TICKS
 from utank_hil.retuning import Desk
 from utank_hil.runners import (
     LoopStatistics,
@@ -38,10 +40,8 @@ from utank_hil.runners import (
     real_time_scheduling,
     stop_on_signals,
 )
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.controller_node import ControllerNode
-from utank_hil.runtime.faults import fault_text
-from utank_hil.runtime.signals import ROW_TICKS
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.event_ring import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head

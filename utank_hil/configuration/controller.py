@@ -24,8 +24,8 @@ from utank_hil.retuning.estimator import EstimateSettings
 from utank_hil.retuning.record_length import record_problems
 from utank_hil.retuning.settings import RetuningSettings
 from utank_hil.runners.bus_model import SimulatedBus
-from utank_hil.runtime.monitors.thresholds import SensorFigures
-from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.safety.monitors.thresholds import SensorFigures
+from utank_hil.safety.safety_limits import SafetyLimits
 
 _WITHOUT_PUMP: Final = (PassiveDesign, OnOffValveDesign, ClippedValveDesign)
 

@@ -18,8 +18,8 @@ from utank_hil.dynamics.pump import Pump
 from utank_hil.dynamics.steady_heel import RightingRange, righting_range
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve, valve_problems
-from utank_hil.runtime.redundancy import NO_REDUNDANCY, Redundancy
-from utank_hil.runtime.safety_limits import SafetyLimits
+from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
+from utank_hil.safety.safety_limits import SafetyLimits
 
 NOT_AVAILABLE = 0xFFF
 """Twelve bits carry the hash on the bus; all ones means that there is none."""

@@ -16,8 +16,8 @@ from utank_hil.base.closing import Closing
 from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
 from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.law_exchange import RetuningEvent
-from utank_hil.runtime.alarms import AlarmEvent
-from utank_hil.runtime.faults import fault_text
+from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.ring import RingReader, RingWriter
 
 _TEXT_WORDS: Final = 1024

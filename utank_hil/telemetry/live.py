@@ -11,7 +11,7 @@ from typing import Any, Final
 import rerun as rr
 
 from utank_hil.base.closing import Closing
-from utank_hil.runtime.signals import SIGNALS
+from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
 from utank_hil.telemetry.event_ring import EventReader, is_event_ring
 from utank_hil.telemetry.rerun_log import APPLICATION, LIVE_RUN, RunLog, run_paths, write_about

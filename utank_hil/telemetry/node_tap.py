@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
+from utank_hil.nodes.controller import ControllerNode
 from utank_hil.retuning import Retuner
 from utank_hil.retuning.answer import Answer, answer_bytes
-from utank_hil.runtime.controller_node import ControllerNode
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind
 
 Sink = Callable[[bytes, int], None]

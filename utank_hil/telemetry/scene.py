@@ -14,7 +14,7 @@ import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.runtime.faults import fault_text
+from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
 PERIOD_S: Final = 0.2

@@ -1,0 +1,437 @@
+import math
+
+import numpy as np
+import pytest
+from controller_bench import (
+    CATALOGUE,
+    LIMITS,
+    MS,
+    VERSION,
+    ControllerBench,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus import (
+    Address,
+    AddressClaim,
+    ControlWord,
+    DriveFault,
+    DriveState,
+    DriveStatus1,
+    Fault,
+    Frame,
+    Heartbeat,
+    Mode,
+    OperatorCommand,
+    PumpCommand,
+    Quality,
+    SensorMotion,
+    SensorPump,
+    SensorTank,
+    Switch,
+)
+from utank_hil.safety.supervisor import Demand
+
+START_NS = 7_000_000_123
+LEVEL = 20e3  # a pressure away from every limit
+
+
+# What takes the motion sensor's samples away; each must look like silence.
+def _nan(bench: ControllerBench) -> None:
+    bench.motion = SensorMotion(math.nan, 0.0, Quality.GOOD)
+
+
+def _rate_nan(bench: ControllerBench) -> None:
+    bench.motion = SensorMotion(0.0, math.nan, Quality.GOOD)
+
+
+def _bad_quality(bench: ControllerBench) -> None:
+    bench.motion = bench.motion._replace(quality=Quality.BAD)
+
+
+def _no_quality(bench: ControllerBench) -> None:
+    bench.motion = bench.motion._replace(quality=None)
+
+
+def _silence(bench: ControllerBench) -> None:
+    bench.silent.add(SensorMotion)
+
+
+def _wrong_identifier(bench: ControllerBench) -> None:
+    bench.spoil = lambda kind, frame: (
+        (frame._replace(can_id=frame.can_id + 0x100),) if kind is SensorMotion else (frame,)
+    )
+
+
+def _standing_counter(bench: ControllerBench) -> None:
+    first = bench.encode(bench.motion)
+    bench.send(first)
+    bench.spoil = lambda kind, frame: (first,) if kind is SensorMotion else (frame,)
+
+
+def _flipped_bit(bench: ControllerBench) -> None:
+    def flip(kind: type, frame: Frame) -> tuple[Frame, ...]:
+        if kind is not SensorMotion:
+            return (frame,)
+        data = bytearray(frame.data)
+        data[3] ^= 0x10
+        return (Frame(frame.can_id, bytes(data)),)
+
+    bench.spoil = flip
+
+
+def _short(bench: ControllerBench) -> None:
+    bench.spoil = lambda kind, frame: (
+        (Frame(frame.can_id, frame.data[:6]),) if kind is SensorMotion else (frame,)
+    )
+
+
+MOTION_FAULTS = [
+    _nan, _rate_nan, _bad_quality, _no_quality, _silence, _wrong_identifier, _standing_counter,
+    _flipped_bit, _short,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", MOTION_FAULTS)
+def test_without_good_motion_samples_pressure_is_zero_within_250_ms(fault) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.motion = SensorMotion(0.02, 0.01, Quality.GOOD)
+    bench.run(100)
+    rows = len(bench.rows)
+    last_good_ns = bench.now_ns - TICK_NS
+    fault(bench)
+    bench.run(2000)
+    # five repeated frames are there before the sample is too old
+    repeated = fault is _standing_counter
+    assert bench.node.fault is (Fault.PROTECTION if repeated else Fault.MOTION_SILENT)
+    zero_ns = next(t for t, c in bench.commands if t > last_good_ns and c.pressure_pa == 0.0)
+    assert zero_ns - last_good_ns <= 250 * MS
+    assert all(c.pressure_pa == 0.0 for t, c in bench.commands if t >= zero_ns)
+    assert bench.word is ControlWord.DISABLE_VOLTAGE
+    # a rejected frame changes no value
+    np.testing.assert_allclose(bench.column("roll_rad")[rows:], 0.02, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(bench.column("roll_rate_rad_s")[rows:], 0.01, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "fault", "within_ms"),
+    [
+        (lambda b: b.silent.add(SensorTank), Fault.TANK_SILENT, 2010),
+        (lambda b: b.silent.add(SensorPump), Fault.PUMP_SENSOR_SILENT, 2010),
+        (lambda b: b.silent.add(DriveStatus1), Fault.DRIVE_SILENT, 90),
+        (lambda b: setattr(b, "drive_fault", DriveFault.STALL), Fault.DRIVE_FAULT, 120),
+        (lambda b: (setattr(b, "drive_follows", False),
+                    setattr(b, "drive_state", DriveState.SWITCHED_ON)), Fault.DRIVE_FAULT, 80),
+        (lambda b: (setattr(b, "drive_follows", False),
+                    setattr(b, "drive_state", DriveState.FAULT)), Fault.DRIVE_FAULT, 40),
+        (lambda b: setattr(b, "tank", b.tank._replace(port_high=Switch.ON)), Fault.LEVEL_LIMIT, 40),
+        (lambda b: setattr(b, "tank", b.tank._replace(starboard_high=None)), Fault.LEVEL_LIMIT, 40),
+        (lambda b: setattr(b, "tank", b.tank._replace(port_high=Switch.ON, quality=Quality.BAD)),
+         Fault.LEVEL_LIMIT, 40),
+        (lambda b: setattr(b, "motion", SensorMotion(0.4, 0.0, Quality.GOOD)), Fault.HEEL_LIMIT,
+         1020),
+        (lambda b: b.silent.add(OperatorCommand), Fault.OPERATOR_SILENT, 6210),
+        (lambda b: setattr(b, "versions", (b.versions[0], VERSION + 1)), Fault.VERSION_MISMATCH,
+         120),
+    ],
+)  # fmt: skip
+def test_fault_of_any_partner_ends_at_zero_and_stays_there(change, fault, within_ms) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    change(bench)
+    began_ns = bench.now_ns
+    bench.run(within_ms + 500)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
+    after = [(t, c.pressure_pa) for t, c in bench.commands if t - began_ns >= within_ms * MS]
+    assert after
+    assert {pressure_pa for _, pressure_pa in after} == {0.0}
+    assert bench.status.alarm
+
+
+@pytest.mark.parametrize("state", [DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT])
+def test_drive_that_brakes_for_a_fault_or_has_it_is_found_by_its_next_status(state) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.drive_follows, bench.drive_state = False, state
+    bench.run(30)  # the cycle of DRIVE_STATUS_1, and a tick
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.DRIVE_FAULT)
+
+
+def test_stale_levels_halve_the_pressure_before_they_stop_it() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LIMITS.pressure_pa)
+    bench.silent.add(SensorTank)
+    bench.run(600)
+    assert bench.node.mode is Mode.ACTIVE
+    assert bench.pressure_pa == LIMITS.pressure_pa / 2
+    assert bench.status.degraded
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        CATALOGUE.transmitter(PumpCommand).can_id,
+        CATALOGUE.transmitter(Heartbeat, Address.CONTROLLER).can_id,
+        CATALOGUE.transmitter(AddressClaim, Address.CONTROLLER).can_id,
+    ],
+)
+@pytest.mark.parametrize("data", [bytes(8), b""])
+def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(
+    own: int, data: bytes
+) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.send(Frame(own, data))
+    bench.run(40)
+    assert bench.node.fault is Fault.ADDRESS_CONFLICT
+    assert bench.pressure_pa == 0.0
+    bench.order_is(arm=False, mode_request=Mode.STANDBY, reset=True)
+    bench.run(400)
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(400)
+    assert bench.node.mode is Mode.FAULT
+    assert bench.node.supervisor.reset_refused_by is Fault.ADDRESS_CONFLICT
+    bench.order_is(arm=False, reset=False)
+    bench.run(9500)
+    bench.order_is(reset=True)
+    bench.run(600)
+    assert bench.node.mode is Mode.STANDBY
+    bench.order_is(arm=True, reset=False)
+    bench.run(600)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_an_own_identifier_before_arming_is_said_to_be_the_reason() -> None:
+    bench = ControllerBench(START_NS)
+    bench.run(400)
+    bench.send(Frame(CATALOGUE.transmitter(PumpCommand).can_id, b""))
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(9000)
+    assert (bench.status.mode, bench.status.fault) == (Mode.INIT, Fault.ADDRESS_CONFLICT)
+    bench.run(2000)
+    assert bench.node.mode is Mode.STANDBY
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_panel_of_other_versions_can_not_arm_and_does_not_stop(off: int) -> None:
+    wrong = [CATALOGUE.version, VERSION]
+    wrong[off] ^= 1
+    bench = ControllerBench(START_NS)
+    bench.panel_versions = (wrong[0], wrong[1])
+    bench.run(400)
+    bench.order_is(arm=True, mode_request=Mode.ACTIVE)
+    bench.run(400)
+    assert (bench.node.mode, bench.node.fault) == (Mode.STANDBY, Fault.VERSION_MISMATCH)
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.panel_versions = (wrong[0], wrong[1])
+    bench.run(400)
+    assert bench.node.mode is Mode.ACTIVE
+
+
+def test_lost_link_cuts_at_once_and_comes_back_without_arming() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.node.link_error(bench.now_ns, "interface down")
+    bench.run(20)
+    assert bench.node.fault is Fault.BUS_LOST
+    assert bench.pressure_pa == 0.0
+    bench.run(1000)  # the panel holds the arm bit all the time
+    assert bench.node.mode is Mode.FAULT
+    bench.order_is(reset=True)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    assert {c.pressure_pa for _, c in bench.commands[-100:]} == {0.0}
+
+
+@pytest.mark.parametrize("late_ticks", range(1, 15))
+def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks: int) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    # the loop hands over what arrived meanwhile, so nothing is stale
+    bench.tick(late_ticks=late_ticks)
+    bench.tick()
+    assert bench.node.seen.overruns_in_ten == min(late_ticks, 9)
+    assert bench.node.fault is (Fault.OVERRUN if late_ticks >= 3 else Fault.NONE)
+    stopped = bench.node.supervisor.demand is Demand.ZERO
+    assert stopped == (late_ticks >= 5)  # up to 60 ms late
+
+
+def test_three_overruns_in_ten_ticks_ramp_down_two_do_not() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    for late in (1, 0, 1, 0, 0, 0):
+        bench.tick(late_ticks=late)
+    assert bench.node.mode is Mode.ACTIVE
+    bench.tick(late_ticks=1)
+    assert bench.node.fault is Fault.OVERRUN
+    assert bench.pressure_pa > 0  # a ramp, not a step
+    bench.run(1000)
+    assert bench.pressure_pa == 0.0
+
+
+@pytest.mark.parametrize("answer_pa", [math.nan, math.inf, -math.inf])
+def test_law_that_fails_stops_the_pump(answer_pa: float) -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    bench.law.answer_pa = answer_pa
+    bench.run(240)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.pressure_pa == 0.0
+    assert "reset" in bench.law.calls
+    bench.law.answer_pa = LEVEL
+    bench.run(500)
+    assert bench.pressure_pa == 0.0
+
+
+def test_law_that_raises_stops_the_pump_until_the_operator_resets() -> None:
+    bench = ControllerBench(START_NS)
+    bench.drive_at(LEVEL)
+    step = bench.law.step
+
+    def fail(*_: object) -> np.ndarray:
+        raise ZeroDivisionError("of what")
+
+    bench.law.step = fail  # type: ignore[method-assign]
+    bench.run(240)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.node.law_error == "ZeroDivisionError: of what"
+    assert bench.pressure_pa == 0.0
+    bench.law.step = step  # type: ignore[method-assign]
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(1000)  # the law answers again, which nobody trusts
+    assert bench.node.mode is Mode.FAULT
+    bench.law.calls.clear()
+    bench.order_is(reset=True)
+    bench.run(20)
+    assert bench.law.calls[:1] == ["reset"]
+    assert bench.node.mode is Mode.STANDBY
+
+
+orders = st.builds(
+    OperatorCommand,
+    mode_request=st.sampled_from([Mode.STANDBY, Mode.PASSIVE, Mode.ACTIVE, Mode.ACTIVE, None]),
+    arm=st.booleans(),
+    stop=st.sampled_from([False, False, False, True]),
+    reset=st.booleans(),
+    acknowledge=st.booleans(),
+)
+events = st.one_of(
+    orders,
+    st.floats(-80e3, 80e3),
+    st.sampled_from([SensorMotion, SensorTank, SensorPump, DriveStatus1, OperatorCommand]),
+    st.just("all well"),
+    st.builds(
+        SensorTank,
+        port_level_m=st.floats(-4, 4),
+        starboard_level_m=st.floats(-4, 4),
+        port_high=st.sampled_from([Switch.OFF, Switch.OFF, Switch.ON, None]),
+        starboard_high=st.just(Switch.OFF),
+        quality=st.sampled_from([*Quality, None]),
+    ),
+)
+
+STOP_CLASS = {
+    Fault.BUS_LOST, Fault.ADDRESS_CONFLICT, Fault.VERSION_MISMATCH, Fault.DRIVE_FAULT,
+    Fault.DRIVE_SILENT, Fault.LEVEL_LIMIT, Fault.INTERNAL, Fault.OVERRUN, Fault.BUS_OVERLOAD,
+}  # fmt: skip
+
+
+@given(st.lists(st.tuples(events, st.integers(1, 40)), max_size=15))
+def test_pressure_only_while_armed_and_never_faster_than_the_rate_limit(history) -> None:
+    bench = ControllerBench(START_NS)
+    bench.arm()
+    bench.law.answer_pa = 40e3
+    bench.run(300)
+    modes: list[Mode] = []  # since the last command
+    for event, ticks in history:
+        if isinstance(event, OperatorCommand):
+            bench.order_is(**event._asdict())
+        elif isinstance(event, float):
+            bench.law.answer_pa = event
+        elif isinstance(event, SensorTank):
+            bench.tank = event
+        elif isinstance(event, type):
+            bench.silent.add(event)
+        else:
+            bench.silent.clear()
+            bench.tank = SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)
+        for _ in range(ticks):
+            before, mode_before, count = bench.pressure_pa, bench.node.mode, len(bench.commands)
+            bench.tick()
+            mode, fault, pressure_pa = bench.node.mode, bench.node.fault, bench.pressure_pa
+            modes.append(mode)
+            assert abs(pressure_pa) <= LIMITS.pressure_pa
+            if mode is Mode.ACTIVE and mode_before is not Mode.ACTIVE:
+                assert bench.order.arm
+            if len(bench.commands) == count:
+                continue
+            if mode in (Mode.INIT, Mode.STANDBY):
+                assert pressure_pa == 0.0
+            if abs(pressure_pa - before) > LIMITS.rate_pa_s * 0.02 + 8:
+                # only a cut may be faster
+                assert pressure_pa == 0.0
+                off = bench.tank.port_high is Switch.OFF and bench.tank.starboard_high is Switch.OFF
+                assert (
+                    bench.order.stop
+                    or fault in STOP_CLASS
+                    or (mode is Mode.FAULT and (not off or DriveStatus1 in bench.silent))
+                    or fault is Fault.MOTION_SILENT  # what its ramp left after 200 ms
+                    or Mode.INIT in modes  # disarmed, and then not even ready
+                )
+            modes.clear()
+
+
+def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = ControllerBench()
+    bench.drive_at(20e3)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("of what")
+
+    monkeypatch.setattr(bench.law, "step", fail)
+    while not bench.node.law_error:
+        assert bench.node.command_pa == 20e3
+        bench.tick()
+    assert bench.node.mode is Mode.ACTIVE  # it is seen in the next tick
+    assert bench.node.command_pa == 20e3 - LIMITS.rate_pa_s * TICK_S
+    bench.tick()
+    assert bench.node.command_pa == 0.0
+
+
+def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming() -> None:
+    bench = ControllerBench()
+    bench.law.answer_pa = math.nan
+    bench.run(400)
+    bench.law.answer_pa = 0.0
+    bench.arm()
+    assert bench.node.law_error == "its answer is nan Pa"
+
+
+def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = ControllerBench()
+    bench.law.answer_pa = math.nan
+    bench.run(400)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("of what")
+
+    monkeypatch.setattr(bench.law, "step", fail)
+    bench.run(400)
+    assert bench.node.law_error == "its answer is nan Pa"
+
+
+@pytest.mark.parametrize("answer", [[], [1e3, 2e3]])
+def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer: list[float]) -> None:
+    bench = ControllerBench()
+    bench.drive_at(LEVEL)
+    bench.law.step = lambda y, reference=None: np.array(answer)  # type: ignore[method-assign]
+    bench.run(300)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.INTERNAL)
+    assert bench.pressure_pa == 0.0
+    assert bench.node.law_error.startswith("ValueError: zip() argument 2 is ")

@@ -1,0 +1,423 @@
+"""The controller's side of the valve: what it tells it when, and what it finds wrong with it."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from controller_bench import CATALOGUE, ControllerBench, ToyLaw
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_S
+from utank_hil.canbus import (
+    Address,
+    FailPosition,
+    Fault,
+    Frame,
+    Heartbeat,
+    Mode,
+    Quality,
+    SensorMotion,
+    SensorPump,
+    ValveCommand,
+    ValveControl,
+    ValveFault,
+    ValveState,
+    ValveStatus,
+)
+from utank_hil.configuration import Vessel, load_config
+from utank_hil.control import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE
+from utank_hil.dynamics.valves import Valve
+from utank_hil.nodes.monitoring import Monitors
+from utank_hil.nodes.valve_command import ValveCommander
+from utank_hil.safety.monitors.thresholds import SensorFigures
+
+VESSEL = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
+TANK = VESSEL.tank
+DUCT = Valve("duct", opening_time_s=0.5, leakage=0.1)
+SHUT = DUCT.loss(TANK, 0.0)
+
+
+@dataclass
+class ToyValveLaw(ToyLaw):
+    """Asks for a loss, and for a pressure."""
+
+    loss: float = 0.0
+
+    def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
+        return np.array([self.loss, *super().step(y, reference)])
+
+
+class ValveBench(ControllerBench):
+    """A controller with a valve that does as it is told, unless a test says otherwise."""
+
+    def __init__(self, valve: Valve = DUCT) -> None:
+        self.valve = valve
+        self.opening = valve.fail_opening
+        self.state: ValveState | None = ValveState.FAIL_POSITION
+        self.fault: ValveFault | None = ValveFault.NONE
+        self.moves = self.reports = self.echoes = self.beats = self.hears = True
+        self.told: list[ValveCommand] = []
+        super().__init__(
+            law=ToyValveLaw(),
+            commands=(VALVE, PRESSURE),
+            valve=ValveCommander(valve, TANK, CATALOGUE, 0.05),
+        )
+        self._valve_commands = CATALOGUE.receiver(ValveCommand)
+        self._valve_status = CATALOGUE.transmitter(ValveStatus)
+        self._valve_beat = CATALOGUE.transmitter(Heartbeat, Address.VALVE)
+        self._echo: int | None = None
+
+    @property
+    def control(self) -> ValveControl | None:
+        return self.told[-1].control
+
+    def tick(self, late_ticks: int = 0) -> None:
+        if self.beats and self._tick_index % 10 == 0:
+            self.send(self._valve_beat.frame(Heartbeat(None, None, 0.0, *self.versions, 0.0, 0.0)))
+        if self.told and self.moves:
+            following = self.control is ValveControl.FOLLOW
+            target = self.told[-1].opening if following else self.valve.fail_opening
+            step = TICK_S / self.valve.opening_time_s
+            self.opening += min(max(target - self.opening, -step), step)
+        if self.reports and self._tick_index % 2 == 0:
+            self._report()
+        super().tick(late_ticks)
+
+    def _report(self) -> None:
+        status = ValveStatus(
+            self.opening, self.state, self.fault, self._echo, FailPosition.OPEN, *(False,) * 3
+        )
+        self.send(self._valve_status.frame(status))
+
+    def hear(self, frames: list[Frame]) -> None:  # type: ignore[override]
+        super().hear(frames)
+        for frame in frames:
+            if frame.can_id == self._valve_commands.can_id:
+                command = self._valve_commands.accept(frame)
+                assert command is not None
+                self.told.append(command)
+                if self.echoes:
+                    self._echo = self._valve_commands.counter
+                if self.fault is ValveFault.NONE and self.hears:
+                    following = command.control is ValveControl.FOLLOW
+                    self.state = ValveState.FOLLOWING if following else ValveState.FAIL_POSITION
+
+
+def valve_law(bench: ValveBench) -> ToyValveLaw:
+    assert isinstance(bench.law, ToyValveLaw)
+    return bench.law
+
+
+def throttling(valve: Valve = DUCT) -> ValveBench:
+    """A bench whose armed controller holds the valve shut."""
+    bench = ValveBench(valve)
+    bench.arm()
+    valve_law(bench).loss = SHUT
+    bench.run(1000)
+    return bench
+
+
+def test_the_valve_is_told_to_follow_only_while_the_law_is_in_charge() -> None:
+    bench = ValveBench()
+    valve_law(bench).loss = SHUT
+    bench.run(500)
+    assert {(told.opening, told.control) for told in bench.told} == {
+        (1.0, ValveControl.FAIL_POSITION)
+    }
+    assert len(bench.told) == len(bench.commands) == 25  # every 20 ms
+    bench.arm()
+    bench.run(300)
+    assert bench.control is ValveControl.FOLLOW
+    assert bench.told[-1].opening == pytest.approx(0.0, abs=1e-4)
+    assert bench.told[-1].timeout_s == 0.05
+    bench.order_is(mode_request=Mode.PASSIVE, arm=False)
+    bench.run(40)
+    assert bench.node.mode is Mode.PASSIVE
+    assert bench.told[-1][:2] == (1.0, ValveControl.FAIL_POSITION)
+
+
+@pytest.mark.parametrize(("opening", "position"), [(0.3, "open"), (1.0, "shut")])
+def test_an_opening_has_the_loss_that_the_law_asked_for(opening: float, position: str) -> None:
+    valve = Valve("duct", 0.5, 0.1, fail_position=position)  # type: ignore[arg-type]
+    bench = throttling(valve)
+    valve_law(bench).loss = valve.loss(TANK, opening)
+    bench.run(400)
+    assert bench.told[-1].opening == pytest.approx(opening, abs=1e-4)
+
+
+def test_the_law_is_told_the_loss_of_the_valve_as_it_stands_and_the_mean_pressure() -> None:
+    bench = throttling()
+    told: list[FloatArray] = []
+    bench.law.applied = told.append  # type: ignore[method-assign, assignment]
+    bench.run(400)
+    assert told[-1] == pytest.approx([SHUT, 0.0])
+    bench.law.answer_pa = 4e3
+    bench.moves, bench.opening = False, 0.1
+    bench.run(800)
+    assert told[-1] == pytest.approx([DUCT.loss(TANK, 0.1), 4e3], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fault", "within_ms", "changes"),
+    [
+        (Fault.VALVE_SILENT, 90, {"reports": False}),
+        (Fault.VALVE_SILENT, 90, {"opening": math.nan, "moves": False}),
+        (Fault.VALVE_SILENT, 140, {"echoes": False}),
+        (Fault.VALVE_FAULT, 40, {"state": ValveState.FAULT, "fault": ValveFault.STUCK}),
+        (Fault.VALVE_FAULT, 40, {"state": ValveState.FAIL_POSITION, "fault": ValveFault.SUPPLY}),
+        (Fault.VALVE_FAULT, 140, {"state": ValveState.FAIL_POSITION, "hears": False}),
+        (Fault.VALVE_FAULT, 40, {"fault": ValveFault.POSITION_SENSOR}),
+        (Fault.VALVE_FAULT, 40, {"fault": None}),
+        (Fault.VALVE_NOT_FOLLOWING, 340, {"opening": 0.5, "moves": False}),
+    ],
+)
+def test_a_valve_that_fails_ends_at_its_fail_position_and_at_zero_pressure(
+    fault: Fault, within_ms: float, changes: dict[str, object]
+) -> None:
+    bench = throttling()
+    bench.law.answer_pa = 4e3
+    bench.run(400)
+    for name, value in changes.items():
+        setattr(bench, name, value)
+    bench.run(within_ms)
+    assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, fault)
+    bench.run(20)
+    assert bench.control is ValveControl.FAIL_POSITION
+    assert bench.pressure_pa == 0
+
+
+def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault() -> None:
+    bench = ValveBench()
+    bench.reports = False
+    bench.run(500)
+    assert not bench.node.seen.valve_fault
+    assert bench.node.fault is Fault.VALVE_SILENT
+
+
+@pytest.mark.parametrize("silent", ["motion", "tank"])
+def test_what_ramps_the_pump_down_sends_the_valve_to_its_fail_position_at_once(silent: str) -> None:
+    bench = throttling()
+    bench.law.answer_pa = 20e3
+    bench.run(600)
+    if silent == "motion":
+        bench.motion = bench.motion._replace(roll_rad=math.nan)
+    else:
+        bench.tank = bench.tank._replace(port_level_m=math.nan)
+    while bench.node.mode is Mode.ACTIVE:
+        bench.tick()
+    bench.run(20)
+    assert bench.control is ValveControl.FAIL_POSITION
+    assert bench.pressure_pa != 0  # the pump is still on its ramp
+
+
+def test_without_the_valve_or_with_its_versions_wrong_nothing_is_armed() -> None:
+    bench = ValveBench()
+    bench.reports = False
+    bench.run(400)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VALVE_SILENT)
+    bench = ValveBench()
+    bench.beats = False
+    bench.run(400)
+    assert (bench.node.mode, bench.node.fault) == (Mode.INIT, Fault.VERSION_MISMATCH)
+    bench.beats = True
+    bench.arm()
+
+
+def test_a_faulty_valve_refuses_arming_and_is_reset_only_on_the_operator_s_order() -> None:
+    bench = ValveBench()
+    bench.state, bench.fault = ValveState.FAULT, ValveFault.COMMAND_TIMEOUT
+    bench.run(400)
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(200)
+    assert (bench.node.mode, bench.node.fault) == (Mode.STANDBY, Fault.VALVE_FAULT)
+    assert ValveControl.RESET not in {told.control for told in bench.told}
+    bench.order_is(mode_request=Mode.STANDBY, arm=False, reset=True)
+    bench.run(40)
+    assert bench.control is ValveControl.RESET
+    bench.run(200)  # of no use; a later order is an edge again
+    assert bench.control is ValveControl.FAIL_POSITION
+    bench.order_is(reset=False)
+    bench.order_is(reset=True)
+    bench.run(40)
+    assert bench.control is ValveControl.RESET
+    bench.fault, bench.state = ValveFault.NONE, ValveState.FAIL_POSITION
+    bench.run(60)
+    assert bench.control is ValveControl.FAIL_POSITION
+    # nothing of that order is left for its next fault
+    bench.state, bench.fault = ValveState.FAULT, ValveFault.COMMAND_TIMEOUT
+    heard = len(bench.told)
+    bench.run(400)
+    assert {told.control for told in bench.told[heard:]} == {ValveControl.FAIL_POSITION}
+
+
+def test_armed_again_while_the_valve_is_still_on_its_way_it_is_not_called_stuck() -> None:
+    bench = throttling(Valve("duct", opening_time_s=10.0, leakage=0.1))
+    bench.run(9000)
+    assert bench.opening == pytest.approx(0.0, abs=1e-3)
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(2000)
+    valve_law(bench).loss = 0.0
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(1000)
+    assert bench.node.mode is Mode.ACTIVE
+    assert bench.opening < 0.5
+
+
+def test_a_valve_that_does_not_return_to_its_fail_position_refuses_arming() -> None:
+    bench = throttling()
+    bench.moves = False
+    bench.order_is(mode_request=Mode.STANDBY, arm=False)
+    bench.run(1000)
+    assert bench.node.mode is Mode.STANDBY
+    bench.order_is(mode_request=Mode.ACTIVE, arm=True)
+    bench.run(200)
+    assert (bench.node.mode, bench.node.fault) == (Mode.STANDBY, Fault.VALVE_NOT_FOLLOWING)
+    bench.moves = True
+    bench.run(1000)
+    bench.order_is(arm=False)
+    bench.arm()
+
+
+EVENTS: dict[str, Callable[[ValveBench], object]] = {
+    "arm": lambda bench: bench.order_is(mode_request=Mode.ACTIVE, arm=True, stop=False),
+    "disarm": lambda bench: bench.order_is(mode_request=Mode.PASSIVE, arm=False),
+    "stop": lambda bench: bench.order_is(mode_request=Mode.STANDBY, arm=False, stop=True),
+    "reset": lambda bench: (bench.order_is(reset=False), bench.order_is(reset=True)),
+    "valve silent": lambda bench: setattr(bench, "reports", False),
+    "valve stuck": lambda bench: setattr(bench, "moves", False),
+    "valve fault": lambda bench: (
+        setattr(bench, "fault", ValveFault.SUPPLY), setattr(bench, "state", ValveState.FAULT)
+    ),
+    "valve well": lambda bench: (
+        setattr(bench, "reports", True), setattr(bench, "moves", True),
+        setattr(bench, "fault", ValveFault.NONE),
+        setattr(bench, "state", ValveState.FAIL_POSITION),
+    ),
+    "no motion": lambda bench: setattr(bench, "motion", SensorMotion(math.nan, 0.0, None)),
+    "motion": lambda bench: setattr(bench, "motion", SensorMotion(0.0, 0.0, Quality.GOOD)),
+    "no loss": lambda bench: setattr(bench.law, "loss", math.nan),
+    "loss": lambda bench: setattr(bench.law, "loss", SHUT),
+    "pause": lambda bench: bench.run(300),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(sorted(EVENTS)), st.integers(1, 40)), max_size=25))
+def test_whatever_comes_the_valve_is_told_to_follow_only_while_the_controller_is_active(
+    events: list[tuple[str, int]],
+) -> None:
+    bench = ValveBench()
+    valve_law(bench).loss = SHUT
+    bench.arm()
+    not_active_ticks = 0
+    for event, ticks in events:
+        EVENTS[event](bench)
+        for _ in range(ticks):
+            bench.tick()
+            active = bench.node.mode is Mode.ACTIVE
+            not_active_ticks = 0 if active else not_active_ticks + 1
+            if not_active_ticks >= 2:  # a command leaves every other tick
+                assert bench.control is not ValveControl.FOLLOW
+                assert bench.told[-1].opening == DUCT.fail_opening
+            assert 0 <= bench.told[-1].opening <= 1
+
+
+def test_a_loss_that_is_no_number_ends_in_an_internal_fault() -> None:
+    bench = throttling()
+    valve_law(bench).loss = math.nan
+    bench.run(220)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.node.law_error == "its answer is a valve loss of nan"
+    assert bench.control is ValveControl.FAIL_POSITION
+
+
+def test_the_last_frames_of_the_controller_send_the_valve_to_its_fail_position() -> None:
+    bench = throttling()
+    bench.hear(list(bench.node.stop(bench.now_ns)))
+    assert bench.control is ValveControl.FAIL_POSITION
+    assert bench.pressure_pa == 0
+
+
+def test_the_level_is_observed_with_what_the_valve_holds_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bench = ValveBench()
+    bench.pump = SensorPump(3e3, 0.0, Quality.GOOD)
+    driven: list[float] = []
+    monkeypatch.setattr(bench.node._valve, "held_pa", lambda *_: 2e3)
+    monkeypatch.setattr(bench.level, "update", lambda level_m, pa, cycles: driven.append(pa))
+    bench.run(100)
+    assert set(driven) == {1e3}
+
+
+def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> None:
+    bench = throttling()
+    valve_law(bench).answer_pa = math.inf
+    bench.run(300)
+    assert bench.node.fault is Fault.INTERNAL
+    assert bench.node.law_error == "its answer is inf Pa"
+    valve_law(bench).answer_pa, valve_law(bench).loss = 0.0, math.nan
+    bench.run(300)
+    assert bench.node.law_error == "its answer is inf Pa"
+
+
+def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = ValveBench()
+    monitors = Monitors(DesignPlant(VESSEL.ship, TANK), 0.35, SensorFigures(), 250_000)
+    held: list[float] = []
+    monkeypatch.setattr(monitors, "update", lambda *_, held_pa, **__: held.append(held_pa) or 0)
+    bench.node.monitors = monitors
+    bench.opening, bench.moves = 0.2, False
+    monkeypatch.setattr(bench.node, "_estimate", lambda _: None)
+    bench.level.rate_m_s = 0.5
+    bench.tick()
+    commander = ValveCommander(DUCT, TANK, CATALOGUE, 0.05)
+    assert held == [commander.held_pa(bench.node.inbox, 0.5)]
+    assert held[0] > 0.0
+
+
+def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
+    """Where it is by then nobody knows."""
+    bench = ValveBench()
+    bench.run(1000)
+    bench.node._valve._told = 0.0  # as if it had been commanded to shut
+    seen, inbox = bench.node.seen, bench.node.inbox
+    for late_ms in range(10, 2000, 10):
+        bench.node._valve.observe(inbox, seen, inbox.valve_ns + late_ms * 1_000_000)
+    assert seen.valve_age_ms > 1900
+    assert seen.valve_off_ms == 0.0
+
+
+@pytest.mark.parametrize("opening", [0.3, 0.6, 1.0])
+def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
+    opening: float,
+) -> None:
+    bench = ValveBench()
+    bench.now_ns = bench.start_ns = 1000 * 1_000_000_000  # the clock of the machine
+    bench.opening = opening
+    for _ in range(100):
+        bench.tick()
+        assert bench.node.seen.valve_off_ms == 0.0
+    assert bench.node.alarms.codes == set()
+    # nor is one that reports later
+    bench = ValveBench()
+    bench.now_ns = bench.start_ns = 1000 * 1_000_000_000
+    bench.opening, bench.reports = opening, False
+    bench.run(200)
+    bench.opening, bench.reports = opening, True
+    for _ in range(100):
+        bench.tick()
+        assert bench.node.seen.valve_off_ms == 0.0
+    # one that does not move is found
+    bench = ValveBench()
+    bench.opening, bench.moves = opening, False
+    bench.run(1000)
+    off = bench.node.seen.valve_off_ms
+    assert off == 0.0 if opening == 1.0 else off > 300

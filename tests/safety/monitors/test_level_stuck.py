@@ -1,0 +1,149 @@
+"""A level that stands still, against the tank's equation solved by another way."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_ship import SHIP, TANK, THRESHOLDS
+from scipy.integrate import solve_ivp
+
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
+
+STEP_S = 0.01
+G = 9.80665
+TUBE = replace(TANK, damping_ratio=0.2, density_kg_m3=1025.0)
+LENGTH_M = 2 * TUBE.height_m + TUBE.width_m * TUBE.reservoir_area_m2 / TUBE.duct_area_m2
+W0 = math.sqrt(2 * G / LENGTH_M)
+BAND_M = 0.125
+PERMITTED_M = 16 * BAND_M
+
+
+def monitor() -> LevelStuck:
+    return LevelStuck(SHIP, TUBE, replace(THRESHOLDS, level_still_m=BAND_M), STEP_S)
+
+
+def found_at_s(roll_rad, level_m: float, pressure_pa: float, until_s: float) -> float | None:
+    stuck = monitor()
+    for k in range(round(until_s / STEP_S)):
+        if stuck.update(roll_rad(k * STEP_S), level_m, pressure_pa):
+            return k * STEP_S
+    return None
+
+
+@pytest.mark.parametrize(
+    ("roll_rad", "level_m", "pressure_pa"),
+    [
+        (lambda _: 0.0, 0.0, 60e3),
+        (lambda _: 0.0, 0.0, -60e3),
+        (lambda _: 0.0, 1.5, 0.0),
+        (lambda _: 0.0, -2.5, 20e3),
+        (lambda _: 0.19, 0.0, 0.0),  # a mean that it becomes only in the course of a period
+        (lambda t: 0.15 * math.sin(W0 * t), 0.0, 0.0),
+        (lambda t: 0.15 - 0.15 * math.cos(0.8 * t), -0.5, 10e3),
+    ],
+)
+def test_it_is_found_when_the_free_water_would_have_moved_sixteen_bands(
+    roll_rad, level_m: float, pressure_pa: float
+) -> None:
+    steady = G * TUBE.width_m
+    swinging = steady - TUBE.width_m * (TUBE.height_m + TUBE.lz_m) * W0**2
+
+    def slopes(t, state):
+        level, rate, mean_rad = state
+        push = swinging * (roll_rad(t) - mean_rad) + steady * mean_rad + pressure_pa / 1025.0
+        acceleration = push / LENGTH_M - 2 * 0.2 * W0 * rate - W0**2 * level
+        return rate, acceleration, (roll_rad(t) - mean_rad) * W0 / (2 * math.pi)
+
+    times_s = np.arange(0.0, 40.0, STEP_S)
+    level = solve_ivp(slopes, (0, 40), (level_m, 0.0, 0.0), t_eval=times_s, rtol=1e-6).y[0]
+    moved_s = times_s[np.argmax(abs(level - level_m) > PERMITTED_M)]
+    assert moved_s > 1.0
+    found_s = found_at_s(roll_rad, level_m, pressure_pa, 40.0)
+    assert found_s == pytest.approx(moved_s, abs=0.02)
+
+
+@pytest.mark.parametrize("level_m", [0.0, math.pi, -2.5])
+def test_the_first_sample_only_says_where_the_level_stands(level_m: float) -> None:
+    assert monitor().update(0.0, level_m, 1e12) == 0
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_push_that_carries_the_water_not_quite_so_far_is_left_alone(way: int) -> None:
+    """At rest at first, it overshoots once: by exp(-pi z / sqrt(1 - z^2)) of the way."""
+    overshoot = math.exp(-math.pi * 0.2 / math.sqrt(1 - 0.2**2))
+    least_pa = PERMITTED_M * 2 * 1025.0 * G / (1 + overshoot)
+    assert found_at_s(lambda _: 0.0, 0.0, way * 0.98 * least_pa, 60.0) is None
+    found_s = found_at_s(lambda _: 0.0, 0.0, way * 1.02 * least_pa, 60.0)
+    assert found_s == pytest.approx(math.pi / (W0 * math.sqrt(1 - 0.2**2)), rel=0.15)
+
+
+@pytest.mark.parametrize(("away_m", "still"), [(BAND_M, True), (1.01 * BAND_M, False)])
+def test_a_level_that_stays_within_the_band_stands_still(away_m: float, still: bool) -> None:
+    stuck = monitor()
+    found = 0
+    for k in range(1000):
+        found |= stuck.update(0.0, away_m * (k % 2), 60e3)
+    assert found == (Finding.LEVEL_STUCK if still else 0)
+
+
+def test_what_the_water_should_have_done_before_it_moved_does_not_count() -> None:
+    stuck = monitor()
+    alone_s = found_at_s(lambda _: 0.0, 0.0, 60e3, 20.0)
+    assert alone_s is not None
+    steps = round(alone_s / STEP_S)
+    for level_m in (0.0, 0.2, 0.0):
+        found = [stuck.update(0.0, level_m, 60e3) for _ in range(steps)]
+        assert found == [0] * steps
+    assert stuck.update(0.0, 0.0, 60e3)
+    stuck.restart()
+    found = [stuck.update(0.0, 0.0, 60e3) for _ in range(steps + 1)]
+    assert found == [0] * steps + [Finding.LEVEL_STUCK]
+
+
+def gauges(*samples: tuple[float, float]) -> list[int]:
+    stuck = GaugeStuck(THRESHOLDS)
+    return [stuck.update(*sample) for sample in samples]
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_gauge_that_stands_still_while_the_other_moves_is_stuck(way: int) -> None:
+    band_m, volume_m = THRESHOLDS.level_still_m, THRESHOLDS.volume_m
+    still = [(0.3, 0.1 + way * 0.03 * k * volume_m) for k in range(40)]
+    assert gauges(*still) == [0] * 34 + [Finding.LEVEL_STUCK] * 6
+    # it may be noisy, and the way counts from the least to the most
+    noisy = [
+        (0.3 + (-1) ** k * 0.7 * band_m, way * 0.7 * volume_m * math.sin(0.2 * k))
+        for k in range(40)
+    ]
+    assert Finding.LEVEL_STUCK in gauges(*noisy)
+    # eight bands at least, in a low tank
+    low = GaugeStuck(replace(THRESHOLDS, volume_m=0.01))
+    found = [low.update(0.0, moved * band_m) for moved in (0.0, 0.0, 7.9, 8.1)]
+    assert found == [0, 0, 0, Finding.LEVEL_STUCK]
+
+
+def test_a_gauge_has_moved_beyond_its_band_and_the_other_beyond_its_way() -> None:
+    assert gauges((math.pi, -math.pi)) == [0]
+    volume_m = THRESHOLDS.volume_m
+    assert gauges((0.0, 0.0), (0.0, volume_m), (0.0, 1.001 * volume_m)) == [
+        0, 0, Finding.LEVEL_STUCK,
+    ]  # fmt: skip
+    at_the_band = GaugeStuck(THRESHOLDS)
+    at_the_band.update(0.0, 0.0)
+    assert at_the_band.update(at_the_band._band_m, 2 * volume_m) == Finding.LEVEL_STUCK
+
+
+def test_gauges_that_both_stand_still_or_both_move_are_sound() -> None:
+    assert not any(gauges(*[(0.3, -0.3)] * 1000))
+    for other in (-1.0, -0.3, 0.5):
+        moving = [(math.sin(0.1 * k), other * math.sin(0.1 * k)) for k in range(1000)]
+        assert not any(gauges(*moving))
+    # one that has moved again is judged from there
+    band_m, volume_m = THRESHOLDS.level_still_m, THRESHOLDS.volume_m
+    moves_m = 0.9 * volume_m
+    assert not any(gauges(*[(0.0, 0.0)], *[(0.0, moves_m)] * 20, *[(0.1, 0.0)] * 20))
+    # within the band of its own noise it has not moved
+    for moves, found in ((1.4, Finding.LEVEL_STUCK), (1.45, 0)):
+        assert gauges((0.0, 0.0), (moves * band_m, 9.0 * volume_m))[1] == found

@@ -1,0 +1,273 @@
+"""The sums of roll and integrated rate, from closed forms and by hand."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from moving_ship import THRESHOLDS
+from scipy.integrate import solve_ivp
+
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.motion import RollAgainstRate, Stuck
+from utank_hil.safety.monitors.thresholds import MonitorThresholds
+
+D = 1 / 64
+"""The threshold of the drift, rad."""
+DRIFTS = replace(THRESHOLDS, drift_rad=D, roll_still_rad=1e-9, rate_still_rad_s=1e-9)
+S = 1 / 1024
+SIGNS = replace(THRESHOLDS, drift_rad=1e6, roll_noise_rad=5 * S, rate_still_rad_s=0.5)
+"""A sample's noise is S, and no drift is seen: only the sign is judged."""
+
+
+class Fed:
+    """A monitor that is fed with what the roll moves and what the rate says, at a rate not still.
+
+    Parameters
+    ----------
+    step_s : float
+    """
+
+    def __init__(self, step_s: float, thresholds: MonitorThresholds = DRIFTS) -> None:
+        self.monitor = RollAgainstRate(thresholds)
+        self.step_s, self.roll_rad, self.rate_rad_s = step_s, 0.0, 1.0
+        assert self.monitor.update(0.0, 1.0, 0.0, step_s) == 0
+
+    def __call__(self, moved_rad: float, turned_rad: float = 0.0, *, still: bool = False) -> int:
+        self.roll_rad += moved_rad
+        self.rate_rad_s *= 1 if still else -1
+        return self.monitor.update(self.roll_rad, self.rate_rad_s, turned_rad, self.step_s)
+
+    def to(self, unexplained_rad: float) -> int:
+        """Jump so far that so much is left unexplained."""
+        keep = 1 - self.step_s / 15
+        return self(unexplained_rad / keep - self.monitor.unexplained_rad) & (
+            Finding.DRIFT | Finding.DRIFT_LASTS
+        )
+
+
+DRIFT, LASTS = Finding.DRIFT, Finding.DRIFT | Finding.DRIFT_LASTS
+
+
+@pytest.mark.parametrize("at_s", [20.0, 60.0, 260.0, 600.0])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_of_a_constant_bias_so_much_is_left_as_has_not_been_learned(at_s: float, way: int) -> None:
+    """In a leak of 15 s; it is learned as an average over 30 s and the time, at most 300 s."""
+    bias_rad_s = way * 2e-4
+
+    def slopes(t, state):
+        left, learned = state
+        remains = -bias_rad_s - learned
+        return remains - left / 15, remains / min(30 + t, 300)
+
+    expected_rad = solve_ivp(slopes, (0, at_s), (0.0, 0.0), rtol=1e-8, atol=1e-12).y[0, -1]
+    fed = Fed(0.1)
+    for _ in range(round(at_s / 0.1)):
+        fed(0.0, bias_rad_s * 0.1)
+    assert fed.monitor.unexplained_rad == pytest.approx(expected_rad, rel=0.02)
+    fed.monitor.restart()
+    assert fed.monitor.unexplained_rad == 0.0
+    # what was learned is kept
+    fed.monitor.update(fed.roll_rad, 0.0, 0.0, 0.1)
+    fed(0.0, bias_rad_s * 0.1)
+    remains = 30 / (30 + at_s) if at_s < 270 else 0.1 * math.exp(-(at_s - 270) / 300)
+    left_rad = -remains * bias_rad_s * 0.1 * (1 - 0.1 / 15)
+    assert fed.monitor.unexplained_rad == pytest.approx(left_rad, rel=0.02)
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(("jump", "learns"), [(6.0, False), (-6.0, False), (5.75, True)])
+def test_a_jump_is_learned_as_little_and_nothing_is_while_three_thresholds_are_left(
+    way: int, jump: float, learns: bool
+) -> None:
+    """Steps of half the leak's time: 7.5 s, of which the sum keeps half."""
+    fed = Fed(7.5)
+    fed(way * jump * D)
+    sums = [jump / 2 * D]
+    assert fed.monitor.unexplained_rad == way * sums[0]
+    bias = math.copysign(D / 37.5, jump)
+    for learned_s in (45, None):
+        left = -7.5 * bias
+        sums.append((sums[-1] + left) / 2)
+        if learns and learned_s:
+            bias += left / learned_s
+        fed(0.0)
+        assert fed.monitor.unexplained_rad == pytest.approx(way * sums[-1], rel=1e-12)
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_the_sum_stays_within_six_thresholds_and_forgets_in_fifteen_seconds(way: int) -> None:
+    fed = Fed(7.5)
+    fed(way * 100 * D)
+    assert fed.monitor.unexplained_rad == way * 6 * D
+    fed = Fed(15.0)
+    fed(way * 100 * D)
+    assert fed.monitor.unexplained_rad == 0.0
+    fed = Fed(40.0)
+    fed(way * 100 * D)
+    assert fed.monitor.unexplained_rad == 0.0
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_one_threshold_is_a_drift_and_four_of_the_smoothed_sum_are_too_many(way: int) -> None:
+    for sum_rad, found in ((D, 0), (1.01 * D, DRIFT), (4 * D, DRIFT), (4.01 * D, LASTS)):
+        assert Fed(7.5)(way * 2 * sum_rad) & LASTS == found
+    # smoothed with 0.25 s: 0.32 of the rest in a step of 80 ms
+    fed = Fed(0.08)
+    assert [fed.to(way * 5.9 * D) for _ in range(4)] == [DRIFT, DRIFT, LASTS, LASTS]
+    share = 1 - 0.68**3
+    assert 4 / share < 5.9 < 4 / (1 - 0.68**2)
+
+
+@pytest.mark.parametrize(("dip", "forgets"), [(0.6, False), (0.9, False), (0.45, True)])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_drift_lasts_after_thirty_seconds_that_half_of_it_ends(
+    dip: float, forgets: bool, way: int
+) -> None:
+    fed = Fed(0.5)
+    assert [fed.to(way * 2 * D) for _ in range(61)] == [DRIFT] * 60 + [LASTS]
+    fed = Fed(0.5)
+    assert [fed.to(way * 2 * D) for _ in range(50)] == [DRIFT] * 50
+    assert fed.to(way * dip * D) == 0
+    more = 60 if forgets else 10
+    assert [fed.to(way * 2 * D) for _ in range(more + 1)] == [DRIFT] * more + [LASTS]
+    fed.monitor.restart()
+    fed(0.0)
+    assert [fed.to(way * 2 * D) for _ in range(61)] == [DRIFT] * 60 + [LASTS]
+
+
+def forgetting(fed: Fed, way: int) -> None:
+    """Leave four thresholds unexplained until the bias is forgotten, after a minute beyond three.
+
+    In the first step nothing is unexplained yet.
+    """
+    left = []
+    while not left or left[-1] > 3 * D:
+        fed.to(way * 4 * D)
+        left.append(abs(fed.monitor.unexplained_rad))
+    assert len(left) == 122
+
+
+def lasting(fed: Fed) -> int:
+    """For how many steps without anything new the drift is still found."""
+    return next(count for count in range(200) if not fed(0.0))
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_bias_that_explains_nothing_for_a_minute_is_forgotten(way: int) -> None:
+    fed = Fed(0.5)
+    for _ in range(100):
+        fed.to(way * 4 * D)
+    fed.to(0.0)
+    forgetting(fed, way)  # the first minute was not whole
+    # thirty seconds of agreement, the step of the forgetting among them
+    assert lasting(fed) == 59
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize("agreed", [0, 20, 57])
+def test_a_drift_among_the_thirty_seconds_of_agreement_begins_them_anew(
+    way: int, agreed: int
+) -> None:
+    fed = Fed(0.5)
+    forgetting(fed, way)
+    assert [fed.to(0.0) for _ in range(agreed)] == [LASTS] * agreed
+    assert fed.to(way * 1.5 * D) == LASTS
+    fed.to(0.0)
+    assert lasting(fed) == 59
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.97, False), (1.03, True)])
+def test_noise_of_the_roll_is_its_second_difference_over_the_square_root_of_six(
+    share: float, found: bool
+) -> None:
+    """Of a roll that goes to and fro by a the second difference is 4 a."""
+    noisy = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=0.01)
+    a, fed = share * math.sqrt(6) * 0.01 / 4, Fed(0.7, noisy)
+    last = [fed(2 * a * (-1) ** k, 2 * a * (-1) ** k) for k in range(20)][-1]
+    assert last & Finding.NOISE == (Finding.NOISE if found else 0)
+    assert fed.monitor.noise.power == pytest.approx((4 * a) ** 2)
+    # of a new roll after a gap there is none
+    fed.monitor.restart()
+    fed.monitor.update(1.0, 0.0, 0.0, 0.7)
+    fed.monitor.update(1.0, 0.0, 0.0, 0.7)
+    assert fed.monitor.noise.power == 0.0
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_signal_is_stuck_after_a_while_within_its_band_with_too_much_left(way: int) -> None:
+    def judged(*samples: tuple[float, float], keep: float = 1.0, step_s: float = 0.4) -> list[bool]:
+        stuck = Stuck(0.25, 0.5)
+        assert stuck.still_s == 0.0
+        assert stuck.update(3.0, 9.0, keep, step_s) is False
+        return [stuck.update(value, way * left, keep, step_s) for value, left in samples]
+
+    assert judged((3.25, 0.5), (2.75, 0.0), (3.0, 0.0)) == [False] * 3  # not more than the limit
+    assert judged((3.25, 0.5), (2.75, 0.125)) == [False, True]
+    assert judged((3.0, 0.5), (3.26, 9.0), (3.0, 9.0), (3.0, 0.5), (3.0, 0.125)) == [
+        False, False, False, False, True,
+    ]  # fmt: skip
+    assert judged((3.0, 1.0), (3.0, 1.0), step_s=0.7) == [False, True]
+    assert judged((3.0, 1.0), (3.0, 0.25), (3.0, 0.5), keep=0.5) == [False, False, False]
+    assert judged((3.0, 1.0), (3.0, 1.0), keep=0.5) == [False, True]
+
+
+def test_a_jump_is_half_a_threshold_of_what_a_still_signal_leaves() -> None:
+    fed = Fed(0.4)
+    found = [fed(10 * D, still=True) & Finding.RATE_STUCK for _ in range(4)]
+    assert found == [0, 0, 0, Finding.RATE_STUCK]
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_stuck_signal_is_found_when_more_is_left_than_its_threshold(way: int) -> None:
+    """Of a roll, with the band that a wrong rate would leave: four times the still roll more."""
+    moves = replace(THRESHOLDS, drift_rad=D, roll_still_rad=D, rate_still_rad_s=1e-3)
+    for roll_stands, rate_stands in ((True, False), (False, True), (False, False)):
+        fed, found = Fed(0.05, moves), []
+        for k in range(200):
+            x = way * 0.05 * D
+            # the roll is moved to and fro by what is more than its band
+            swing = 0.0 if roll_stands else 3 * D * (-1) ** k
+            left = x if roll_stands else 0.0
+            moved = swing + (0.0 if roll_stands else x)
+            found.append(fed(moved, swing + left, still=rate_stands))
+        first = {
+            what: next((k + 1 for k, each in enumerate(found) if each & what), None)
+            for what in (Finding.ROLL_STUCK, Finding.RATE_STUCK)
+        }
+
+        # 1 D/s, of which 30 / (30 + t) is not yet learned, up to three thresholds, and a leak
+        def steps_to(limit: float) -> float:
+            left, t, learned_s = 0.0, 0.0, 0.0
+            while left <= limit:
+                learned_s = t if left < 3 else learned_s
+                left += 0.01 * (30 / (30 + learned_s) - left / 15)
+                t += 0.01
+            return t / 0.05
+
+        if roll_stands:
+            assert first[Finding.ROLL_STUCK] == pytest.approx(steps_to(5.0), abs=3)
+        else:
+            assert first[Finding.ROLL_STUCK] is None
+        if rate_stands:
+            assert first[Finding.RATE_STUCK] == pytest.approx(steps_to(1.0), abs=3)
+        else:
+            assert first[Finding.RATE_STUCK] is None
+
+
+def test_where_the_rate_stands_still_for_longer_the_sign_is_not_judged() -> None:
+    fed = Fed(0.35, SIGNS)
+    found = []
+    for still in (False, True, True, True, False):
+        fed(-8 * S, 8 * S, still=still)
+        found.append(fed.monitor.sign.sum)
+    # 0.7 s is not longer
+    assert found == [5.0, 10.0, 15.0, 15.0, 16.0]
+
+
+def test_a_gap_begins_the_test_of_the_sign_anew() -> None:
+    fed = Fed(0.35, SIGNS)
+    for _ in range(3):
+        fed(-8 * S, 8 * S)
+    assert fed.monitor.sign.sum > 0
+    fed.monitor.restart()
+    assert fed.monitor.sign.sum == 0.0

@@ -1,0 +1,295 @@
+import math
+from dataclasses import replace
+
+import pytest
+from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
+
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.level_stuck import LevelStuck
+from utank_hil.safety.monitors.tank_equation import TankEquation, roll_push_at_natural_frequency
+
+STEP_S = 0.1
+FAULT_S = 60.0
+T = THRESHOLDS.roll_period_s
+
+
+def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding, float]:
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
+    first: dict[Finding, float] = {}
+    for k in range(round((FAULT_S + until_s) / STEP_S)):
+        t = k * STEP_S
+        sample = [ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t)]
+        if t >= FAULT_S:
+            sample = fault(t, *sample)
+        found = equation.update(*sample) | stuck.update(*sample)
+        for finding in Finding:
+            if found & finding:
+                first.setdefault(finding, t - FAULT_S)
+    return first
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3, 35e3])
+@pytest.mark.parametrize("frequency_rad_s", [0.45, 0.6, 1.0])
+def test_water_that_obeys_its_equation_is_left_alone(
+    roll_deg: float, pressure_pa: float, frequency_rad_s: float
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
+    assert not found_after(ship, lambda _, *sample: sample, 120.0)
+
+
+def test_water_at_rest_under_a_steady_heel_and_pressure_is_not_stuck() -> None:
+    """A heel pushes less than a roll of its amplitude: the water does not swing with it."""
+    stuck = LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S)
+    heel_rad, pressure_pa = 0.1, 20e3
+    level_m = (heel_rad * 9.80665 * TANK.width_m + pressure_pa / 1000) / (2 * 9.80665)
+    found = [stuck.update(heel_rad * min(k / 600, 1), 0.01 * k, 0.0) for k in range(600)]
+    found += [stuck.update(heel_rad, level_m, pressure_pa) for _ in range(600)]
+    assert not any(found)
+
+
+ZEROS = (math.radians(0.3), 0.044, 870.0)
+"""Each pushes the water as much as all zeros together may."""
+
+
+@pytest.mark.parametrize("roll_deg", [0.3, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("pressure_pa", [0.0, 6e3, 30e3])
+@pytest.mark.parametrize("frequency_rad_s", [0.45, 0.6])
+@pytest.mark.parametrize("sensor", [0, 1, 2])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_zeros_of_the_sensors_are_no_wrong_sign_no_delay_and_nothing_stuck(
+    roll_deg: float, pressure_pa: float, frequency_rad_s: float, sensor: int, way: int
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), pressure_pa, frequency_rad_s)
+    monitors = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+                LevelStuck(SHIP, TANK, THRESHOLDS, STEP_S))  # fmt: skip
+    for k in range(900):
+        sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
+        sample[sensor] += way * ZEROS[sensor]
+        assert not any(monitor.update(*sample) for monitor in monitors)
+
+
+def test_zeros_explain_a_standing_roll_only_as_far_as_they_go() -> None:
+    """Water that is pushed by a constant and a wave, under a roll that does not move."""
+    for times, explained in ((0.9, True), (3.0, False)):
+        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+        level_m = times * THRESHOLDS.zero_push_m2_s2 / (2 * 9.80665)
+        found = [equation.update(0.0, level_m, 0.0) for _ in range(900)]
+        assert (Finding.ROLL_STUCK in Finding(found[-1])) is not explained
+
+
+def test_gains_are_one_and_the_delay_is_the_delay() -> None:
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
+    ship, equation = MovingShip(), TankEquation(SHIP, TANK, exact, STEP_S)
+    late_s = 0.4
+    for k in range(1000):
+        t = k * STEP_S
+        equation.update(ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+    assert equation.roll_gain == pytest.approx(1, abs=0.1)
+    assert equation.pump_gain == pytest.approx(1, abs=0.02)
+    assert equation.level_gain == pytest.approx(1, abs=0.02)
+    assert equation.late_s == pytest.approx(0, abs=0.1)
+    for k in range(1000, 2000):
+        t = k * STEP_S
+        equation.update(ship.roll_rad(t - late_s), ship.level_m(t), ship.pressure_pa(t))
+    assert equation.late_s == pytest.approx(late_s, abs=0.1)
+
+
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+def test_sign_of_the_motion_sensor_is_found_in_one_roll_period_of_half_a_degree(
+    pressure_pa: float,
+) -> None:
+    ship = MovingShip(math.radians(0.5), pressure_pa)
+    found = found_after(ship, lambda _, roll, level, pressure: (-roll, level, pressure))
+    assert found[Finding.WATER_SIGN] <= T
+
+
+def test_too_little_roll_tells_nothing_and_says_nothing() -> None:
+    ship = MovingShip(math.radians(0.1), 0.0)
+    assert not found_after(ship, lambda _, roll, *rest: (-roll, *rest))
+
+
+def test_swapped_gauges_are_found_within_a_period() -> None:
+    found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, -level, pressure))
+    assert found[Finding.WATER_SIGN] <= T
+
+
+def test_pressure_of_the_wrong_sign_is_found_within_a_period() -> None:
+    found = found_after(MovingShip(), lambda _, roll, level, pressure: (roll, level, -pressure))
+    assert found[Finding.PUMP_SIGN] <= T
+
+
+def test_levels_that_stand_still_are_found_within_five_seconds() -> None:
+    ship = MovingShip()
+    for shift_s in (0.0, 1.0, 2.0, 3.0, 4.0):
+        at = MovingShip(noise=False).level_m(FAULT_S + shift_s)
+
+        def stick(t, roll, level, pressure, at=at, shift_s=shift_s):
+            return roll, at if t >= FAULT_S + shift_s else level, pressure
+
+        assert found_after(ship, stick)[Finding.LEVEL_STUCK] - shift_s <= 5.0
+
+
+@pytest.mark.parametrize("stands_deg", [0.0, 1.4])
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+def test_a_roll_that_stands_still_with_its_rate_is_told_by_the_water(
+    pressure_pa: float, stands_deg: float
+) -> None:
+    """Roll and rate agree then, and no sign is wrong: a dead sensor may go on sending zeros."""
+    stands_rad = math.radians(stands_deg)
+    ship = MovingShip(math.radians(1.0), pressure_pa)
+    found = found_after(ship, lambda _, roll, *rest: (stands_rad, *rest))
+    assert found[Finding.ROLL_STUCK] <= 1.25 * T
+    calm = MovingShip(math.radians(0.2), pressure_pa)
+    assert Finding.ROLL_STUCK not in found_after(calm, lambda _, roll, *rest: (0.0, *rest))
+
+
+@pytest.mark.parametrize("pressure_pa", [0.0, 10e3])
+@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
+def test_a_frozen_roll_is_told_sooner_and_where_less_is_unexplained(
+    pressure_pa: float, phase: float
+) -> None:
+    """Samples that are all the same hold no noise that could explain it."""
+
+    def found_s(roll_deg: float, *, stands: bool, frozen: bool) -> float:
+        ship = MovingShip(math.radians(roll_deg), pressure_pa)
+        equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+        fault_s = FAULT_S + phase * 2 * math.pi / ship.w
+        at_rad = MovingShip(math.radians(roll_deg), noise=False).roll_rad(fault_s)
+        for k in range(round((fault_s + 2 * T) / STEP_S)):
+            t = k * STEP_S
+            roll_rad = at_rad if stands and t >= fault_s else ship.roll_rad(t)
+            said = frozen and t >= fault_s + 1.0
+            if equation.update(roll_rad, ship.level_m(t), ship.pressure_pa(t), frozen=said):
+                return t - fault_s
+        return math.inf
+
+    assert found_s(1.0, stands=True, frozen=True) <= 2.5
+    assert found_s(0.4, stands=True, frozen=True) <= 3.5
+    assert found_s(0.4, stands=True, frozen=False) == math.inf
+    # a sensor without noise on a ship that does lie still
+    assert found_s(0.0, stands=True, frozen=True) == math.inf
+    assert found_s(1.0, stands=False, frozen=True) == math.inf
+
+
+@pytest.mark.parametrize("shift_s", [0.0, 1.3, 5.2, 6.5])
+def test_gauges_that_jump_say_nothing_of_the_motion_sensor(shift_s: float) -> None:
+    ship = MovingShip(math.radians(2.0), 5e3)
+
+    def swap(t, roll, level, pressure):
+        return roll, -level if t >= FAULT_S + shift_s else level, pressure
+
+    found = found_after(ship, swap, shift_s + T)
+    assert found[Finding.WATER_SIGN] - shift_s <= 2.0
+    assert Finding.MOTION_LATE not in found
+
+
+def test_delay_of_two_seconds_is_found_and_of_100_ms_is_not() -> None:
+    ship = MovingShip(math.radians(2.0), 5e3)
+
+    def late(delay_s):
+        return lambda t, roll, level, pressure: (ship.roll_rad(t - delay_s), level, pressure)
+
+    assert found_after(ship, late(2.0))[Finding.MOTION_LATE] <= 2 * T
+    assert not found_after(ship, late(0.1))
+
+
+def test_no_delay_is_judged_by_little_more_than_the_least_push() -> None:
+    """In calm seas the sensors' noise looked like one in the course of an hour."""
+    w0 = TANK.natural_frequency_rad_s
+    least_rad = THRESHOLDS.least_roll_push_m2_s2 / roll_push_at_natural_frequency(SHIP, TANK)
+    for times, judged in ((1.6, False), (3.0, True)):  # the filters take a fifth
+        ship, equation = (
+            MovingShip(times * least_rad, 0.0, w0),
+            TankEquation(SHIP, TANK, THRESHOLDS, STEP_S),
+        )
+        late = []
+        for k in range(1200):
+            t = k * STEP_S
+            equation.update(ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+            late.append(equation.late_s)
+        assert math.isfinite(late[-1]) is judged
+
+
+def test_restart_forgets() -> None:
+    ship, equation = MovingShip(), TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    for k in range(600):
+        t = k * STEP_S
+        found = equation.update(-ship.roll_rad(t), ship.level_m(t), ship.pressure_pa(t))
+    assert found
+    equation.restart()
+    assert math.isnan(equation.roll_gain)
+    assert not equation.update(ship.roll_rad(0.0), ship.level_m(0.0), ship.pressure_pa(0.0))
+
+
+@pytest.mark.parametrize("every", [2, 4, 5])
+def test_samples_that_are_left_out_change_little(every: int) -> None:
+    """Half a second is a twentieth of the period: the inputs run nearly straight."""
+    exact = replace(THRESHOLDS, zero_push_m2_s2=0.0)
+    ship = MovingShip(math.radians(2.0), noise=False)
+    whole, gaps = (TankEquation(SHIP, TANK, exact, STEP_S) for _ in range(2))
+    for k in range(1, 1200):
+        sample = (each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa))
+        roll, level, pressure = sample
+        whole.update(roll, level, pressure)
+        if k % every == 0:
+            gaps.update(roll, level, pressure, every)
+    assert gaps.roll_gain == pytest.approx(whole.roll_gain, abs=0.05)
+    assert gaps.pump_gain == pytest.approx(whole.pump_gain, abs=0.05)
+    assert gaps.level_gain == pytest.approx(whole.level_gain, abs=0.02)
+    assert gaps.late_s == pytest.approx(whole.late_s, abs=0.02)
+
+
+def test_inputs_run_straight_over_the_steps_that_are_left_out() -> None:
+    apart, together = (TankEquation(SHIP, TANK, THRESHOLDS, STEP_S) for _ in range(2))
+    for k in range(100):
+        found = [apart.update(0.01 * k, 0.02 * k, 300.0 * k), 0]
+        if k % 4 == 0:
+            found[1] = together.update(0.01 * k, 0.02 * k, 300.0 * k, 4)
+            assert found[0] == found[1]
+            assert together.roll_gain == pytest.approx(apart.roll_gain, nan_ok=True)
+            assert together._dd == pytest.approx(apart._dd)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 3.0, 30.0])
+def test_it_has_settled_after_six_time_constants_and_after_a_gap_again(seconds: float) -> None:
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    settles_s = 6 * T / (4 * math.pi)
+    assert not equation.settled
+    for k in range(round(seconds / STEP_S)):
+        equation.update(0.0, 0.0, 0.0)
+        assert equation.settled is (k * STEP_S >= settles_s)
+    # a full reservoir ends the judging, not the watch
+    equation.update(0.0, 0.99 * TANK.level_limit_m, 0.0)
+    assert equation.settled is (seconds > settles_s)
+    equation.restart()
+    assert not equation.settled
+
+
+@pytest.mark.parametrize(
+    ("fault", "obeyed"),
+    [
+        (lambda roll, level, pressure: (roll, level, pressure), True),
+        (lambda roll, level, pressure: (-roll, level, pressure), False),
+        (lambda roll, level, pressure: (roll, -level, pressure), False),
+    ],
+)
+@pytest.mark.parametrize("roll_deg", [0.1, 0.25, 0.5, 1.0, 4.0])
+@pytest.mark.parametrize("zero", range(-3, 4))
+def test_no_zero_makes_a_wrong_sensor_look_obeyed(
+    fault, obeyed: bool, roll_deg: float, zero: int
+) -> None:
+    ship = MovingShip(math.radians(roll_deg), 0.0, noise=False)
+    equation = TankEquation(SHIP, TANK, THRESHOLDS, STEP_S)
+    seen = []
+    for k in range(600):
+        sample = [each(k * STEP_S) for each in (ship.roll_rad, ship.level_m, ship.pressure_pa)]
+        sample = list(fault(*sample))
+        sample[abs(zero) % 3] += math.copysign(1, zero) * ZEROS[abs(zero) % 3] if zero else 0.0
+        equation.update(*sample)
+        seen.append(equation.obeyed)
+    if not obeyed or roll_deg == 0.1:
+        assert not any(seen)
+    elif roll_deg >= 1.0:
+        assert any(seen)

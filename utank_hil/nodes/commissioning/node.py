@@ -1,0 +1,264 @@
+"""The commissioning as a node: a controller node whose law gives pulses, and what looks on."""
+
+from collections.abc import Iterable
+from enum import Enum
+from operator import attrgetter
+from typing import Final
+
+import numpy as np
+
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus import Frame, Mode
+from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.interface import PRESSURE, VALVE
+from utank_hil.nodes.commissioning.checks import (
+    Check,
+    Record,
+    judge_rest,
+    judge_valve,
+)
+from utank_hil.nodes.commissioning.pulse_checks import judge_pulses
+from utank_hil.nodes.commissioning.pulses import PulseLaw, PulsePlan, ValveStroke
+from utank_hil.nodes.controller import ControllerNode
+from utank_hil.safety.faults import fault_text
+
+ROW_TICKS: Final = 5
+ROW_S: Final = ROW_TICKS * TICK_S
+"""A row is the mean of so much time, also where the loop left out a tick of it."""
+REST_S: Final = 20.0
+SETTLE_S: Final = 1.0
+"""From ACTIVE to the first pulse."""
+STALE_MS: Final = 100.0
+"""A motion sensor that is silent for longer is not commissioned."""
+MOST_OVER_PLAN: Final = 3.0
+"""A level so many times the plan's ends the pulses."""
+
+_ALWAYS: Final = {
+    "roll_rad": "inbox.roll_rad",
+    "roll_rate_rad_s": "inbox.roll_rate_rad_s",
+    "port_level_m": "inbox.port_level_m",
+    "starboard_level_m": "inbox.starboard_level_m",
+    "high_level": "seen.high_level",
+}
+_OF_PUMP: Final = {"pressure_pa": "inbox.pressure_pa", "command_pa": "command_pa"}
+# each sensor by itself, whichever is in use
+_OF_PAIR: Final = {
+    "roll_rad": "inbox.motions.first.roll_rad",
+    "roll_rate_rad_s": "inbox.motions.first.roll_rate_rad_s",
+    "roll_2_rad": "inbox.motions.second.roll_rad",
+    "roll_rate_2_rad_s": "inbox.motions.second.roll_rate_rad_s",
+}
+_OF_VALVE: Final = {"valve_opening": "inbox.valve_opening"}
+
+
+class Stage(Enum):
+    """Where a commissioning stands, with what the operator is to know of it."""
+
+    WAITING = "Waiting until the controller is ready."
+    REST = "Measuring the zeros. Keep the ship still."
+    ARM = "The zeros are right. Arm at the panel: pump and valve will move a little."
+    MOVING = "Pump and valve move a little. Stop or disarm at the panel ends it."
+    DONE = "Done."
+
+
+class CommissioningNode:
+    """Leads through a commissioning; on the bus it is the controller.
+
+    Parameters
+    ----------
+    node : ControllerNode
+        With `law` in it.
+    law : PulseLaw
+    plant : DesignPlant
+        As the files describe it.
+    plan : PulsePlan, optional
+        If the tank has a pump.
+    stroke : ValveStroke, optional
+        If it has a valve.
+    volume_m : float
+        Sum of both levels at which the volume's monitor speaks.
+
+    Attributes
+    ----------
+    node : ControllerNode
+    stage : Stage
+    rest, moved : Record
+        What was recorded at rest, and from ACTIVE on; empty before.
+    ended : str
+        Why it ended before its time, in words; else empty.
+    """
+
+    name = "controller"
+    period_ns = TICK_NS
+
+    def __init__(
+        self,
+        node: ControllerNode,
+        law: PulseLaw,
+        plant: DesignPlant,
+        *,
+        plan: PulsePlan | None,
+        stroke: ValveStroke | None,
+        volume_m: float,
+    ) -> None:
+        self.node = node
+        self._law = law
+        self._plant = plant
+        self._plan = plan
+        self._stroke = stroke
+        self._volume_m = volume_m
+        self._pulses_s = 0.0 if plan is None else plan.duration_s
+        self._moving_s = self._pulses_s + (0.0 if stroke is None else stroke.duration_s)
+        sources = dict(_ALWAYS)
+        if plan is not None:
+            sources |= _OF_PUMP
+        if node.inbox.motions is not None:
+            sources |= _OF_PAIR
+        if stroke is not None:
+            sources |= _OF_VALVE
+        self._names = tuple(sources)
+        self._values = attrgetter(*sources.values())
+        self.stage = Stage.WAITING
+        self.ended = ""
+        self._since_ns = 0
+        self.rest: Record = {}
+        self.moved: Record = {}
+        self._rows: list[FloatArray] = []
+        self._sum = np.zeros(len(self._names))
+        self._ticks = 0
+
+    def checks(self) -> list[Check]:
+        """Judge what was recorded; takes tens of milliseconds, so not while the loop runs."""
+        if not self.rest:
+            return []
+        checks = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
+        whole = bool(self.moved) and not self.ended
+        begin = round(SETTLE_S / ROW_S)
+        end = begin + round(self._pulses_s / ROW_S)
+        record, plan, stroke = self.moved, self._plan, self._stroke
+        rows = len(record.get("roll_rad", ()))
+        if plan is not None and (whole or rows >= begin + plan.period_s / ROW_S):
+            pulses = {name: column[begin:end] for name, column in record.items()}
+            checks += judge_pulses(self.rest, pulses, self._plant, plan, ROW_S)
+        if stroke is not None and (whole or rows >= end + stroke.duration_s / ROW_S - 1):
+            checks += judge_valve(record["valve_opening"][end:], stroke, ROW_S)
+        return checks
+
+    @property
+    def duration_s(self) -> float:
+        """Time that it takes at least, without waiting and arming."""
+        return REST_S + SETTLE_S + self._moving_s
+
+    @property
+    def length_s(self) -> float:
+        """Length of the stage that it is in, where it has one."""
+        return REST_S if self.stage is Stage.REST else SETTLE_S + self._moving_s
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take one frame from the bus."""
+        self.node.receive(frame, now_ns)
+
+    def other_frames(self, count: int) -> None:
+        """Take note of frames of other kinds on the bus."""
+        self.node.other_frames(count)
+
+    def link_error(self, now_ns: int, reason: str) -> None:
+        """Take note that the bus could not be read or written."""
+        self.node.link_error(now_ns, reason)
+
+    def stop(self, now_ns: int) -> Iterable[Frame]:
+        """Leave the pump at zero."""
+        return self.node.stop(now_ns)
+
+    def tick(self, now_ns: int) -> Iterable[Frame]:
+        """Let the controller do its tick, and look at what came of it."""
+        # whoever arms sooner would have the pump move without having been asked to
+        self.node.seen.commissioned = self.stage in (Stage.ARM, Stage.MOVING)
+        frames = self.node.tick(now_ns)
+        if self.stage in (Stage.REST, Stage.MOVING):
+            self._note(now_ns)
+        if self.stage is not Stage.DONE:
+            self._go_on(now_ns)
+        return frames
+
+    @property
+    def missing(self) -> str:
+        """What is not heard that the controller could do without, in words; else empty."""
+        motions, seen = self.node.inbox.motions, self.node.seen
+        if motions is None or max(seen.motion_age_ms, seen.motion_spare_age_ms) <= STALE_MS:
+            return ""
+        return "A motion sensor is silent. Check the supply and bus connection of both."
+
+    def _note(self, now_ns: int) -> None:
+        self._sum += self._values(self.node)
+        self._ticks += 1
+        # a loop held up for more than two rows lost the echo of drive or valve, and begins anew
+        missing = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS) - len(self._rows)
+        if missing > 0:
+            self._rows += [self._sum / self._ticks] * missing
+            self._sum = np.zeros(len(self._names))
+            self._ticks = 0
+
+    def _enter(self, stage: Stage, now_ns: int) -> None:
+        self.stage = stage
+        self._since_ns = now_ns
+        self._rows = []
+        self._sum = np.zeros(len(self._names))
+        self._ticks = 0
+
+    def _record(self) -> Record:
+        rows = np.array(self._rows).reshape(-1, len(self._names))
+        return dict(zip(self._names, rows.T, strict=True))
+
+    def _go_on(self, now_ns: int) -> None:
+        mode = self.node.mode
+        passed_s = (now_ns - self._since_ns) * 1e-9
+        if self.stage is Stage.MOVING:
+            self._move(passed_s - SETTLE_S, now_ns)
+        elif mode in (Mode.INIT, Mode.FAULT) or self.missing:
+            if self.stage is not Stage.WAITING:
+                self._enter(Stage.WAITING, now_ns)
+        elif self.stage is Stage.WAITING:
+            self._enter(Stage.REST, now_ns)
+        elif self.stage is Stage.REST and passed_s >= REST_S:
+            self.rest = self._record()
+            zeros = judge_rest(self.rest, self._plant, self._plan, self._volume_m)
+            passed = all(check.passed for check in zeros)
+            self._enter(Stage.ARM if passed else Stage.DONE, now_ns)
+        elif self.stage is Stage.ARM and mode is Mode.ACTIVE:
+            self._enter(Stage.MOVING, now_ns)
+
+    def _move(self, time_s: float, now_ns: int) -> None:
+        """Command what is due, and end when all is done or something is wrong."""
+        node, plan = self.node, self._plan
+        if node.mode is not Mode.ACTIVE:
+            self.ended = (
+                fault_text(node.fault) if node.mode is Mode.FAULT else "Disarmed before the end."
+            )
+        elif self.missing:
+            self.ended = self.missing
+        elif plan is not None and self._level_m() > MOST_OVER_PLAN * plan.level_m:
+            self.ended = (
+                f"The level went {MOST_OVER_PLAN:g} times as far as planned. Check the gauges' "
+                "scaling, the pump's limits and the ship's file."
+            )
+        if self.ended or time_s >= self._moving_s:
+            self._law.reset()
+            self.moved = self._record()
+            self._enter(Stage.DONE, now_ns)
+        elif time_s >= 0:
+            self._law.set(
+                {
+                    PRESSURE: 0.0 if plan is None else plan.pressure_at(time_s),
+                    VALVE: 0.0
+                    if self._stroke is None
+                    else self._stroke.loss_at(time_s - self._pulses_s),
+                }
+            )
+
+    def _level_m(self) -> float:
+        """How far the level is from where it was at rest."""
+        inbox, rest = self.node.inbox, self.rest
+        at_rest_m = float(rest["starboard_level_m"].mean() - rest["port_level_m"].mean()) / 2
+        return abs(inbox.level_m - at_rest_m)

@@ -1,1 +1,0 @@
-"""The controller on the bus: node, inbox, supervisor, monitors, commissioning, panel."""

@@ -1,0 +1,1 @@
+"""What may be done with the pump: fault table, supervisor, monitors, alarms."""

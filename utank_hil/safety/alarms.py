@@ -1,0 +1,209 @@
+"""The alarm list: an alarm stays until it was accepted and its cause has gone.
+
+    state                      to                         when
+    (not in the list)          ACTIVE_UNACKNOWLEDGED      its cause is there
+    ACTIVE_UNACKNOWLEDGED      ACTIVE_ACKNOWLEDGED        accepted after it was sent
+                               RECTIFIED_UNACKNOWLEDGED   the cause has been gone for `GONE_NS`
+    ACTIVE_ACKNOWLEDGED        (NORMAL, out of the list)  the cause has been gone for `GONE_NS`
+                               ACTIVE_UNACKNOWLEDGED      it is latched, or refuses arming, anew;
+                                                          or it is graver than when accepted
+    RECTIFIED_UNACKNOWLEDGED   ACTIVE_UNACKNOWLEDGED      its cause is there again
+                               (NORMAL, out of the list)  accepted
+
+The terms are those of IEC 62923-1. What raises an alarm is decided elsewhere: `active_faults`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum, auto
+from typing import Final, TypeAlias
+
+from utank_hil.canbus import Alarm, AlarmState, Fault, Mode
+from utank_hil.safety import judging
+from utank_hil.safety.faults import FAULTS
+from utank_hil.safety.observations import Observations
+from utank_hil.safety.supervisor import Supervisor
+
+GONE_NS: Final = 10_000_000_000
+"""A cause that comes back sooner, as with each roll, was never gone."""
+
+_URGENCY: Final = {row.code: place for place, row in enumerate(FAULTS)}
+_UNACCEPTED: Final = (AlarmState.ACTIVE_UNACKNOWLEDGED, AlarmState.RECTIFIED_UNACKNOWLEDGED)
+_NOTHING: Final = Alarm(AlarmState.NORMAL, Fault.NONE, 0, 0, 0, 0.0)
+
+
+class Gravity(IntEnum):
+    """What the cause of an alarm does to the pressure, or would."""
+
+    NOTHING = auto()
+    HALVES = auto()
+    ENDS = auto()
+
+
+Active: TypeAlias = Mapping[Fault, Gravity]
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmEvent:
+    """A state change of an alarm, or a reset that was refused.
+
+    Attributes
+    ----------
+    time_ns : int
+        Time on the node's clock.
+    code : Fault
+    state : AlarmState or None
+        State entered; None: a reset was refused since this lasts.
+    mode : Mode
+        Of the controller.
+    """
+
+    time_ns: int
+    code: Fault
+    state: AlarmState | None
+    mode: Mode
+
+
+@dataclass(slots=True)
+class _Entry:
+    code: Fault
+    state: AlarmState
+    raised_ns: int
+    seen_ns: int
+    gravity: Gravity = Gravity.NOTHING
+    grave_ns: int = 0
+    times_raised: int = 0
+    sent: bool = False
+
+
+class AlarmList:
+    """The alarms of a controller, the most urgent first.
+
+    Attributes
+    ----------
+    unaccepted : bool
+        Whether one waits to be accepted.
+    """
+
+    def __init__(self) -> None:
+        self._entries: dict[Fault, _Entry] = {}
+        self._order: list[_Entry] = []
+        self._place = 0
+        self._new: list[AlarmEvent] = []
+        self.unaccepted = False
+
+    @property
+    def codes(self) -> frozenset[Fault]:
+        """What is in the list."""
+        return frozenset(self._entries)
+
+    def update(self, active: Active, mode: Mode, now_ns: int) -> None:
+        """Take the faults whose cause is there."""
+        entries = self._entries
+        if not active and not entries:
+            return
+        for code, gravity in active.items():
+            entry = entries.get(code)
+            if (
+                entry is None
+                or entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED
+                or (entry.state is AlarmState.ACTIVE_ACKNOWLEDGED and gravity > entry.gravity)
+            ):
+                entry = self.raise_anew(code, mode, now_ns)
+            entry.seen_ns = now_ns
+            if gravity >= entry.gravity or now_ns - entry.grave_ns >= GONE_NS:
+                entry.gravity, entry.grave_ns = gravity, now_ns
+        for entry in tuple(entries.values()):
+            if now_ns - entry.seen_ns >= GONE_NS:
+                if entry.state is AlarmState.ACTIVE_UNACKNOWLEDGED:
+                    self._enter(entry, AlarmState.RECTIFIED_UNACKNOWLEDGED, mode, now_ns)
+                elif entry.state is AlarmState.ACTIVE_ACKNOWLEDGED:
+                    self._enter(entry, AlarmState.NORMAL, mode, now_ns)
+
+    def raise_anew(self, code: Fault, mode: Mode, now_ns: int) -> _Entry:
+        """Raise the alarm of a fault, even if it is accepted and its cause has lasted since."""
+        entry = self._entries.get(code)
+        if entry is None:
+            entry = self._entries[code] = _Entry(code, AlarmState.NORMAL, now_ns, now_ns)
+        entry.raised_ns = entry.seen_ns = now_ns
+        entry.gravity = Gravity.NOTHING
+        entry.times_raised += 1
+        entry.sent = False
+        self._enter(entry, AlarmState.ACTIVE_UNACKNOWLEDGED, mode, now_ns)
+        return entry
+
+    def accept(self, code: int | None, mode: Mode, now_ns: int) -> None:
+        """Accept the alarm of this code, or all for None; of those that a panel can have shown."""
+        for entry in tuple(self._entries.values()):
+            if entry.sent and (code is None or code == entry.code):
+                if entry.state is AlarmState.ACTIVE_UNACKNOWLEDGED:
+                    self._enter(entry, AlarmState.ACTIVE_ACKNOWLEDGED, mode, now_ns)
+                elif entry.state is AlarmState.RECTIFIED_UNACKNOWLEDGED:
+                    self._enter(entry, AlarmState.NORMAL, mode, now_ns)
+
+    def reset_refused(self, code: Fault, mode: Mode, now_ns: int) -> None:
+        """Note that a reset was refused, and why."""
+        self._new.append(AlarmEvent(now_ns, code, None, mode))
+
+    def next_message(self, now_ns: int) -> Alarm:
+        """The alarm that is due to be sent: one after the other."""
+        if not self._order:
+            return _NOTHING
+        place = self._place % len(self._order)
+        self._place = place + 1
+        entry = self._order[place]
+        entry.sent = True
+        age_s = (now_ns - entry.raised_ns) * 1e-9
+        return Alarm(
+            entry.state, entry.code, place, len(self._order), min(entry.times_raised, 254), age_s
+        )
+
+    def take_events(self) -> list[AlarmEvent]:
+        """What happened since the last call."""
+        events, self._new = self._new, []
+        return events
+
+    def _enter(self, entry: _Entry, state: AlarmState, mode: Mode, now_ns: int) -> None:
+        entry.state = state
+        if state is AlarmState.ACTIVE_ACKNOWLEDGED:
+            entry.times_raised = 0  # since it was last accepted
+        if state is AlarmState.NORMAL:
+            del self._entries[entry.code]
+        self._new.append(AlarmEvent(now_ns, entry.code, state, mode))
+        self._order = sorted(
+            self._entries.values(),
+            key=lambda each: (each.state not in _UNACCEPTED, _URGENCY.get(each.code, 0)),
+        )
+        self.unaccepted = any(each.state in _UNACCEPTED for each in self._order)
+
+
+def active_faults(
+    supervisor: Supervisor, seen: Observations, law_fault: Fault
+) -> dict[Fault, Gravity]:
+    """Faults whose cause is there, or which are latched.
+
+    What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
+    what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. Why
+    arming was refused counts as long as it would be.
+    """
+    mode, fault, limits = supervisor.mode, supervisor.fault, supervisor.limits
+    found = dict.fromkeys({law_fault, *judging.all_warning(seen, limits)}, Gravity.NOTHING)
+    # in STANDBY it says why arming was refused, which may be some time ago
+    if mode is Mode.INIT or fault in judging.all_refusing(seen, limits):
+        found[fault] = Gravity.NOTHING
+    if mode in (Mode.ACTIVE, Mode.FAULT):
+        found |= dict.fromkeys(judging.all_halving(seen, limits), Gravity.HALVES)
+        found |= dict.fromkeys(judging.all_ending(seen, limits), Gravity.ENDS)
+    else:
+        found |= dict.fromkeys(all_stopping(supervisor, seen), Gravity.ENDS)
+    if mode is Mode.FAULT:
+        found[fault] = Gravity.ENDS
+    found.pop(Fault.NONE, None)
+    return found
+
+
+def all_stopping(supervisor: Supervisor, seen: Observations) -> set[Fault]:
+    """What would stop the pump now, in INIT but for what is awaited."""
+    if supervisor.mode is Mode.INIT:
+        return judging.all_stopping_unawaited(seen, supervisor.limits)
+    return judging.all_stopping(seen, supervisor.limits)

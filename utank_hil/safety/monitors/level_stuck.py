@@ -1,0 +1,98 @@
+"""A level that stands still although it is pushed.
+
+While the measured level stays within a band, the water is computed from where it began, at rest, by
+the tank's equation. Water that does move may cross the band to its turning point and back; in that
+time the computed level moves four bands, and some more by the noise. Sixteen are a level that is
+stuck.
+"""
+
+import math
+from typing import Final
+
+from utank_hil.dynamics.linear import coupled_matrices
+from utank_hil.dynamics.ship import RollShip
+from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
+from utank_hil.safety.monitors.finding import Finding
+from utank_hil.safety.monitors.tank_equation import roll_push_at_natural_frequency
+from utank_hil.safety.monitors.thresholds import MonitorThresholds
+
+BANDS: Final = 16.0
+
+GAUGE_BANDS: Final = 8.0
+_LEVEL_STUCK: Final = int(Finding.LEVEL_STUCK)
+
+
+class GaugeStuck:
+    """One gauge that stands still while the other one moves: both show the same water.
+
+    Noise of the other one looks the same, so that it counts only where their sum is wrong, too.
+
+    Parameters
+    ----------
+    thresholds : MonitorThresholds
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        # a level of its own has more noise than the mean of both
+        self._band_m = math.sqrt(2) * thresholds.level_still_m
+        self._moved_m = max(thresholds.volume_m, GAUGE_BANDS * thresholds.level_still_m)
+        self._still_m = self._least_m = self._most_m = math.inf
+
+    def update(self, gauge_m: float, other_m: float) -> int:
+        """Take the level of both; return what was found of the first."""
+        if abs(gauge_m - self._still_m) > self._band_m:
+            self._still_m = gauge_m
+            self._least_m = self._most_m = other_m
+        self._least_m = min(self._least_m, other_m)
+        self._most_m = max(self._most_m, other_m)
+        return _LEVEL_STUCK if self._most_m - self._least_m > self._moved_m else 0
+
+
+class LevelStuck:
+    """The measured level against water that is free to move.
+
+    Parameters
+    ----------
+    ship : RollShip
+    tank : Tank
+    thresholds : MonitorThresholds
+    period_s : float
+        Time between two updates.
+    """
+
+    def __init__(
+        self, ship: RollShip, tank: Tank, thresholds: MonitorThresholds, period_s: float
+    ) -> None:
+        water_kg_m = tank.density_kg_m3 * tank.reservoir_area_m2
+        push = roll_push_at_natural_frequency(ship, tank)
+        stiffness = coupled_matrices(ship, tank)[2][1, 0]
+        self._push, self._steady_push = push, -stiffness / water_kg_m
+        self._mean_share = period_s * tank.natural_frequency_rad_s / (2 * math.pi)
+        self._mean_rad = 0.0
+        self._density = tank.density_kg_m3
+        self._band_m = thresholds.level_still_m
+        self._period_s = period_s
+        self._inertia = tank.effective_length_m
+        self._loss = tank.loss_pa_per_m_s / tank.density_kg_m3
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew after a gap."""
+        self._level_m = math.inf
+        self._moved_m = self._rate_m_s = 0.0
+
+    def update(self, roll_rad: float, level_m: float, pressure_pa: float) -> int:
+        """Take what is measured; return what was found."""
+        # a steady heel pushes otherwise than a roll does
+        self._mean_rad += self._mean_share * (roll_rad - self._mean_rad)
+        if abs(level_m - self._level_m) > self._band_m:
+            self._level_m = level_m
+            self._moved_m = self._rate_m_s = 0.0
+            return 0
+        level_m = self._level_m + self._moved_m
+        pushed = self._push * (roll_rad - self._mean_rad) + self._steady_push * self._mean_rad
+        pushed += pressure_pa / self._density
+        pushed -= self._loss * self._rate_m_s + 2 * GRAVITY_M_S2 * level_m
+        self._rate_m_s += pushed / self._inertia * self._period_s
+        self._moved_m += self._rate_m_s * self._period_s
+        return _LEVEL_STUCK if abs(self._moved_m) > BANDS * self._band_m else 0
