@@ -9,8 +9,6 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.identification import (
     IdentificationError,
     era,
-    era_dc,
-    era_with_observer,
     hankel_singular_values,
     okid,
     order_from_singular_values,
@@ -24,11 +22,10 @@ def _noisy_markov(seed: int, order: int = 60) -> FloatArray:
     ).markov
 
 
-@pytest.mark.parametrize("realize", [era, era_dc])
-def test_exact_markov_parameters_give_the_system_back(realize) -> None:  # type: ignore[no-untyped-def]
+def test_exact_markov_parameters_give_the_system_back() -> None:
     truth = plant()
-    assert response_error(realize(truth.markov(401), 4, sample_time_s=0.2), truth).max() < 1e-9
-    assert response_error(realize(truth.markov(150), sample_time_s=0.2), truth).max() < 1e-9
+    assert response_error(era(truth.markov(401), 4, sample_time_s=0.2), truth).max() < 1e-9
+    assert response_error(era(truth.markov(150), sample_time_s=0.2), truth).max() < 1e-9
 
 
 def test_feed_through_and_any_shape_come_through() -> None:
@@ -77,14 +74,6 @@ def test_scaling_of_outputs_and_inputs_does_not_matter() -> None:
     np.testing.assert_allclose(np.sort_complex(one.poles()), np.sort_complex(other.poles()))
 
 
-def test_data_correlations_average_over_lags() -> None:
-    truth = plant()
-    error = np.mean(
-        [response_error(era_dc(_noisy_markov(s), 4, sample_time_s=0.2), truth) for s in range(3)]
-    )
-    assert error < 0.01
-
-
 def test_bad_requests_are_refused() -> None:
     markov = plant().markov(101)
     with pytest.raises(ValueError, match="from 1 to 4"):
@@ -95,10 +84,5 @@ def test_bad_requests_are_refused() -> None:
         era(markov[:, :, 0], sample_time_s=0.2)
     with pytest.raises(ValueError, match="finite"):
         era(markov * np.nan, sample_time_s=0.2)
-    with pytest.raises(ValueError, match="9 Markov parameters leave no"):
-        era_dc(markov[:9], 2, sample_time_s=0.2)
-    assert era_dc(markov[:10], 4, sample_time_s=0.2).nstates == 4
-    with pytest.raises(ValueError, match="observer_gain must have shape"):
-        era_with_observer(markov, np.zeros((50, 2, 2)), sample_time_s=0.2)
     with pytest.raises(IdentificationError, match="moves no output"):
         era(np.zeros((10, 1, 1)), 1, sample_time_s=0.2)

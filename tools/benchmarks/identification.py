@@ -1,4 +1,4 @@
-"""Identification on its own: speed beside `numpy.linalg.lstsq`, memory, growth, recursive update.
+"""Identification on its own: speed beside `numpy.linalg.lstsq`, memory and growth.
 
 Times are the least of several interleaved runs. tools/peers/compare_identification.py has the
 accuracy, beside published packages.
@@ -22,7 +22,7 @@ from tools.peers.identification_records import (
 )
 from tools.printing import command_line, show
 from utank_hil.base.arrays import FloatArray
-from utank_hil.identification import RecursiveArx, okid
+from utank_hil.identification import okid
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.least_squares import fit
 
@@ -135,29 +135,13 @@ def growth(quick: bool) -> list[dict[str, Any]]:
     return rows
 
 
-def recursive() -> list[dict[str, Any]]:
-    """Time of one update."""
-    u, y = record()
-    rows = []
-    for order in (4, 20, 60, 120):
-        model = RecursiveArx(order, np.std(y, axis=0), np.std(u, keepdims=True), SAMPLE_TIME_S)
-        count = 500
-        for k in range(order + 1):
-            model.update(u[k : k + 1], y[k])
-        start = time.perf_counter()
-        for k in range(order + 1, order + 1 + count):
-            model.update(u[k : k + 1], y[k])
-        rows.append({"order": order, "update_us": (time.perf_counter() - start) / count * 1e6})
-    return rows
-
-
 def main() -> None:
     """Measure and print."""
     parser = command_line(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and shorter measurements")
     arguments = parser.parse_args()
     quick = arguments.quick
-    found = {"speed": speed(quick), "growth": growth(quick), "recursive": recursive()}
+    found = {"speed": speed(quick), "growth": growth(quick)}
     show(found, arguments)
 
 

@@ -42,7 +42,7 @@ from tools.peers.memory import peak_mb
 from tools.peers.published_identification import PUBLISHED, Identify
 from tools.printing import command_line, show
 from utank_hil.base.arrays import FloatArray
-from utank_hil.identification import era, find_disturbance_frequencies, okid, refine
+from utank_hil.identification import era, find_disturbance_frequencies, okid
 from utank_hil.identification.ship_fit import fit_ship
 
 TRUE_ORDER = 4
@@ -55,13 +55,11 @@ ROWS = {  # noise, sea, and (order, block rows) that published methods are tried
 Method = Callable[[FloatArray, FloatArray], Matrices]
 
 
-def realized(order: int, refined: bool, u: FloatArray, y: FloatArray) -> Matrices:
-    """OKID with frequencies found from the data, ERA, and refinement."""
+def realized(order: int, u: FloatArray, y: FloatArray) -> Matrices:
+    """OKID with frequencies found from the data, and ERA."""
     waves = find_disturbance_frequencies(u, y, sample_time_s=SAMPLE_TIME_S)
     result = okid(u, y, order, disturbance_frequencies_rad_s=waves, sample_time_s=SAMPLE_TIME_S)
     system = era(result.markov, TRUE_ORDER, sample_time_s=SAMPLE_TIME_S)
-    if refined:
-        system = refine(system, result, u, y).system
     a, b, c, d = (np.asarray(part) for part in (system.A, system.B, system.C, system.D))
     return a, b, c, d
 
@@ -81,9 +79,8 @@ def physical(order: int, u: FloatArray, y: FloatArray) -> Matrices:
 
 
 OURS: dict[str, Method] = {
-    "OKID p = 120, ERA": partial(realized, 120, False),
-    "OKID p = 200, ERA": partial(realized, 200, False),
-    "OKID p = 120, ERA, refined": partial(realized, 120, True),
+    "OKID p = 120, ERA": partial(realized, 120),
+    "OKID p = 200, ERA": partial(realized, 200),
     "OKID p = 120, physics": partial(physical, 120),
 }
 

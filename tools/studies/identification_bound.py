@@ -33,7 +33,7 @@ from tools.peers.identification_records import (
 from tools.printing import command_line, show
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollShip, Tank
-from utank_hil.identification import era, okid, refine
+from utank_hil.identification import era, okid
 from utank_hil.identification.ship_fit import fit_ship
 from utank_hil.sea import Sea, load_ndbc
 
@@ -130,13 +130,11 @@ def found(u: FloatArray, y: FloatArray) -> dict[str, Matrices]:
     """What each method makes of a record."""
     result = okid(u, y, ORDER, sample_time_s=SAMPLE_TIME_S)
     realized = era(result.markov, 4, sample_time_s=SAMPLE_TIME_S)
-    refined = refine(realized, result, u, y).system
     # begun with a ship of another loading
     ship = dataclasses.replace(SHIP, stiffness_nm_rad=1.4 * SHIP.stiffness_nm_rad)
     fit = fit_ship(result, u, dataclasses.replace(PLANT, ship=ship), MEASURED)
     return {
         "OKID, ERA": matrices(realized),
-        "OKID, ERA, refined": matrices(refined),
         "OKID, ship fit": matrices_of(fit.ship, fit.tank),
     }
 

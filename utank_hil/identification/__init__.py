@@ -5,8 +5,6 @@ No CAN, clocks or files: arrays in, models out.
 
 from utank_hil.identification.disturbance import DisturbanceBasis as DisturbanceBasis
 from utank_hil.identification.era import era as era
-from utank_hil.identification.era import era_dc as era_dc
-from utank_hil.identification.era import era_with_observer as era_with_observer
 from utank_hil.identification.era import hankel_singular_values as hankel_singular_values
 from utank_hil.identification.era import order_from_singular_values as order_from_singular_values
 from utank_hil.identification.errors import IdentificationError as IdentificationError
@@ -25,9 +23,6 @@ from utank_hil.identification.okid import OkidResult as OkidResult
 from utank_hil.identification.okid import arx as arx
 from utank_hil.identification.okid import okid as okid
 from utank_hil.identification.persistence import excitation_order as excitation_order
-from utank_hil.identification.recursive import RecursiveArx as RecursiveArx
-from utank_hil.identification.refinement import Refinement as Refinement
-from utank_hil.identification.refinement import refine as refine
 from utank_hil.identification.ship_fit import ShipFit as ShipFit
 from utank_hil.identification.ship_fit import fit_ship as fit_ship
 from utank_hil.identification.stabilization import StabilizationPoint as StabilizationPoint

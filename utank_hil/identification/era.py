@@ -5,17 +5,16 @@
     H0 = [Y_1 Y_2 ...; Y_2 Y_3 ...; ...] = U S V^T,   H1 = the same, one sample on
     A = S^-1/2 U^T H1 V S^-1/2,   B = S^1/2 V^T E_r,   C = E_m^T U S^1/2,   D = Y_0
 
-Juang and Pappa (1985); with data correlations (ERA/DC) after Juang, Cooper and Wright (1988). The
-Hankel matrix has half of the Markov parameters down and half across. It must span a roll period or
-more: with 6 s for a period of 12.5 s the errors are 10-50 %. Channels are scaled to equal energy,
-because pascals, radians and metres share the singular values.
+Juang and Pappa (1985). The Hankel matrix has half of the Markov parameters down and half across. It
+must span a roll period or more: with 6 s for a period of 12.5 s the errors are 10-50 %. Channels
+are scaled to equal energy, because pascals, radians and metres share the singular values.
 """
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lstsq, svdvals
+from scipy.linalg import svdvals
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.identification.errors import IdentificationError
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 _HIGHEST_ORDER = 20  # limit of an order chosen from the singular values
-_CORRELATION_BLOCKS = 2  # of ERA/DC, besides the first, down and across
 _SMALLEST, _LARGEST = 1e-140, 1e140  # range in which products stay finite
 _SIGNAL = 1e-3  # smallest singular value of a signal, relative to the largest
 
@@ -72,98 +70,6 @@ def era(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -
     markov = _checked(markov)
     found = realize(markov, order)
     return _state_space(found.a, found.b, found.c, markov[0], sample_time_s)
-
-
-def era_with_observer(
-    markov: FloatArray,
-    observer_gain: FloatArray,
-    order: int | None = None,
-    *,
-    sample_time_s: float,
-) -> tuple["StateSpace", FloatArray]:
-    """Realize the model and its identified observer (Juang, Applied System Identification, 6.3).
-
-    Parameters
-    ----------
-    markov : array_like, shape (K, m, r)
-    observer_gain : array_like, shape (K - 1, m, m)
-        C A^(k-1) K, as `okid` returns it.
-
-    Returns
-    -------
-    system : control.StateSpace
-    gain : ndarray, shape (n, m)
-        K of x(k+1) = A x(k) + B u(k) + K (y(k) - C x(k) - D u(k)).
-
-    Raises
-    ------
-    ValueError, IdentificationError
-        As `era`.
-    """
-    markov = _checked(markov)
-    gains = np.asarray(observer_gain, dtype=np.float64)
-    count, m, _ = markov.shape
-    if gains.shape != (count - 1, m, m):
-        raise ValueError(
-            f"observer_gain must have shape {(count - 1, m, m)} with these Markov parameters, "
-            f"got {gains.shape}"
-        )
-    found = realize(markov, order)
-    # C, C A, C A^2, ... times K are the observer gain Markov parameters
-    blocks = [found.c / found.row_scale[:, None]]
-    for _ in range(count - 2):
-        blocks.append(blocks[-1] @ found.a)
-    scaled = gains / found.row_scale[:, None]
-    gain: FloatArray = lstsq(np.vstack(blocks), scaled.reshape(-1, m))[0]
-    return _state_space(found.a, found.b, found.c, markov[0], sample_time_s), gain
-
-
-def era_dc(markov: FloatArray, order: int | None = None, *, sample_time_s: float) -> "StateSpace":
-    """Realize a discrete state-space model by ERA with data correlations.
-
-    The Hankel matrices of Markov parameters are correlated with the first of them before the
-    singular value decomposition, which averages noise that is not common to the lags.
-
-    Parameters
-    ----------
-    markov, order, sample_time_s
-        See `era`.
-
-    Raises
-    ------
-    ValueError, IdentificationError
-        As `era`.
-    """
-    markov = _checked(markov)
-    scaled, row_scale, column_scale = _scaled(markov)
-    count, m, r = markov.shape
-    # half of the Markov parameters across, a sixth down, the rest for the correlation lags
-    lags = count - 1
-    rows, columns = max(1, lags // 6), max(1, lags // 2)
-    step = (lags - rows - columns) // (2 * _CORRELATION_BLOCKS)
-    if step < 1:
-        raise ValueError(
-            f"{count} Markov parameters leave no correlation lags for ERA/DC; give 10 or more"
-        )
-    first = _hankel(scaled, 1, rows, columns)
-
-    def correlations(shift: int) -> FloatArray:
-        blocks = [
-            _hankel(scaled, 1 + shift + i * step, rows, columns) @ first.T
-            for i in range(2 * _CORRELATION_BLOCKS + 1)
-        ]
-        span = range(_CORRELATION_BLOCKS + 1)
-        return np.block([[blocks[i + j] for j in span] for i in span])
-
-    u, s, vt = np.linalg.svd(correlations(0), full_matrices=False)
-    n = _checked_order(order, s)
-    root = np.sqrt(s[:n])
-    observability = u[:, :n] * root
-    a = (u[:, :n] / root).T @ correlations(1) @ (vt[:n].T / root)
-    b = lstsq(observability[: rows * m], first[:, :r])[0]
-    return _state_space(
-        a, b * column_scale, observability[:m] * row_scale[:, None], markov[0], sample_time_s
-    )
 
 
 def hankel_singular_values(markov: FloatArray) -> FloatArray:

@@ -144,11 +144,11 @@ def modal_confidence(result: OkidResult, order: int) -> ModalConfidence:
     frequency_std, damping_std = np.zeros(len(s)), np.zeros(len(s))
     for j, pole in enumerate(s):
         block = covariance[2 * j : 2 * j + 2, 2 * j : 2 * j + 2]
-        frequency_std[j], damping_std[j] = frequency_and_damping_std(pole, block)
+        frequency_std[j], damping_std[j] = _frequency_and_damping_std(pole, block)
     return ModalConfidence(model, frequency_std, damping_std)
 
 
-def frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[float, float]:
+def _frequency_and_damping_std(s: complex, covariance: FloatArray) -> tuple[float, float]:
     """Standard deviations of |s| and -Re s / |s| from the covariance of (Re s, Im s)."""
     size = abs(s)
     to_frequency = np.array([s.real, s.imag]) / size
