@@ -32,6 +32,7 @@ from utank_hil.canbus import (
     NodeState,
     PassiveTwin,
     Quality,
+    RetuningOrder,
     RetuningState,
     SeaEstimate,
     SensorMotion,
@@ -43,7 +44,7 @@ from utank_hil.canbus import (
 from utank_hil.control import DesignPlant
 from utank_hil.nodes.monitoring import Monitors
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import EstimateFigures, RetuningEvent, RetuningOrder
+from utank_hil.retuning import EstimateFigures, RetuningEvent
 from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.safety.monitors.thresholds import SensorFigures

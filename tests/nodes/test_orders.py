@@ -5,10 +5,9 @@ from controller_bench import CATALOGUE, MS, ControllerBench
 from hypothesis import given
 from hypothesis import strategies as st
 
-from utank_hil.canbus import Frame, Mode, OperatorCommand
+from utank_hil.canbus import Frame, Mode, OperatorCommand, RetuningOrder
 from utank_hil.canbus.endpoints import MAX_LOST
 from utank_hil.nodes.orders import Orders
-from utank_hil.retuning import RetuningOrder
 
 QUIET = OperatorCommand(Mode.ACTIVE, True, False, False, False)
 

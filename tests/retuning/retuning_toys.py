@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import Mode, OperatorCommand, RetuningState, Verdict
+from utank_hil.canbus import Mode, OperatorCommand, RetuningOrder, RetuningState, Verdict
 from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import (
     AdaptiveController,
@@ -14,7 +14,6 @@ from utank_hil.retuning import (
     Candidate,
     ModelSummary,
     MotionEstimate,
-    RetuningOrder,
     RetuningSettings,
     ShipFigures,
 )

@@ -10,7 +10,7 @@ import pytest
 from retuning_toys import SAMPLE_NS, ToyRetuner
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.canbus import RetuningOrder, RetuningState, Verdict
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
@@ -21,7 +21,6 @@ from utank_hil.retuning import (
     Refusal,
     RenewedLaw,
     RenewingController,
-    RetuningOrder,
     ShipFigures,
 )
 from utank_hil.retuning.law_bank import FADE_SAMPLES

@@ -15,13 +15,12 @@ from tools.printing import command_line, show
 from tools.studies.trial_setup import shipped
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.assembly import build_law, retuner_work
-from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.canbus import RetuningOrder, RetuningState, Verdict
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.retuning import (
     MotionEstimate,
     RenewingController,
     RetunerProcess,
-    RetuningOrder,
     ShipFigures,
 )
 from utank_hil.retuning.renewing import TRIAL

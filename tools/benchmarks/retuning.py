@@ -26,7 +26,7 @@ from firmware_sim.ship_side import build_ship_side
 from tools.printing import command_line, show
 from utank_hil.assembly import build_controller_node, retuner_work
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import PredictiveDesign
 from utank_hil.dynamics import coupled_model
@@ -36,7 +36,6 @@ from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import (
     AdaptiveController,
     RetunerProcess,
-    RetuningOrder,
     ShipFigures,
     make_pulses,
 )

@@ -7,9 +7,8 @@ wait for them, nor to be lost with them. What a frame says between two looks is 
 
 from typing import Final, NamedTuple
 
-from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver
+from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver, RetuningOrder
 from utank_hil.canbus.endpoints import MAX_LOST, Rejection
-from utank_hil.retuning.law_exchange import RetuningOrder
 
 NEVER_HEARD_NS: Final = -(1 << 62)
 

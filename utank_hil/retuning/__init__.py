@@ -17,7 +17,6 @@ from utank_hil.retuning.estimator import EstimateSettings as EstimateSettings
 from utank_hil.retuning.estimator import Estimator as Estimator
 from utank_hil.retuning.law_exchange import LawExchange as LawExchange
 from utank_hil.retuning.law_exchange import RetuningEvent as RetuningEvent
-from utank_hil.retuning.law_exchange import RetuningOrder as RetuningOrder
 from utank_hil.retuning.pulses import make_pulses as make_pulses
 from utank_hil.retuning.renewed_law import RenewedLaw as RenewedLaw
 from utank_hil.retuning.renewing import RenewingController as RenewingController

@@ -28,12 +28,12 @@ The limits on pressure, rate, level and power apply downstream.
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import asdict, dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.canbus import RetuningState
+from utank_hil.canbus import RetuningOrder, RetuningState
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES, WarmUp
 from utank_hil.retuning.answer import Answer, ModelSummary, Refusal
 from utank_hil.retuning.estimate import MotionEstimate
@@ -61,22 +61,6 @@ _COMPARABLE: Final = (
 _BUSY: Final = (RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
 _, _DESIGN, _TRIAL = _BUSY
-
-
-class RetuningOrder(NamedTuple):
-    """What the operator ordered since the last sample.
-
-    Attributes
-    ----------
-    retune, undo : bool
-        The button was pressed.
-    forbidden : bool
-        Retuning is forbidden, or was for a moment.
-    """
-
-    retune: bool = False
-    undo: bool = False
-    forbidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
