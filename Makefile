@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-fast evidence search check format benchmark peers site sbom wheel docs lock clean
+.PHONY: help setup compiled bench test test-fast evidence thesis search check format benchmark peers site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
@@ -25,6 +25,7 @@ help:
 	@echo "make compiled   simulations in 0.4 of the time, until the source changes; a minute, with gcc"
 	@echo "make evidence   what takes longer, where its result is missing or out of date: hours at first;"
 	@echo "                $(PYTHON) -m tools.evidence --list shows the parts, --part runs one"
+	@echo "make thesis     figures and printed numbers of the source thesis made anew, out/thesis: four minutes"
 	@echo "make search     the property tests with new random examples, until one fails or they end"
 	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
 	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
@@ -74,6 +75,9 @@ test-fast: setup
 
 evidence: setup peers
 	$(PYTHON) -m tools.evidence
+
+thesis: setup
+	$(PYTHON) -m tools.thesis
 
 # in `make test` they draw the same examples each time
 search: setup

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rolling_ship import SHIP, TANK
 
-from utank_hil.analysis.capsize.survival import controlled_run
+from tools.thesis.capsize.survival import controlled_run
 from utank_hil.control import CommandLimiter, PumpLimits
 from utank_hil.control.stimulation import Stimulation
 from utank_hil.dynamics import RollModel, WaveMoment, harmonic_response

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from tools.studies import trial_setup
-from utank_hil.analysis.loop.sea_trial import run_trial
+from tools.studies.sea_trial import run_trial
 
 
 class Ended(NamedTuple):

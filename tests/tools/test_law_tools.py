@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tools.studies import many_seas, model_errors
-from utank_hil.analysis.loop.sea_trial import TrialShip
+from tools.studies.sea_trial import TrialShip
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("short_search")]
 

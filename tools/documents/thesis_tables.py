@@ -3,7 +3,7 @@
 from typing import Any
 
 from tools.documents.rows import Rows, Table, number
-from utank_hil.thesis.figure import Verdict, printed_text
+from tools.thesis.figure import Verdict, printed_text
 
 
 def errata_terms(result: dict[str, Any]) -> Rows:

@@ -176,7 +176,7 @@ PARTS = (
     ),
     Part(
         "thesis_figures",
-        "python -m tools.thesis.figures",
+        "python -m tools.thesis --json",
         "every figure and printed number of the source, and what its text says of them",
         4,
     ),

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from tools.peers.plan_programmes import HOUR, STORM
-from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
+from tools.studies.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.loop_simulation import passive_motion
 from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import Vessel

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from tools.printing import show
+from tools.studies.sea_trial import Entrant, Trial, TrialFigures, TrialShip
 from tools.studies.trial_setup import (
     STORM_HOUR,
     chosen,
@@ -39,7 +40,6 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
 )
-from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.base.arrays import FloatArray

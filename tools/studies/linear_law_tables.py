@@ -19,10 +19,8 @@ import numpy as np
 
 from tools.printing import print_tables
 from tools.studies.trial_setup import entrant, shipped
-from utank_hil.analysis.loop.closed_loop import closed_loop_response
-from utank_hil.analysis.loop.margins import Margins, margins
-from utank_hil.analysis.loop.performance_index import performance_index
-from utank_hil.analysis.loop.printed_laws import (
+from tools.thesis.performance_index import performance_index
+from tools.thesis.printed_laws import (
     DPC_ROLL,
     PRINTED,
     PRINTED_ARX,
@@ -33,6 +31,9 @@ from utank_hil.analysis.loop.printed_laws import (
     printed_plant,
     source_index,
 )
+from tools.thesis.ships import AS_PRINTED, FITTED, GREATER
+from utank_hil.analysis.loop.closed_loop import closed_loop_response
+from utank_hil.analysis.loop.margins import Margins, margins
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.control import (
     DesignPlant,
@@ -51,7 +52,6 @@ from utank_hil.control.optimal_tank import (
 )
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.linear import STATES, coupled_model
-from utank_hil.thesis.ships import AS_PRINTED, FITTED, GREATER
 
 Rows = dict[str, dict[str, float]]
 SHIPPED = {

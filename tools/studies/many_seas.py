@@ -20,7 +20,10 @@ from typing import Final
 import numpy as np
 
 from tools.printing import show
+from tools.studies.causal_bound import CausalProblem, causal_bound
+from tools.studies.clairvoyant import NoHistoryError
 from tools.studies.model_errors import of_period
+from tools.studies.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from tools.studies.trial_setup import (
     STORM_HOUR,
     chosen,
@@ -32,9 +35,6 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
 )
-from utank_hil.analysis.loop.causal_bound import CausalProblem, causal_bound
-from utank_hil.analysis.loop.clairvoyant import NoHistoryError
-from utank_hil.analysis.loop.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.base.one_thread import one_thread_each

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.printing import show
+from tools.studies.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -25,7 +26,6 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
 )
-from utank_hil.analysis.loop.sea_trial import PASSIVE, Entrant, Trial, TrialFigures, TrialShip
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.dynamics import RollShip
 

@@ -8,7 +8,7 @@
 * valves: roll of the first ship, tank damping 3 %, with each valve law and the best fixed opening.
 * stimulation: roll amplitude reached on still water, on the ship it was made for and another.
 
-Thesis 4.5 is `utank-hil reproduce contest`. Takes about five minutes on one core.
+Thesis 4.5 is `python -m tools.thesis contest`. Takes about five minutes on one core.
 """
 
 import dataclasses
@@ -22,8 +22,8 @@ from rich.progress import track
 
 from tools.printing import print_tables
 from tools.studies.trial_setup import STORM_HOUR, measured_hour, shipped
-from utank_hil.analysis.capsize.contest import PATTI_B
-from utank_hil.analysis.capsize.survival import controlled_run
+from tools.thesis.capsize.contest import PATTI_B
+from tools.thesis.capsize.survival import controlled_run
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius
 from utank_hil.analysis.loop.loop_simulation import passive_motion, simulate_loop
 from utank_hil.analysis.loop.margins import radius_and_peak

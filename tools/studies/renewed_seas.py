@@ -24,10 +24,10 @@ from firmware_sim.run import Job, Run
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
+from tools.studies.clairvoyant import clairvoyant_bound
 from tools.studies.many_seas import SIXTEEN, seas
 from tools.studies.renewed_voyage import motion_between
 from tools.studies.trial_setup import CONFIGS, chosen, shipped
-from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState

@@ -25,8 +25,8 @@ from firmware_sim.run import RECORD_S, Job, Run
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.voyage import Waypoint
 from tools.printing import command_line, show
+from tools.studies.clairvoyant import clairvoyant_bound
 from tools.studies.trial_setup import CONFIGS, measured_hour, shipped
-from utank_hil.analysis.loop.clairvoyant import clairvoyant_bound
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of, self_tuned
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.base.arrays import FloatArray

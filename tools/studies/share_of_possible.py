@@ -21,6 +21,16 @@ import math
 import numpy as np
 
 from tools.printing import show
+from tools.studies.causal_bound import CausalBound, CausalProblem, causal_bound
+from tools.studies.sea_trial import (
+    CLAIRVOYANT,
+    NO_TANK,
+    PASSIVE,
+    Entrant,
+    Trial,
+    TrialFigures,
+    TrialShip,
+)
 from tools.studies.trial_setup import (
     STORM_HOUR,
     entrant,
@@ -33,17 +43,7 @@ from tools.studies.trial_setup import (
     seeds_of,
     shipped,
 )
-from utank_hil.analysis.loop.causal_bound import CausalBound, CausalProblem, causal_bound
 from utank_hil.analysis.loop.robustness import robustness
-from utank_hil.analysis.loop.sea_trial import (
-    CLAIRVOYANT,
-    NO_TANK,
-    PASSIVE,
-    Entrant,
-    Trial,
-    TrialFigures,
-    TrialShip,
-)
 from utank_hil.analysis.motion.confidence import mean_interval
 from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import ControllerConfig

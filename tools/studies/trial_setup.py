@@ -17,7 +17,7 @@ from rich.progress import Progress
 
 from firmware_sim.scenario import Scenario
 from tools.printing import command_line
-from utank_hil.analysis.loop.sea_trial import Entrant, Trial, TrialFigures, run_trials
+from tools.studies.sea_trial import Entrant, Trial, TrialFigures, run_trials
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, load_config

@@ -22,9 +22,10 @@ from rich.console import Console
 from rich.progress import track
 
 from tools.printing import command_line, show
-from utank_hil.analysis.capsize.maps import capsize_map, phase_grid
-from utank_hil.analysis.capsize.sea_stack import stacked_seas
-from utank_hil.analysis.capsize.threshold import (
+from tools.thesis.capsize.maps import capsize_map, phase_grid
+from tools.thesis.capsize.picture import draw_capsize_maps
+from tools.thesis.capsize.sea_stack import stacked_seas
+from tools.thesis.capsize.threshold import (
     Probability,
     capsize_probability,
     capsize_threshold,
@@ -32,7 +33,6 @@ from utank_hil.analysis.capsize.threshold import (
 )
 from utank_hil.configuration import ConfigError, Vessel, load_config
 from utank_hil.dynamics import RollModel
-from utank_hil.pictures import draw_capsize_maps
 from utank_hil.sea import Sea, jonswap
 
 PATTI_B = Path(__file__).resolve().parents[2] / "configs" / "ships" / "patti_b.yaml"

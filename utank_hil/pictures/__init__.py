@@ -7,4 +7,3 @@ Each `draw_...` writes a `.png` file at `path`, over what is there; `about` is k
 from utank_hil.pictures.bench_curves import BenchBar as BenchBar
 from utank_hil.pictures.bench_curves import BenchCurve as BenchCurve
 from utank_hil.pictures.bench_curves import draw_bench as draw_bench
-from utank_hil.pictures.capsize_maps import draw_capsize_maps as draw_capsize_maps

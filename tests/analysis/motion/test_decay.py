@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from utank_hil.analysis.capsize.threshold import without_tank
+from tools.thesis.capsize.threshold import without_tank
 from utank_hil.analysis.motion.decay import roll_decay
 from utank_hil.dynamics import RollModel, RollShip, Tank, simulate
 

@@ -1,1 +1,1 @@
-"""The closed loop: its margins, robustness, bounds, and what it is worth in a sea."""
+"""The closed loop: its margins, robustness, and what it is worth in a sea."""

@@ -1,1 +1,0 @@
-"""Capsizing: thresholds, probability, phase-plane maps, and the effect of a law."""

@@ -1,1 +1,0 @@
-"""The figures and printed numbers of the source thesis, made anew from this project's models."""
