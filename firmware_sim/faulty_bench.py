@@ -91,7 +91,8 @@ class FaultyBench:
         def controller() -> Controller:
             return BreakableLaw(self._law.controller(), self._law_failures)
 
-        law = replace(self._law, controller=controller)
+        # a controller that retunes exchanges its laws itself: a fault of one is no fault of it
+        law = self._law if self._retuner else replace(self._law, controller=controller)
         self.node = build_controller_node(
             self._config,
             law,

@@ -364,6 +364,7 @@ def _adaptive(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Adap
     assert law.linear is not None
     return AdaptiveController(
         law.linear,
+        law.controller(),
         ShipFigures.of(ship),
         design.predictor.measured.index("roll_rad"),
         settings,
@@ -377,4 +378,4 @@ def _renewing(config: ControllerConfig, law: BuiltLaw, retuner: Retuner) -> Rene
     assert isinstance(law.linear, ConstrainedLaw)
     ship = ShipFigures.of(config.vessel.ship)
     roll = law.measured.index("roll_rad")
-    return RenewingController(law.linear, ship, roll, config.limits, retuner)
+    return RenewingController(law.linear, law.controller(), ship, roll, config.limits, retuner)

@@ -16,6 +16,7 @@ from utank_hil.commands.common import new_app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.replay import replay
 from utank_hil.commands.run import run
+from utank_hil.telemetry import law_values
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter
 from utank_hil.telemetry.replay import entries_of
@@ -81,6 +82,9 @@ def test_a_run_in_real_time_is_replayed_bit_for_bit(folder: Path) -> None:
     found = json.loads(result.stdout)
     assert found["exact"]
     assert found["causes"] == []
+    assert found["law"] == {
+        "recorded_law_ran": True, "why_not": "", "same_design": True, "differences": [],
+    }  # fmt: skip
     assert found["ticks"] > 200
     assert found["frames"] > found["ticks"] / 2
     drove = [
@@ -96,14 +100,39 @@ def test_the_last_bit_of_a_gain_is_named_even_where_no_frame_shows_it(
 ) -> None:
     other = controller(tmp_path, float(np.nextafter(-1.5e5, 0)))
     result = invoke(replay, log_of(folder), "--config", other, "--json")
-    assert result.exit_code == 1
+    assert result.exit_code == 0
     found = json.loads(result.stdout)
-    assert not found["exact"]
-    assert any(
-        line.startswith("law, ") and "recorded -150000.0, replayed -149999.99999999997" in line
-        for line in found["causes"]
-    )
+    assert found["exact"]
+    assert not found["law"]["recorded_law_ran"]
+    assert found["law"]["why_not"] == "another configuration was named"
+    assert ["-150000.0", "-149999.99999999997"] in [
+        [each["recorded"], each["designed"]] for each in found["law"]["differences"]
+    ]
+    assert all(each["deviation"] < 2e-16 for each in found["law"]["differences"])
     assert any(line.startswith("configuration, law.system") for line in found["causes"])
+
+
+def test_a_recorded_law_answers_though_another_would_be_designed_here(
+    folder: Path, tmp_path: Path
+) -> None:
+    log = FrameLog(log_of(folder))
+    recorded = law_values.decoded(log.head["law"])
+    # what the log says is a ten-millionth beside what is designed here; no frame shows that
+    log.head["law"] = law_values.encoded(recorded | {"c": recorded["c"] * (1 + 1e-7)})
+    changed = tmp_path / "run-x.frames"
+    with FrameLogWriter(changed, log.head) as writer:
+        for block in log.blocks():
+            writer.write(block)
+    result = invoke(replay, changed, "--json")
+    found = json.loads(result.stdout)
+    assert (result.exit_code, found["exact"], found["causes"]) == (0, True, [])
+    assert found["law"]["recorded_law_ran"]
+    (difference,) = found["law"]["differences"]
+    assert difference["name"] == "c[0, 0]"
+    assert difference["deviation"] == pytest.approx(1e-7, rel=1e-3)
+    text = invoke(replay, changed).stdout
+    assert "equal bit for bit: " in text
+    assert "the law designed here is not the recorded one, by 1.0e-07 of an array" in text
 
 
 def test_another_gain_is_named_by_tick_message_and_signal(folder: Path, tmp_path: Path) -> None:

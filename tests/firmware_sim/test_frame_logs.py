@@ -36,8 +36,8 @@ def replayed(file: Path) -> ReplayResult:
     log = FrameLog(file)
     assert log.head["about"]["seed"] == 3
     with recorded_config(log.head) as config:
-        result, why = replay_log(log, config, file.parent)
-    assert why == []
+        result, why, law = replay_log(log, config, file.parent)
+    assert (why, law.why_not_recorded, law.differences) == ([], "", [])
     return result
 
 

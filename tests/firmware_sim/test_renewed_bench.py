@@ -47,8 +47,9 @@ def test_a_renewal_is_the_same_each_time_and_is_replayed_exactly(
     np.testing.assert_array_equal(logged.rows, run_lockstep(job).rows)
     log = FrameLog(file)
     with recorded_config(log.head) as config:
-        result, why = replay_log(log, config, tmp_path)
+        result, why, law = replay_log(log, config, tmp_path)
     assert (result.first, result.ticks, why) == (None, 24_000, [])
+    assert (law.why_not_recorded, law.differences) == ("", [])
 
 
 @pytest.mark.evidence

@@ -8,17 +8,19 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tools.reference_recordings.cases import CASES, FAULTS, Case, record
-from tools.reference_recordings.comparison import LOGS, compare
+from tools.reference_recordings.comparison import DESIGN_BOUND, LOGS, compare
 from utank_hil.assembly import build_law
 from utank_hil.canbus import ControllerStatus, Fault, Mode, RetuningState, load_catalogue
+from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.law_values import encoded, law_values
-from utank_hil.telemetry.replay import entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.law_values import decoded, encoded, law_values
+from utank_hil.telemetry.replay import entries_of, replay, replay_log
+from utank_hil.telemetry.replay_head import law_differences, recorded_config
 
 STATUS = load_catalogue().codec(ControllerStatus)
 ACCEPT = "if this is meant: python -m tools.reference_recordings --accept"
@@ -70,9 +72,43 @@ def test_one_bit_of_one_gain_is_named() -> None:
         controller = law.controller()
         bits = law_values(controller)["gains"].view("u8")  # the controller's own memory
         bits[0, 100] ^= 1
-        changed = replace(law, controller=lambda: controller)
-        (why,) = causes(log.head, config, changed, LOGS)
-    assert why.startswith("law, gains[0, 100]: recorded ")
+        (found,) = law_differences(log.head, replace(law, controller=lambda: controller))
+    assert found.name == "gains[0, 100]"
+    assert found.deviation < 1e-15
+
+
+def test_a_recorded_law_answers_for_itself_and_today_s_design_is_judged_beside() -> None:
+    """As on a processor whose design is another one: by a thousandth here, which frames show."""
+    log = FrameLog(LOGS / "every-mode.frames")
+    with recorded_config(log.head) as config:
+        recorded = decoded(log.head["law"])
+        log.head["law"] = encoded(recorded | {"gains": recorded["gains"] * 1.001})
+        result, why, law = replay_log(log, config, LOGS)
+    assert result.different["PUMP_CMD"] > 10  # they were answered by the law that was recorded
+    assert (why, law.why_not_recorded) == ([], "")
+    (gains,) = (each for each in law.differences if each.name.startswith("gains"))
+    assert gains.deviation == law.deviation == pytest.approx(1e-3, rel=2e-3)
+    assert law.deviation > DESIGN_BOUND
+
+
+def test_a_design_that_another_weight_changes_is_beyond_the_bound() -> None:
+    path = LOGS / "planned.frames"
+    with recorded_config(FrameLog(path).head) as config:
+        design = config.law
+        assert isinstance(design, ConstrainedDesign)
+        heavier = replace(design, pressure_weight_rad2=1.001 * design.pressure_weight_rad2)
+        other = build_law(config.model_copy(update={"law": heavier}))
+    head = FrameLog(path).head
+    assert max(each.deviation for each in law_differences(head, other)) > 10 * DESIGN_BOUND
+
+
+def test_numbers_that_do_not_fit_this_version_s_law_leave_the_one_designed_here() -> None:
+    log = FrameLog(LOGS / "every-mode.frames")
+    with recorded_config(log.head) as config:
+        log.head["law"]["gains"] = encoded({"gains": np.zeros((1, 3))})["gains"]
+        result, _, law = replay_log(log, config, LOGS)
+    assert result.exact
+    assert "gains is float64 of shape (1, 3) there" in law.why_not_recorded
 
 
 def test_a_changed_limit_is_named_by_tick_signal_and_key() -> None:

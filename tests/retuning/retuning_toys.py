@@ -78,8 +78,9 @@ class Rig:
     ) -> None:
         count = round(settings.identification_s / SAMPLE_TIME_S)
         self.pulses_pa = 1e3 * np.where(np.arange(count) % 7 < 3, 1.0, -1.0)
+        law = law_of(1e5)
         self.controller = AdaptiveController(
-            law_of(1e5), SHIP, 0, settings, self.pulses_pa, retuner
+            law, law.controller(), SHIP, 0, settings, self.pulses_pa, retuner
         )
         self.roll = roll
         self.stiffness = stiffness

@@ -14,15 +14,14 @@ from firmware_sim.lockstep_run import run_lockstep
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
-from utank_hil.assembly import build_law
 from utank_hil.canbus import Mode
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.replay import entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.replay import replay_log
+from utank_hil.telemetry.replay_head import recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -213,8 +212,7 @@ def test_both_runs_are_replayed_bit_for_bit(bench, name: str) -> None:
     path = Path(report["files"][f"frames of {name}"])
     log = FrameLog(path)
     with recorded_config(log.head) as config:
-        law = build_law(config)
-        assert causes(log.head, config, law, path.parent) == []
-        result = replay(entries_of(log.blocks()), config, law)
+        result, why, law = replay_log(log, config, path.parent)
+    assert (why, law.why_not_recorded, law.differences) == ([], "", [])
     (run,) = (run for run in report["runs"] if run["name"] == name)
     assert (result.first, result.ticks) == (None, run["loop"]["ticks"])

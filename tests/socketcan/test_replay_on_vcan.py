@@ -20,13 +20,12 @@ from two_processes import (
     watched,
 )
 
-from utank_hil.assembly import build_law
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.telemetry.bus_logs import write_bus_log
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import ReplayResult, entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.replay import entries_of, replay_log
+from utank_hil.telemetry.replay_head import recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -69,9 +68,8 @@ def test_a_run_between_two_processes_is_replayed_bit_for_bit(tmp_path: Path) -> 
     kinds = {entry.kind for entry in entries_of(log.blocks())}
     assert {Kind.STARTED, Kind.LINK_ERROR, Kind.STOP} <= kinds
     with recorded_config(log.head) as config:
-        law = build_law(config)
-        assert causes(log.head, config, law, path.parent) == []
-        result: ReplayResult = replay(entries_of(log.blocks()), config, law)
+        result, why, law = replay_log(log, config, path.parent)
+    assert (why, law.why_not_recorded, law.differences) == ([], "", [])
     assert result.first is None, result.first
     assert result.ticks > 250
     assert result.frames > 200

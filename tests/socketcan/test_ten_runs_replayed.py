@@ -28,8 +28,8 @@ from utank_hil.nodes.panel import Action
 from utank_hil.runners import RealTimeLoop, heard_by
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay import Entry, entries_of, replay
-from utank_hil.telemetry.replay_head import causes, recorded_config
+from utank_hil.telemetry.replay import Entry, entries_of, replay_log
+from utank_hil.telemetry.replay_head import recorded_config
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 
@@ -156,9 +156,8 @@ def test_a_run_in_real_time_is_replayed_bit_for_bit(
     file = first_that_can_be_judged(lambda to: recorded(case, told, processes, to), tmp_path)
     log = FrameLog(file)
     with recorded_config(log.head) as config:
-        law = build_law(config)
-        assert causes(log.head, config, law, file.parent) == []
-        result = replay(entries_of(log.blocks()), config, law)
+        result, why, law = replay_log(log, config, file.parent)
+    assert (why, law.why_not_recorded, law.differences) == ([], "", [])
     assert result.first is None, result.first
     print(f"{result.ticks} ticks, {result.frames} frames")
     assert result.frames > 100

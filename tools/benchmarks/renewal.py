@@ -65,7 +65,9 @@ def renew_once(law: ConstrainedLaw, times: dict[str, list[float]]) -> tuple[floa
     assert work is not None
     rng = np.random.default_rng(1)
     with RetunerProcess(work) as process:
-        controller = RenewingController(law, ship, 0, config.limits, process.desks[0])
+        controller = RenewingController(
+            law, law.controller(), ship, 0, config.limits, process.desks[0]
+        )
         idle_mb = resident_mb(process.pid)
         step_s = law.sample_time_s
         noted = round(BEFORE_S / step_s)

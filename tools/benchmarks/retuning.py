@@ -131,8 +131,10 @@ def retune_once(config: ControllerConfig, times: dict[str, list[float]]) -> None
     period_s = design.predictor.sample_time_s
     with RetunerProcess(work) as process:
         (retuner,) = process.desks
+        law = design.law(plant)
         controller = AdaptiveController(
-            design.law(plant),
+            law,
+            law.controller(),
             ShipFigures(
                 plant.ship.stiffness_nm_rad, plant.ship.inertia_kg_m2, plant.ship.damping_nms_rad
             ),

@@ -1,6 +1,7 @@
 """``utank-hil replay``: the recorded bus handed to the controller again."""
 
 import json
+import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,9 +23,9 @@ from utank_hil.telemetry.bus_logs import (
     read_bus_log,
 )
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
-from utank_hil.telemetry.replay import ReplayResult, replay_log
+from utank_hil.telemetry.replay import LawVerdict, ReplayResult, replay_log
 from utank_hil.telemetry.replay import replay as run_replay
-from utank_hil.telemetry.replay_head import ReplayHeadError, recorded_config
+from utank_hil.telemetry.replay_head import ReplayHeadError, few, recorded_config
 
 
 def replay(
@@ -42,16 +43,19 @@ def replay(
 ) -> None:
     """Hand a recorded bus to the controller again and compare every frame that it sends.
 
-    Exit code 0: all frames are equal bit for bit, by the same law. 1: something differs; the first
-    difference is printed with its tick, message and signal, and what may be its cause. 2: the log
-    or an option is wrong.
+    The recorded law answers, by its numbers in the log; with --config, the law of that file. How
+    far the law that is designed here is from the recorded one is said beside.
+
+    Exit code 0: all frames are equal bit for bit. 1: a frame differs; the first difference is
+    printed with its tick, message and signal, and what may be its cause. 2: the log or an option is
+    wrong.
 
     **Example:** utank-hil replay out/gpc.frames
     """
     cut = ""
     try:
         if log.suffix.lower() in BUS_SUFFIXES:
-            result, why = _replay_bus_log(log, config)
+            (result, why), law = _replay_bus_log(log, config), None
         else:
             if log.suffix == ".rrd":
                 fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
@@ -62,7 +66,9 @@ def replay(
                     "not known: give the run's first part"
                 )
             with _configuration(config, recording.head) as chosen:
-                result, why = replay_log(recording, chosen, log.parent)
+                result, why, law = replay_log(
+                    recording, chosen, log.parent, as_recorded=config is None
+                )
             cut = recording.cut
     except (OSError, ValueError) as error:
         fail(f"{log}: {error}" if isinstance(error, ParameterError | ReplayHeadError) else error)
@@ -70,12 +76,11 @@ def replay(
         fail(f"{log}: there is no tick in it to compare{f': {cut}' if cut else ''}")
     if result.lost_rows:
         why.insert(0, f"the recorder lost {result.lost_rows} rows of the log")
-    exact = result.exact and not any(line.startswith("law, ") for line in why)
     if json_:
-        sys.stdout.write(json.dumps(_as_json(result, why, cut, exact)) + "\n")
+        sys.stdout.write(json.dumps(_as_json(result, why, cut, law)) + "\n")
     else:
-        _print(Terminal(), result, why, cut)
-    raise typer.Exit(ExitCode.OK if exact else ExitCode.REFUSED)
+        _print(Terminal(), result, why, cut, law)
+    raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
 
 
 def _replay_bus_log(log: Path, config: Path | None) -> tuple[ReplayResult, list[str]]:
@@ -107,19 +112,50 @@ def _configuration(path: Path | None, head: dict[str, Any]) -> Iterator[Controll
         yield config
 
 
-def _as_json(result: ReplayResult, why: list[str], cut: str, exact: bool) -> dict[str, Any]:
+def _as_json(
+    result: ReplayResult, why: list[str], cut: str, law: LawVerdict | None
+) -> dict[str, Any]:
     return {
-        "exact": exact,
+        "exact": result.exact,
         "ticks": result.ticks,
         "frames": result.frames,
         "different_frames": dict(result.different),
         "first_difference": None if result.first is None else asdict(result.first),
         "causes": why,
+        "law": None if law is None else _law_as_json(law),
         "cut": cut,
     }
 
 
-def _print(console: Terminal, result: ReplayResult, why: list[str], cut: str) -> None:
+def _print_law(console: Terminal, law: LawVerdict) -> None:
+    """Print which law answered, and how far the one that is designed here is from the recorded."""
+    if law.why_not_recorded:
+        console.say(f"the law designed here answered: {law.why_not_recorded}")
+    if not law.differences:
+        return
+    known = [each.deviation for each in law.differences if math.isfinite(each.deviation)]
+    size = f", by {max(known):.1e} of an array's largest element at most" if known else ""
+    console.say(f"the law designed here is not the recorded one{size}:")
+    for line in few([str(each) for each in law.differences]):
+        console.say(f"  {line}")
+
+
+def _law_as_json(law: LawVerdict) -> dict[str, Any]:
+    """The law's verdict; a deviation without a size, of arrays that can't be compared, is null."""
+    return {
+        "recorded_law_ran": not law.why_not_recorded,
+        "why_not": law.why_not_recorded,
+        "same_design": not law.differences,
+        "differences": [
+            asdict(each) | {"deviation": each.deviation if math.isfinite(each.deviation) else None}
+            for each in law.differences
+        ],
+    }
+
+
+def _print(
+    console: Terminal, result: ReplayResult, why: list[str], cut: str, law: LawVerdict | None
+) -> None:
     said = f"{result.ticks} ticks, {result.frames} frames of the controller"
     if result.first is None:
         console.say(said, green="equal bit for bit:")
@@ -131,7 +167,9 @@ def _print(console: Terminal, result: ReplayResult, why: list[str], cut: str) ->
         console.say("not the same as when it was recorded:")
         for line in why:
             console.say(f"  {line}")
-    elif result.first is not None:
+    elif result.first is not None and law is not None and not law.why_not_recorded:
         console.say("version, configuration and law are the same: the program was changed")
+    if law is not None:
+        _print_law(console, law)
     if cut:
         console.say("compared up to there", yellow=f"{cut}:")

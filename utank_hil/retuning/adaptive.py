@@ -16,7 +16,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
-from utank_hil.control import LinearLaw
+from utank_hil.control import Controller, LinearLaw
 from utank_hil.retuning.admission import Admission, WarmUp
 from utank_hil.retuning.answer import Answer, Candidate, ModelSummary
 from utank_hil.retuning.change_monitor import ChangeMonitor
@@ -41,6 +41,8 @@ class AdaptiveController(LawExchange):
     ----------
     law : LinearLaw
         First law.
+    controller : Controller
+        Of that law, at rest.
     ship : ShipFigures
         The ship that it was designed for.
     roll : int
@@ -59,6 +61,7 @@ class AdaptiveController(LawExchange):
     def __init__(
         self,
         law: LinearLaw,
+        controller: Controller,
         ship: ShipFigures,
         roll: int,
         settings: RetuningSettings,
@@ -66,7 +69,7 @@ class AdaptiveController(LawExchange):
         retuner: Retuner,
     ) -> None:
         super().__init__(
-            MonitoredLaw(law.controller(), ChangeMonitor(ship)),
+            MonitoredLaw(controller, ChangeMonitor(ship)),
             law.matrices().B.shape[1],
             roll,
             settings.trial,

@@ -17,6 +17,7 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState, Verdict
+from utank_hil.control import Controller
 from utank_hil.control.constrained.law import ConstrainedController, ConstrainedLaw
 from utank_hil.control.limits import PumpLimits
 from utank_hil.retuning.admission import ANOTHER_QUESTION, WarmUp
@@ -68,6 +69,8 @@ class RenewingController(LawExchange):
     ----------
     law : ConstrainedLaw
         First law, of a sea that nobody knew.
+    controller : Controller
+        Of that law, at rest.
     ship : ShipFigures
         The configured ship.
     roll : int
@@ -88,12 +91,13 @@ class RenewingController(LawExchange):
     def __init__(
         self,
         law: ConstrainedLaw,
+        controller: Controller,
         ship: ShipFigures,
         roll: int,
         limits: PumpLimits,
         retuner: Retuner,
     ) -> None:
-        first = MonitoredLaw(law.controller(), ChangeMonitor(ship))
+        first = MonitoredLaw(controller, ChangeMonitor(ship))
         super().__init__(first, len(law.model.C), roll, TRIAL, retuner)
         self._law = law
         self._limits = limits

@@ -1,38 +1,62 @@
-"""The numbers of a built law, to be kept with a recording and compared bit for bit."""
+"""The numbers of a built law: kept with a recording, compared bit for bit, put back into a law.
+
+A design is a search or a factorization, whose last digits depend on the processor's kernels. A
+recorded run is therefore repeated with its recorded numbers, and not with a law designed anew.
+"""
 
 import base64
+import copy
+import math
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
+Part = TypeVar("Part")
 Values = dict[str, npt.NDArray[Any]]
 """Arrays by the path of attributes that leads to them."""
 
 _DEEPEST: Final = 12
 
 
+class LawValuesError(ValueError):
+    """Recorded numbers do not belong to the law that is to take them."""
+
+
+@runtime_checkable
+class Derives(Protocol):
+    """A part of a controller that keeps what follows from its numbers where no number shows it."""
+
+    def derive(self) -> None:
+        """Make that anew from the numbers."""
+
+
 @dataclass(frozen=True, slots=True)
 class ValueDifference:
-    """One number that differs.
+    """An array, or a number, that differs.
 
     Attributes
     ----------
     name : str
-        Path of attributes, with the index in an array.
-    recorded, replayed : str
-        In decimals that tell every bit; "missing" where there is none.
+        Path of attributes, with the index of the first element that differs.
+    recorded, designed : str
+        Of that element, in decimals that tell every bit; "missing" where there is none.
+    deviation : float
+        Largest deviation of an element, relative to the largest recorded one; infinite where no
+        elements can be compared.
     """
 
     name: str
     recorded: str
-    replayed: str
+    designed: str
+    deviation: float = math.inf
 
     def __str__(self) -> str:
-        return f"{self.name}: recorded {self.recorded}, replayed {self.replayed}"
+        size = f", at most {self.deviation:.1e} of the largest" if self.deviation < math.inf else ""
+        return f"{self.name}: recorded {self.recorded}, designed here {self.designed}{size}"
 
 
 def law_values(controller: object) -> Values:
@@ -43,12 +67,30 @@ def law_values(controller: object) -> Values:
     return dict(_walk(controller, "", 0, set()))
 
 
-def differences(recorded: Values, replayed: Values) -> list[ValueDifference]:
-    """The first differing number of each array that is not the same bit for bit."""
+def restored(controller: Part, values: Values) -> Part:
+    """A copy of a controller at rest that holds other numbers; `law_values` of it are `values`.
+
+    Nothing of the given controller is changed, nor of the law that it shares arrays with.
+
+    Raises
+    ------
+    LawValuesError
+        If the controller has other arrays, or arrays of other shapes.
+    """
+    own = law_values(controller)
+    for name in dict.fromkeys((*values, *own)):
+        there, here = values.get(name), own.get(name)
+        if there is None or here is None or not _alike(there, here):
+            raise LawValuesError(f"{name} is {_kind(there)} there and {_kind(here)} here")
+    return cast(Part, _restored(controller, values, "", 0, {}))
+
+
+def differences(recorded: Values, designed: Values) -> list[ValueDifference]:
+    """Each array that is not the same bit for bit, with its first element that differs."""
     found = []
-    for name in dict.fromkeys((*recorded, *replayed)):
-        a, b = recorded.get(name), replayed.get(name)
-        if a is None or b is None or a.shape != b.shape or a.dtype != b.dtype:
+    for name in dict.fromkeys((*recorded, *designed)):
+        a, b = recorded.get(name), designed.get(name)
+        if a is None or b is None or not _alike(a, b):
             found.append(ValueDifference(name, _said(a), _said(b)))
         elif a.tobytes() != b.tobytes():
             raw_a = np.ascontiguousarray(a).reshape(-1, 1).view(np.uint8)
@@ -56,8 +98,8 @@ def differences(recorded: Values, replayed: Values) -> list[ValueDifference]:
             first = int(np.flatnonzero((raw_a != raw_b).any(axis=1))[0])
             at = [int(i) for i in np.unravel_index(first, a.shape)]
             place = f"{name}{at}" if at else name
-            values = repr(a.ravel()[first].item()), repr(b.ravel()[first].item())
-            found.append(ValueDifference(place, *values))
+            texts = repr(a.ravel()[first].item()), repr(b.ravel()[first].item())
+            found.append(ValueDifference(place, *texts, _deviation(a, b)))
     return found
 
 
@@ -81,10 +123,27 @@ def _packed(data: bytes) -> str:
     return base64.b85encode(zlib.compress(data, 9)).decode()
 
 
+def _alike(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> bool:
+    return a.shape == b.shape and a.dtype == b.dtype
+
+
+def _kind(value: npt.NDArray[Any] | None) -> str:
+    return "missing" if value is None else f"{value.dtype} of shape {value.shape}"
+
+
+def _deviation(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> float:
+    """Largest deviation of `b` from `a`, relative to the largest element of `a`."""
+    wide = np.complex128 if a.dtype.kind == "c" else np.float64
+    a, b = a.astype(wide), b.astype(wide)
+    deviation = np.abs(b - a, where=a != b, out=np.zeros(a.shape)).max()
+    largest = np.abs(a[np.isfinite(a)]).max(initial=0.0)
+    if deviation == 0:
+        return 0.0
+    return float(deviation / largest) if largest and math.isfinite(deviation) else math.inf
+
+
 def _said(value: npt.NDArray[Any] | None) -> str:
-    if value is None:
-        return "missing"
-    return repr(value.item()) if value.ndim == 0 else f"{value.dtype} of shape {value.shape}"
+    return _kind(value) if value is None or value.ndim else repr(value.item())
 
 
 def _walk(
@@ -100,9 +159,59 @@ def _walk(
     if depth == _DEEPEST or id(value) in above:
         return
     for name, part in _parts(value):
-        yield from _walk(
-            part, f"{path}.{name.lstrip('_')}".lstrip("."), depth + 1, above | {id(value)}
-        )
+        yield from _walk(part, _path(path, name), depth + 1, above | {id(value)})
+
+
+def _restored(
+    value: object, values: Values, path: str, depth: int, done: dict[int, tuple[object, object]]
+) -> object:
+    """The value itself if it holds no numbers, else a copy with those of `values`."""
+    if path in values:
+        return _number_or_array(value, values[path])
+    if depth == _DEEPEST:
+        return value
+    if id(value) in done:
+        return done[id(value)][0]
+    # the value is kept, too, so that no other object gets its id
+    done[id(value)] = value, value
+    before = dict(_parts(value))
+    parts = {
+        name: _restored(part, values, _path(path, name), depth + 1, done)
+        for name, part in before.items()
+    }
+    if all(part is before[name] for name, part in parts.items()):
+        return value
+    new: Any
+    if isinstance(value, Mapping):
+        new = {name: parts[str(name)] for name in value}
+    elif isinstance(value, list):
+        new = list(parts.values())
+    elif isinstance(value, tuple):
+        make = getattr(type(value), "_make", tuple)
+        new = make(parts.values())
+    else:
+        new = copy.copy(value)
+        for name, part in parts.items():
+            object.__setattr__(new, name, part)
+        if isinstance(new, Derives):
+            new.derive()
+    done[id(value)] = new, value
+    return new
+
+
+def _number_or_array(value: object, recorded: npt.NDArray[Any]) -> object:
+    if not isinstance(value, np.ndarray):
+        return recorded.item() if isinstance(value, bool | int | float | complex) else recorded[()]
+    # strides decide which kernel a product takes, and so its last bit
+    last = sum((size - 1) * step for size, step in zip(value.shape, value.strides, strict=True))
+    memory = np.empty(max(last, 0) // value.itemsize + 1, value.dtype)
+    new = np.lib.stride_tricks.as_strided(memory, value.shape, value.strides)
+    new[...] = recorded
+    return new
+
+
+def _path(path: str, name: str) -> str:
+    return f"{path}.{name.lstrip('_')}".lstrip(".")
 
 
 def _parts(value: object) -> Iterator[tuple[str, object]]:

@@ -16,11 +16,13 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.control.python_law import PythonDesign
 from utank_hil.retuning.answer import Answer, read_answer
 from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.replay_head import causes
+from utank_hil.telemetry.law_values import ValueDifference
+from utank_hil.telemetry.replay_head import causes, law_differences, recorded_law
 
 _NOTHING: Final = "nothing"
 
@@ -90,6 +92,35 @@ class ReplayResult:
         return self.first is None
 
 
+@dataclass(frozen=True, slots=True)
+class LawVerdict:
+    """Which law answered the recorded frames, and how far today's design is from the recorded law.
+
+    Attributes
+    ----------
+    why_not_recorded : str
+        Why the law designed here answered; empty if the recorded one did.
+    differences : list of ValueDifference
+        Between the recorded law and the one designed here; no failure of a replay.
+    """
+
+    why_not_recorded: str
+    differences: list[ValueDifference]
+
+    @property
+    def deviation(self) -> float:
+        """The largest relative deviation in any array of the design; 0 if it is the same."""
+        return max((each.deviation for each in self.differences), default=0.0)
+
+
+class ReplayedLog(NamedTuple):
+    """A log replayed: what came of it, what else is not as then, and the law."""
+
+    result: ReplayResult
+    causes: list[str]
+    law: LawVerdict
+
+
 class RecordedRetuner:
     """Gives the answers of a recording, in the ticks in which they were taken.
 
@@ -146,11 +177,21 @@ def entries_of(blocks: Iterable[Records]) -> Iterator[Entry]:
 
 
 def replay_log(
-    log: FrameLog, config: ControllerConfig, folder: Path
-) -> tuple[ReplayResult, list[str]]:
-    """`replay` to a controller that has what the log's head says, and `causes` of a difference."""
+    log: FrameLog, config: ControllerConfig, folder: Path, *, as_recorded: bool = True
+) -> ReplayedLog:
+    """`replay` to a controller that has what the log's head says.
+
+    Parameters
+    ----------
+    as_recorded : bool
+        Whether `config` is the recorded configuration: the recorded law runs then, if that is
+        possible. Else the law runs that is designed for `config` here.
+    """
     law = build_law(config)
-    why = causes(log.head, config, law, folder)
+    differences = law_differences(log.head, law)
+    why_not = "another configuration was named"
+    if as_recorded or isinstance(config.law, PythonDesign):
+        law, why_not = recorded_law(log.head, config, law)
     result = replay(
         entries_of(log.blocks()),
         config,
@@ -159,7 +200,7 @@ def replay_log(
         estimating=log.head.get("estimating", False),
         commissioned=log.head.get("commissioned", True),
     )
-    return result, why
+    return ReplayedLog(result, causes(log.head, config, folder), LawVerdict(why_not, differences))
 
 
 def replay(

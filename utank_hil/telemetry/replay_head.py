@@ -8,6 +8,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +18,7 @@ from utank_hil.base.provenance import commit, describe, version
 from utank_hil.canbus import load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
+from utank_hil.control.python_law import PythonDesign
 from utank_hil.telemetry import law_values
 
 _PACKAGES: Final = ("numpy", "scipy", "daqp")
@@ -115,10 +117,39 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
         yield config
 
 
-def causes(
-    head: Mapping[str, Any], config: ControllerConfig, law: BuiltLaw, folder: Path
-) -> list[str]:
-    """What differs between a recorded run and one of `config` here, that may change its frames."""
+def recorded_law(
+    head: Mapping[str, Any], config: ControllerConfig, law: BuiltLaw
+) -> tuple[BuiltLaw, str]:
+    """The law that was recorded, and an empty text; else the law given, and why it is not that.
+
+    Parameters
+    ----------
+    config : ControllerConfig
+        The recorded one.
+    law : BuiltLaw
+        Designed for it here. A controller of it with the recorded numbers in their places is what
+        was recorded; its `linear`, for the analysis of its loop, stays the one designed here.
+    """
+    if isinstance(config.law, PythonDesign):
+        return law, "the law is Python code of one's own, which keeps its numbers where it likes"
+    values = law_values.decoded(head["law"])
+    make = law.controller
+    try:
+        law_values.restored(make(), values)
+    except law_values.LawValuesError as error:
+        return law, f"the recorded numbers do not fit this version's law: {error}"
+    return replace(law, controller=lambda: law_values.restored(make(), values)), ""
+
+
+def law_differences(head: Mapping[str, Any], law: BuiltLaw) -> list[law_values.ValueDifference]:
+    """What differs between the recorded law and one designed here, array by array."""
+    return law_values.differences(
+        law_values.decoded(head["law"]), law_values.law_values(law.controller())
+    )
+
+
+def causes(head: Mapping[str, Any], config: ControllerConfig, folder: Path) -> list[str]:
+    """What else differs between a recorded run and one of `config` here: it may change frames."""
     about = head["about"]
     found = [
         f"{name}: recorded {recorded}, here {here}"
@@ -137,7 +168,7 @@ def causes(
     here = describe("replay", config, folder, options={})
     recorded_keys = _flat(_put(about["configuration"], digests))
     replayed_keys = _flat(_put(here["configuration"], here["data"]))
-    found += _few(
+    return found + few(
         [
             f"configuration, {key}: recorded {recorded_keys.get(key, 'absent')!r}, "
             f"replayed {replayed_keys.get(key, 'absent')!r}"
@@ -145,12 +176,10 @@ def causes(
             if recorded_keys.get(key, "absent") != replayed_keys.get(key, "absent")
         ]
     )
-    recorded = law_values.decoded(head["law"])
-    replayed = law_values.law_values(law.controller())
-    return found + _few([f"law, {each}" for each in law_values.differences(recorded, replayed)])
 
 
-def _few(lines: list[str]) -> list[str]:
+def few(lines: list[str]) -> list[str]:
+    """The first lines, and how many there are more."""
     more = len(lines) - _SHOWN
     return [*lines[:_SHOWN], f"and {more} more"] if more > 0 else lines
 

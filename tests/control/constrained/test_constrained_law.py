@@ -216,7 +216,8 @@ def test_a_share_of_the_pressure_is_kept_as_soon_as_the_rate_allows_and_not_for_
     held = [abs(float(controller.step(push)[0])) for _ in range(4)]
     assert held == pytest.approx([0.6, 0.3, 0.3, 0.3], abs=1e-6)
     controller.allow(1.0)
-    assert abs(float(controller.step(push)[0])) == pytest.approx(0.7)
+    # a command that a limit bends is on a grid of 2^-19: this one, and the one before
+    assert abs(float(controller.step(push)[0])) == pytest.approx(0.7, abs=2**-19)
 
 
 def test_when_the_budget_is_too_small_the_last_plan_goes_on_and_ends_in_zero():

@@ -52,6 +52,11 @@ class ActiveSetSolver:
             raise ValueError(f"the quadratic programme cannot be set up (DAQP flag {flag})")
         self._model.settings = {"iter_limit": iteration_limit}
 
+    @property
+    def iteration_limit(self) -> int:
+        """Budget of a solution."""
+        return int(self._model.settings["iter_limit"])
+
     def forget(self) -> None:
         """Start the next solution without the last one's active set."""
         self._warm = False

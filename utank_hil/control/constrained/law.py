@@ -29,6 +29,13 @@ from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.sampling import LinearModel
 
+_GRID_BITS = 20
+"""Binary digits of a command along a limit: 2^-20 is the tolerance of the solver.
+
+A plan often goes along a limit, at a round pressure or a whole number of steps from one, where what
+is done with it (a comparison, the rounding of a message) hangs on its last digit; and that is the
+processor's. On a grid it is the same number on each.
+"""
 _FOLLOWED = 0.02  # of the greatest pressure: a mean command this near to the plan's counts as it
 
 
@@ -151,6 +158,7 @@ class ConstrainedController:
         self._levels_plan = horizon.outputs_plan[:, output]
         self._held_state = self._levels_state[self._programme.held]
         self._pressure_pa = self._allowed_pa = limits.pressure_pa
+        self._grid_pa = math.ldexp(1.0, math.frexp(limits.pressure_pa)[1] - _GRID_BITS)
         self._step_pa = limits.rate_pa_s * model.dt
         self._reach_pa = self._step_pa * (horizon.knots + 1.0)
         samples = len(horizon.interpolation)
@@ -159,6 +167,10 @@ class ConstrainedController:
         power_pa_m_s = limits.power_w / law.reservoir_area_m2
         self._power_pa_m_s = math.inf if law.level_output is None else power_pa_m_s
         self.reset()
+
+    def derive(self) -> None:
+        """Set the programme up anew, after other numbers were put into the controller."""
+        self._programme.rebuild(self._hessian)
 
     def reset(self) -> None:
         """Forget the past: state, plan and command zero."""
@@ -192,6 +204,8 @@ class ConstrainedController:
         low, high = self._last_pa - self._step_pa, self._last_pa + self._step_pa
         command = min(max(float(self._plan_pa[0]), low), high)
         command = min(max(command, -self._pressure_pa), self._pressure_pa)
+        if self.limited:
+            command = self._on_grid(command)
         self._before_pa = self._last_pa
         self._command_pa = self._mean_pa = self._last_pa = command
         return np.array([command])
@@ -223,6 +237,13 @@ class ConstrainedController:
             last = mean + (mean - self._mean_before_pa) / 2
         self._mean_pa = mean
         self._last_pa = min(max(last, -self._pressure_pa), self._pressure_pa)
+
+    def _on_grid(self, command: float) -> float:
+        """The nearest command of the grid, or the limit if that is nearer than the next one."""
+        command = float(np.rint(command / self._grid_pa)) * self._grid_pa + 0.0  # not -0.0
+        if 0 < abs(command) - self._allowed_pa < self._grid_pa:
+            return math.copysign(self._allowed_pa, command)
+        return command
 
     def _plan(self, best: FloatArray, steady_pa: float) -> FloatArray:
         """Commands at each sample of the horizon; `best` is the analytic plan."""

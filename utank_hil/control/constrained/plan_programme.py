@@ -54,19 +54,10 @@ class PlanProgramme:
         self._level_m = limits.level_m
         self._rise_pa = limits.rate_pa_s * sample_time_s * np.diff(horizon.knots, prepend=-1)
 
-        unit = self._unit_pa = limits.pressure_pa
-        hessian = horizon.hessian * unit**2
-        cost = float(np.trace(hessian)) / knots
-        self._gradient_scale = unit / cost
+        self._unit_pa = limits.pressure_pa
+        cost = self._cost(horizon.hessian)
         penalty = level_penalty / cost
-        whole = np.zeros((knots + 1, knots + 1))
-        whole[:knots, :knots], whole[knots, knots] = hessian / cost, penalty
-        slack = np.ones((levels, 1))
-        by_plan = self._by_plan * unit
-        steps = np.eye(knots) - np.eye(knots, k=-1)
-        rows = np.block([[steps, np.zeros((knots, 1))], [by_plan, -slack], [by_plan, slack]])
-        self._solver = ActiveSetSolver(whole, rows, iteration_limit)
-
+        self._gradient_scale = limits.pressure_pa / cost
         self._knots = knots
         self._gradient = np.full(knots + 1, penalty)
         self._lower = np.full(2 * knots + 1 + 2 * levels, -_FREE)
@@ -75,6 +66,27 @@ class PlanProgramme:
         self._rates = slice(knots + 1, 2 * knots + 1)
         self._low_side = slice(2 * knots + 1 + levels, None)
         self._high_side = slice(2 * knots + 1, 2 * knots + 1 + levels)
+        self._solver = self._set_up(horizon.hessian, iteration_limit)
+
+    def rebuild(self, hessian: FloatArray) -> None:
+        """Set the solver up anew, for another cost and whatever numbers the programme holds."""
+        self._solver = self._set_up(hessian, self._solver.iteration_limit)
+        self.forget()
+
+    def _cost(self, hessian: FloatArray) -> float:
+        return float(np.trace(hessian * self._unit_pa**2)) / len(hessian)
+
+    def _set_up(self, hessian: FloatArray, iteration_limit: int) -> ActiveSetSolver:
+        """The solver, in units of the greatest pressure."""
+        unit, knots, levels = self._unit_pa, len(hessian), len(self.held)
+        whole = np.zeros((knots + 1, knots + 1))
+        whole[:knots, :knots] = hessian * unit**2 / self._cost(hessian)
+        whole[knots, knots] = self._gradient[knots]
+        slack = np.ones((levels, 1))
+        by_plan = self._by_plan * unit
+        steps = np.eye(knots) - np.eye(knots, k=-1)
+        rows = np.block([[steps, np.zeros((knots, 1))], [by_plan, -slack], [by_plan, slack]])
+        return ActiveSetSolver(whole, rows, iteration_limit)
 
     def forget(self) -> None:
         """Start the next solution from nothing: as newly built."""
