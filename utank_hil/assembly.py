@@ -42,7 +42,8 @@ from utank_hil.retuning import (
     Work,
     make_pulses,
 )
-from utank_hil.retuning.estimate import MOST_NUMBERS
+from utank_hil.retuning.estimate import MOST_BANDS, EstimateRequest, MotionEstimate
+from utank_hil.retuning.estimator import COLUMNS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runners.statistics import LoopStatistics
 from utank_hil.safety.monitors.thresholds import thresholds_of
@@ -314,7 +315,8 @@ def retuner_work(config: ControllerConfig) -> Work | None:
     task = replace(task, least_gain=LEAST_GAIN)
     predictor = task.design.predictor
     rows = round(settings.identification_s / predictor.sample_time_s)
-    return partial(retune, task=task), (rows, 1 + len(predictor.measured))
+    columns = 1 + len(predictor.measured)
+    return Work(partial(retune, task=task), FloatArray, rows * columns)
 
 
 def _renewal_work(config: ControllerConfig) -> Work:
@@ -323,7 +325,7 @@ def _renewal_work(config: ControllerConfig) -> Work:
     design = config.law
     assert isinstance(design, SelfTunedDesign)
     task = RenewalTask(config.plant, sample_time_of(config.plant), design.mean_power_w)
-    return partial(renew, task=task), (1, MOST_NUMBERS)
+    return Work(partial(renew, task=task), MotionEstimate, 3 * MOST_BANDS)
 
 
 def estimator_work(config: ControllerConfig) -> Work | None:
@@ -334,7 +336,8 @@ def estimator_work(config: ControllerConfig) -> Work | None:
     from utank_hil.retuning.estimating import EstimateTask, estimate  # here: scipy.optimize
 
     task = EstimateTask(config.plant, ESTIMATE_SAMPLE_TIME_S, settings.effective_slope)
-    return partial(estimate, task=task), settings.longest_request
+    numbers = settings.samples * len(COLUMNS)
+    return Work(partial(estimate, task=task), EstimateRequest, numbers)
 
 
 def works_of(config: ControllerConfig) -> tuple[Work | None, Work | None]:

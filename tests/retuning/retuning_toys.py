@@ -1,11 +1,12 @@
 """Laws, candidates and retuners for the tests of this folder and of faults."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Mode, OperatorCommand, RetuningOrder, RetuningState, Verdict
 from utank_hil.control import PredictiveLaw
 from utank_hil.retuning import (
@@ -17,6 +18,7 @@ from utank_hil.retuning import (
     RetuningSettings,
     ShipFigures,
 )
+from utank_hil.retuning.retuner import Request
 
 SAMPLE_TIME_S = 0.2
 SAMPLE_NS = 200_000_000
@@ -50,9 +52,9 @@ class ToyRetuner:
     reply: Answer | None = None
     looks: int = 0
     alive: bool = True
-    records: list[FloatArray] = field(default_factory=list)
+    records: list[Any] = field(default_factory=list)
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
+    def submit(self, number: int, record: Request, now_ns: int) -> None:
         self.number = number
         self.records.append(record)
 
@@ -150,3 +152,27 @@ class Rig:
 
 def states(rig: Rig) -> list[RetuningState]:
     return [event.state for event in rig.controller.events]
+
+
+def scribble(content: Any, data: st.DataObject, values: list[float]) -> None:
+    """Overwrite a number of a decoded message, or a few in an array, with one of `values`."""
+    places = list(_places(content))
+    holder, key = data.draw(st.sampled_from(places))
+    value = data.draw(st.sampled_from(values))
+    if isinstance(holder[key], bytes):
+        numbers = np.frombuffer(holder[key]).copy()
+        begin = data.draw(st.integers(0, max(0, len(numbers) - 1)))
+        numbers[begin : begin + data.draw(st.integers(1, 6))] = value
+        holder[key] = numbers.tobytes()
+    else:
+        holder[key] = value
+
+
+def _places(content: Any) -> Iterator[tuple[Any, Any]]:
+    """Where the numbers and arrays of a decoded message stand."""
+    items = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in list(items):
+        if isinstance(value, dict | list):
+            yield from _places(value)
+        elif isinstance(value, bytes | float):
+            yield content, key

@@ -1,11 +1,13 @@
+import math
 import tracemalloc
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
-from retuning_toys import SUMMARY, Rig, ToyRetuner, candidate_of, law_of
+from retuning_toys import SUMMARY, Rig, ToyRetuner, candidate_of, law_of, scribble
 
 from utank_hil.canbus import Verdict
 from utank_hil.control import PredictiveLaw
@@ -43,13 +45,11 @@ def test_refusal_crosses_with_its_reasons(reasons: tuple[str, ...]) -> None:
 
 
 @given(st.binary(max_size=400))
+@example(b"\x91" * 100_000)  # nested deeper than Python goes
+@example(b"\x82\xa4type\xa7refusal\xa6answer\x81\xa7reasons\xdd\xff\xff\xff\xff")
 def test_nonsense_is_refused(data: bytes) -> None:
-    for head in (b"", b"CANDIDAT", b"ESTIMATE"):
-        try:
-            answer = read_answer(head + data)
-        except ValueError:
-            continue
-        assert isinstance(answer, Refusal)
+    with pytest.raises(ValueError, match=r".+"):
+        read_answer(data)
 
 
 @pytest.mark.parametrize("told", [True, False])
@@ -86,16 +86,21 @@ def test_the_largest_answer_that_a_configuration_can_ask_for_fits_its_mailbox() 
     "size", [(MOST_ORDER + 1, 5, 1), (5, MOST_SAMPLES + 1, 1), (5, 5, len(STATES) + 1)]
 )
 def test_a_larger_law_is_refused(size: tuple[int, int, int]) -> None:
-    with pytest.raises(ValueError, match="a dimension of"):
-        read_answer(answer_bytes(law_of_size(*size)))
+    with pytest.raises(ValueError, match=r"(order|samples|outputs) must be 1 to"):
+        law_of_size(*size)
 
 
-@pytest.mark.parametrize("character", ["x", "\n", "é"])
+@pytest.mark.parametrize("washout_rad_s", [-0.02, math.inf, math.nan])
+def test_a_washout_that_is_none_is_refused(washout_rad_s: float) -> None:
+    with pytest.raises(ValueError, match="washout"):
+        candidate_of(1e5, washout_rad_s)
+
+
+@pytest.mark.parametrize("character", ["x", "\n", "é", "\U0001f6a2"])
 def test_a_long_refusal_is_cut(character: str) -> None:
-    refusal = read_answer(b"REFUSAL " + (character * (1 << 20)).encode())
-    assert isinstance(refusal, Refusal)
-    assert len("".join(refusal.reasons)) <= 4000
-    assert len(refusal.reasons) <= 20
+    whole = answer_bytes(Refusal((character * (1 << 20),) * 50))
+    assert len(whole) <= LONGEST_BYTES
+    assert read_answer(whole) == Refusal((character * 500,) * 20)
 
 
 @pytest.mark.parametrize("washout_rad_s", [0.0, 0.02, 1e308])
@@ -140,18 +145,16 @@ def test_gains_are_those_of_the_whole_laws_matrices(data: st.DataObject) -> None
     assert admission_gains(candidate.law, whole) == pytest.approx(gains_of(whole), rel=1e-12)
 
 
-extreme = st.sampled_from([0.0, -1.0, 1e-308, -5e-324, 1e9, -1e200, 1.7e308, -1.7e308])
+EXTREME = [0.0, -1.0, 1e-308, -5e-324, 1e9, -1e200, 1.7e308, -1.7e308, math.nan, math.inf]
 
 
 @given(st.data())
-def test_no_answer_of_finite_numbers_makes_a_warning_in_the_loop(data: st.DataObject) -> None:
-    whole = bytearray(answer_bytes(candidate_of(1e5, 0.02)))
-    numbers = np.frombuffer(whole, offset=8)
+def test_no_answer_of_any_numbers_makes_a_warning_in_the_loop(data: st.DataObject) -> None:
+    content = msgspec.msgpack.decode(answer_bytes(candidate_of(1e5, 0.02)))
     for _ in range(data.draw(st.integers(1, 3))):
-        begin = data.draw(st.integers(5, len(numbers) - 1))
-        numbers[begin : begin + data.draw(st.integers(1, 6))] = data.draw(extreme)
+        scribble(content, data, EXTREME)
     try:
-        answer = read_answer(bytes(whole))
+        answer = read_answer(msgspec.msgpack.encode(content))
     except ValueError as error:
         answer = Refusal((str(error),))
     rig = Rig(ToyRetuner(answer))
@@ -164,7 +167,7 @@ def test_no_answer_of_finite_numbers_makes_a_warning_in_the_loop(data: st.DataOb
 def test_candidate_with_any_bytes_changed_is_sound_or_refused(data: st.DataObject) -> None:
     whole = bytearray(answer_bytes(candidate_of(1e5)))
     for _ in range(3):
-        at = data.draw(st.integers(8, len(whole) - 1))
+        at = data.draw(st.integers(0, len(whole) - 1))
         whole[at] = data.draw(st.integers(0, 255))
     cut = data.draw(st.integers(0, len(whole)))
     for content in (whole, whole[:cut]):

@@ -9,6 +9,7 @@ from rolling_ship import PLANT, SAMPLE_TIME_S, SHIP, loaded, motion_in, wave_mom
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.dynamics import RollShip
+from utank_hil.retuning.estimate import EstimateRequest, ShipFigures
 from utank_hil.retuning.estimating import EstimateTask, estimate
 from utank_hil.sea import jonswap
 
@@ -16,10 +17,9 @@ TASK = EstimateTask(PLANT, SAMPLE_TIME_S, 0.5)
 MOMENT_NM = wave_moment_nm(jonswap(4.0, 10.0), 1300.0, seed=3)
 
 
-def request(motion: FloatArray, known: RollShip = SHIP) -> FloatArray:
-    figures = [known.stiffness_nm_rad, known.inertia_kg_m2, known.damping_nms_rad, 0.0]
+def request(motion: FloatArray, known: RollShip = SHIP) -> EstimateRequest:
     record = np.column_stack([np.zeros(len(motion)), motion])
-    return np.vstack([figures, record])
+    return EstimateRequest(ShipFigures.of(known), record)
 
 
 def test_ship_and_sea_are_told_while_the_pump_works():

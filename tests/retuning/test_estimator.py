@@ -9,7 +9,7 @@ from retuning_toys import SHIP, ToyRetuner
 from utank_hil.canbus import Verdict
 from utank_hil.dynamics import RollShip, Tank
 from utank_hil.dynamics.tank import GRAVITY_M_S2
-from utank_hil.retuning import EstimateSettings, Estimator, MotionEstimate, Refusal
+from utank_hil.retuning import EstimateSettings, Estimator, MotionEstimate, Refusal, ShipFigures
 from utank_hil.retuning.estimator import OUTDATED, SAMPLE_TIME_S, metacentric_height_m
 from utank_hil.sea import SlopeSpectrum
 
@@ -50,10 +50,10 @@ def test_it_asks_once_an_interval_for_the_latest_record_and_shows_what_came():
     times_s = [time_s for time_s, _ in motion.came]
     assert times_s == pytest.approx([61.2, *(120.2 + 60 * k for k in range(6))], abs=0.5)
     first, last = motion.desk.records[0], motion.desk.records[-1]
-    assert first.shape == (1 + 301, 4)
-    assert last.shape == (1 + 1500, 4)
-    assert first[0, :3].tolist() == [1e9, 2e9, 5e7]
-    assert first[-1].tolist() == pytest.approx([1e3, 6.0, 0.2, 0.3])
+    assert first.record.shape == (301, 4)
+    assert last.record.shape == (1500, 4)
+    assert first.ship == ShipFigures(1e9, 2e9, 5e7)
+    assert first.record[-1].tolist() == pytest.approx([1e3, 6.0, 0.2, 0.3])
     figures = motion.estimator.figures
     assert (figures.of_sea, figures.of_ship) == (Verdict.GOOD, Verdict.GOOD)
     assert figures.sea_message()[1:5] == (3.2, 9.1, WAVES.rms_rad, 0.05)
@@ -65,10 +65,10 @@ def test_the_ship_that_was_told_is_the_known_one_of_the_next_request():
     heavier = replace(SHIP, inertia_kg_m2=3e9)
     motion = Motion(ToyRetuner(replace(GOOD, ship=heavier)))
     motion.run(125.0)
-    assert motion.desk.records[1][0, 1] == 3e9
+    assert motion.desk.records[1].ship == heavier
     motion.desk.reply = replace(GOOD, of_ship=Verdict.UNCERTAIN)
     motion.run(120.0)
-    assert motion.desk.records[3][0, 1] == 3e9
+    assert motion.desk.records[3].ship == heavier
     assert motion.estimator.figures.of_ship is Verdict.UNCERTAIN
     # what is shown of the ship is what was told last, with its age
     assert motion.estimator.figures.roll_period_s == pytest.approx(heavier.roll_period_s)
@@ -79,9 +79,9 @@ def test_what_is_not_new_is_a_gap():
     motion = Motion(ToyRetuner(GOOD))
     motion.run(30.0)
     motion.run(31.0, fresh=False)
-    record = motion.desk.records[0]
-    assert np.isnan(record[1 + 160 :, 1:]).all()
-    assert np.isfinite(record[1:140]).all()
+    record = motion.desk.records[0].record
+    assert np.isnan(record[160:, 1:]).all()
+    assert np.isfinite(record[:139]).all()
 
 
 def test_without_another_estimate_nothing_is_known_after_three_intervals_but_its_age():

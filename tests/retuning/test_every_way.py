@@ -44,7 +44,6 @@ NONSENSE = [
     candidate(1e5, input_gains=np.full((3, 1, 1), np.nan)),
     candidate(1e5, reference_gains=np.full((3, 1, 1), 1e10)),
     candidate(1e5, sample_time_s=0.5),
-    candidate(1e5, washout_rad_s=np.inf),
     candidate_of(1e5, outputs=2),
 ]
 

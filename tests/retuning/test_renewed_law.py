@@ -1,12 +1,14 @@
-"""A constrained law as plain numbers: any law crosses bit for bit, and no damaged one does."""
+"""A constrained law as a message: any law crosses bit for bit, and no unsound one does."""
 
 import dataclasses
 from functools import cache
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from retuning_toys import scribble
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control import PumpLimits
@@ -93,17 +95,21 @@ def test_any_law_crosses_bit_for_bit(sizes: tuple[int, ...], seed: int) -> None:
 
 
 @given(st.data())
-def test_any_damaged_byte_is_refused(data: st.DataObject) -> None:
+def test_a_damaged_byte_is_refused_or_leaves_a_sound_law(data: st.DataObject) -> None:
     whole = bytearray(encoded())
     at = data.draw(st.integers(0, len(whole) - 1))
     whole[at] ^= data.draw(st.integers(1, 255))
-    with pytest.raises(ValueError, match=r"check sum is wrong|no law, estimate or refusal"):
-        read_answer(bytes(whole))
+    try:
+        came = read_answer(bytes(whole))  # the mailbox's check sum is what finds damaged numbers
+    except ValueError:
+        return
+    assert isinstance(came, RenewedLaw)
+    assert np.isfinite(came.law.horizon.unlimited_state).all()
 
 
 @given(st.integers(0, len(encoded()) - 1))
 def test_a_cut_law_is_refused(length: int) -> None:
-    with pytest.raises(ValueError, match=r"check sum|no law|too short"):
+    with pytest.raises(ValueError, match=r"truncated"):
         read_answer(encoded()[:length])
 
 
@@ -111,15 +117,15 @@ def test_a_cut_law_is_refused(length: int) -> None:
 def test_whatever_numbers_a_broken_worker_sends_none_but_a_sound_law_is_read(
     data: st.DataObject,
 ) -> None:
-    numbers = np.frombuffer(encoded(), offset=16).copy()
-    extreme = st.sampled_from([0.0, -1.0, 1e-308, 1e9, 1e200, -1.7e308, np.nan, np.inf])
+    content = msgspec.msgpack.decode(encoded())
     for _ in range(data.draw(st.integers(1, 3))):
-        begin = data.draw(st.integers(0, len(numbers) - 1))
-        numbers[begin : begin + data.draw(st.integers(1, 6))] = data.draw(extreme)
+        scribble(content, data, [0.0, -1.0, 1e-308, 1e9, 1e200, -1.7e308, np.nan, np.inf])
     try:
-        came = RenewedLaw.of_numbers(numbers)  # numpy's warnings are errors in these tests
+        # numpy's warnings are errors in these tests
+        came = read_answer(msgspec.msgpack.encode(content))
     except ValueError:
         return
+    assert isinstance(came, RenewedLaw)
     assert np.isfinite(came.law.horizon.unlimited_state).all()
 
 
@@ -133,5 +139,5 @@ def test_the_largest_law_fits_its_mailbox_and_a_larger_one_is_refused() -> None:
         (3, 1, MOST_KNOTS + 1, MOST_SAMPLES, 0),
         (3, 1, 1, MOST_SAMPLES + 1, 0),
     ):
-        with pytest.raises(ValueError, match="a dimension of"):
+        with pytest.raises(ValueError, match=r"states must be 1 to|of length <=|<= 150"):
             read_answer(answer_bytes(law_of(*sizes)))

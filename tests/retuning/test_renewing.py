@@ -135,8 +135,7 @@ def test_known_waves_bring_a_law_that_is_tried_and_kept() -> None:
     assert "renewed for Hs 3.00 m, Tp 10.0 s" in rig.reasons
     assert "predicted roll 0.86 degrees" in rig.reasons
     (request,) = rig.retuner.records
-    asked = MotionEstimate.of_numbers(request[0])
-    assert np.array_equal(asked.waves.density, estimate().waves.density)  # type: ignore[union-attr]
+    assert np.array_equal(request.waves.density, estimate().waves.density)  # type: ignore[union-attr]
 
 
 def test_every_law_that_may_be_in_charge_is_told_what_is_allowed(
@@ -182,7 +181,7 @@ def test_a_changed_ship_brings_a_law_for_her() -> None:
     rig.controller.note(estimate(ship=SLOWER))
     rig.run_until(TRYING)
     rig.run_until(RETUNED)
-    assert MotionEstimate.of_numbers(rig.retuner.records[-1][0]).ship == SLOWER
+    assert rig.retuner.records[-1].ship == SLOWER
     assert rig.controller.laws.active.found == SLOWER  # the passive twin is hers, too
     rig.controller.note(estimate())  # she can't be told: still the last one that could
     assert rig.controller._latest.ship == SLOWER
@@ -467,11 +466,3 @@ def test_the_exchange_makes_no_step_in_the_pressure() -> None:
     assert apart[0] < 1.5 * apart[1:].max() / FADE_SAMPLES
     steps = np.abs(np.diff(rig.commands))[begin - 2 :]
     assert steps[:5].max() < 0.5 * steps[FADE_SAMPLES:].max()
-
-
-def test_a_request_of_the_widest_estimate_fits() -> None:
-    from utank_hil.retuning.estimate import MOST_BANDS, MOST_NUMBERS
-
-    omega = np.linspace(0.1, 3.0, MOST_BANDS)
-    waves = SlopeSpectrum(omega, np.ones(MOST_BANDS), np.ones(MOST_BANDS))
-    assert len(replace(estimate(), waves=waves).numbers()) == MOST_NUMBERS

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from tools.printing import command_line, show
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.frame import Frame
-from utank_hil.retuning import Answer, RetunerProcess
+from utank_hil.retuning import Answer, RetunerProcess, Work
 from utank_hil.runners import (
     Histogram,
     LoopStatistics,
@@ -87,7 +87,7 @@ def compute(record: FloatArray) -> Answer:
 @contextmanager
 def beside_a_retuner() -> Iterator[None]:
     """A retuner's processes at work on a record."""
-    with RetunerProcess((compute, RECORD)) as retuner:
+    with RetunerProcess(Work(compute, FloatArray, RECORD[0] * RECORD[1])) as retuner:
         retuner.desks[0].submit(1, np.random.default_rng(1).standard_normal(RECORD), 0)
         time.sleep(1.0)
         yield

@@ -27,6 +27,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.configuration import load_config
 from utank_hil.identification.multitaper import bandwidth_rad_s, coefficients
+from utank_hil.retuning.estimate import EstimateRequest, ShipFigures
 from utank_hil.retuning.estimating import EstimateTask, estimate
 from utank_hil.retuning.estimator import SAMPLE_TIME_S
 from utank_hil.sea import SlopeSpectrum
@@ -121,12 +122,12 @@ def parts_of(sea: str, period_s: float, hours: int, minutes: list[float]) -> Ite
             )
             # with a passive tank the ship is known, under GPC she is not
             known = actual if job.name == "passive" else plant.ship
-            head = [known.stiffness_nm_rad, known.inertia_kg_m2, known.damping_nms_rad, 0.0]
+            figures = ShipFigures.of(known)
             for length in minutes:
                 count = round(length * 60 / SAMPLE_TIME_S)
                 for start in range(0, len(record) - count + 1, count):
                     cut = slice(start, start + count)
-                    found = estimate(np.vstack([head, record[cut]]), task)
+                    found = estimate(EstimateRequest(figures, record[cut]), task)
                     if found.ship is None or found.waves is None:
                         continue
                     truth = true_slope(

@@ -1,41 +1,35 @@
 """The retuner's answer: a law, an estimate of waves and ship, or a refusal with reasons.
 
-All pass between processes as plain bytes. Decoding executes no code and rejects anything else, and
-anything too large for the loop to read, to build and to step between two ticks.
+All pass between processes as typed messages (`wire`). Decoding rejects anything that is not one,
+and anything too large for the loop to read, to build and to step between two ticks.
 """
 
-from dataclasses import dataclass, fields, replace
-from typing import Final
-from zlib import crc32
+import math
+from dataclasses import astuple, dataclass, replace
+from typing import Annotated, Final
 
-import numpy as np
+import msgspec
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
-from utank_hil.retuning.number_reader import NumberReader
-from utank_hil.retuning.renewed_law import MOST_NUMBERS, RenewedLaw
+from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate, ShipFigures
+from utank_hil.retuning.renewed_law import MOST_NUMBERS, RenewedLaw, RenewedLawMessage
+from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode, refuse_shapes, refuse_sizes
 
-_CANDIDATE: Final = b"CANDIDAT"
-_REFUSAL: Final = b"REFUSAL "
-_ESTIMATE: Final = b"ESTIMATE"
-_RENEWED: Final = b"RENEWED "
-_CRC_BYTES: Final = 8
-_REASONS_BYTES: Final = 4000
 _MOST_REASONS: Final = 20
+_MOST_CHARACTERS: Final = 500
 _MOST_OUTPUTS: Final = len(STATES)
-_HEAD: Final = 6
 
-LONGEST_BYTES: Final = 8 * max(
-    1 + _HEAD + 9 + MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS,
-    1 + 1 + MOST_NUMBERS,
+LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
+    8 * (MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS),
+    8 * max(MOST_NUMBERS, 3 * MOST_BANDS),
+    4 * _MOST_REASONS * _MOST_CHARACTERS,  # a character has up to four bytes
 )
-"""Of an answer that can be read: kind, head, summary and gains; or kind, check and numbers."""
+"""Of an answer that can be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +90,35 @@ class Candidate:
     ----------
     washout_rad_s : float
         Corner frequency of the washout; 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the law is too large for the loop, its gains do not fit together, or a number besides
+        them is not finite.
     """
 
     law: PredictiveLaw
     washout_rad_s: float
     summary: ModelSummary
+
+    def __post_init__(self) -> None:
+        law = self.law
+        order, samples = len(law.input_gains), len(law.reference_gains)
+        outputs = law.output_gains.shape[-1]
+        refuse_sizes(
+            order=(order, 1, MOST_ORDER),
+            samples=(samples, 1, MOST_SAMPLES),
+            outputs=(outputs, 1, _MOST_OUTPUTS),
+        )
+        refuse_shapes(
+            ("input_gains", law.input_gains, (order, 1, 1)),
+            ("output_gains", law.output_gains, (order, 1, outputs)),
+            ("reference_gains", law.reference_gains, (samples, 1, outputs)),
+        )
+        numbers = (self.washout_rad_s, law.sample_time_s, *astuple(self.summary))
+        if not (all(map(math.isfinite, numbers)) and self.washout_rad_s >= 0):
+            raise ValueError("the candidate's washout, sample time or summary is out of range")
 
     def whole_law(self) -> LinearLaw:
         """The law with its washout."""
@@ -117,43 +135,46 @@ class Refusal:
         Why, in words; one or more.
     """
 
-    reasons: tuple[str, ...]
+    reasons: Annotated[
+        tuple[Annotated[str, msgspec.Meta(max_length=_MOST_CHARACTERS)], ...],
+        msgspec.Meta(max_length=_MOST_REASONS),
+    ]
 
 
 Answer = Candidate | RenewedLaw | MotionEstimate | Refusal
 
 
+class _CandidateMessage(msgspec.Struct, frozen=True, tag="candidate", forbid_unknown_fields=True):
+    answer: Candidate
+
+
+class _EstimateMessage(msgspec.Struct, frozen=True, tag="estimate", forbid_unknown_fields=True):
+    answer: MotionEstimate
+
+
+class _RefusalMessage(msgspec.Struct, frozen=True, tag="refusal", forbid_unknown_fields=True):
+    answer: Refusal
+
+
+_Message = _CandidateMessage | _EstimateMessage | _RefusalMessage | RenewedLawMessage
+_DECODER: Final = decoder(_Message, finite=True)
+
+
 def answer_bytes(answer: Answer) -> bytes:
     """Encode an answer for another process; long reasons are cut."""
-    if isinstance(answer, Refusal):
-        return _REFUSAL + "\n".join(answer.reasons).encode(errors="replace")[:_REASONS_BYTES]
-    if isinstance(answer, MotionEstimate):
-        return _ESTIMATE + answer.numbers().tobytes()
-    if isinstance(answer, RenewedLaw):
-        content = answer.numbers().tobytes()
-        return _RENEWED + crc32(content).to_bytes(_CRC_BYTES, "little") + content
-    law = answer.law
-    order, inputs, outputs = law.output_gains.shape
-    numbers: list[FloatArray | list[float]] = [
-        [
-            order,
-            inputs,
-            outputs,
-            len(law.reference_gains),
-            answer.washout_rad_s,
-            law.sample_time_s,
-        ],
-        [getattr(answer.summary, field.name) for field in fields(ModelSummary)],
-        *(
-            array.ravel()
-            for array in (
-                law.input_gains,
-                law.output_gains,
-                law.reference_gains,
-            )
-        ),
-    ]
-    return _CANDIDATE + np.concatenate(numbers).tobytes()
+    message: _Message
+    match answer:
+        case Candidate():
+            message = _CandidateMessage(answer)
+        case RenewedLaw():
+            message = RenewedLawMessage.of(answer)
+        case MotionEstimate():
+            message = _EstimateMessage(answer)
+        case Refusal():
+            whole = (reason.encode(errors="replace").decode() for reason in answer.reasons)
+            reasons = [reason[:_MOST_CHARACTERS] for reason in whole]
+            message = _RefusalMessage(Refusal(tuple(reasons[:_MOST_REASONS])))
+    return encode(message)
 
 
 def read_answer(data: bytes) -> Answer:
@@ -164,31 +185,8 @@ def read_answer(data: bytes) -> Answer:
     ValueError
         If `data` is anything else.
     """
-    kind, content = data[:8], data[8:]
-    if kind == _REFUSAL:
-        reasons = content[:_REASONS_BYTES].decode(errors="replace").split("\n")
-        return Refusal(tuple(reasons[:_MOST_REASONS]))
-    if kind not in (_CANDIDATE, _ESTIMATE, _RENEWED) or len(content) % 8:
-        raise ValueError("the answer is no law, estimate or refusal")
-    if kind == _RENEWED:
-        check, content = content[:_CRC_BYTES], content[_CRC_BYTES:]
-        if int.from_bytes(check, "little") != crc32(content):
-            raise ValueError("the answer's check sum is wrong")
-        return RenewedLaw.of_numbers(np.frombuffer(content))
-    if kind == _ESTIMATE:
-        return MotionEstimate.of_numbers(np.frombuffer(content))
-    values = NumberReader(np.frombuffer(content))
-    order, inputs, outputs = values.size(MOST_ORDER), values.size(1), values.size(_MOST_OUTPUTS)
-    horizon = values.size(MOST_SAMPLES)
-    washout_rad_s, sample_time_s = values.take(2).tolist()
-    summary = ModelSummary(*values.take(len(fields(ModelSummary))).tolist())
-    law = PredictiveLaw(
-        values.array(order, inputs, inputs),
-        values.array(order, inputs, outputs),
-        values.array(horizon, inputs, outputs),
-        sample_time_s,
-    )
-    values.end()
-    if not washout_rad_s >= 0:
-        raise ValueError(f"the answer's washout is {washout_rad_s} rad/s")
-    return Candidate(law, washout_rad_s, summary)
+    try:
+        message: _Message = _DECODER.decode(data)
+    except RecursionError as error:
+        raise ValueError("the answer is nested too deeply") from error
+    return message.answer

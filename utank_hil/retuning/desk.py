@@ -8,12 +8,10 @@ import time
 import traceback
 from typing import Final
 
-import numpy as np
-
-from utank_hil.base.arrays import FloatArray
 from utank_hil.retuning.answer import LONGEST_BYTES, Answer, Refusal, answer_bytes, read_answer
 from utank_hil.retuning.mailbox import Mailbox
-from utank_hil.retuning.retuner import Work
+from utank_hil.retuning.retuner import Request, Work
+from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode
 
 _ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
 
@@ -24,12 +22,12 @@ class Desk:
     Parameters
     ----------
     work : Work
-        What is done with a record, and the shape of the longest one.
+        What is done, with which requests.
     """
 
     def __init__(self, work: Work) -> None:
-        self._compute, (rows, columns) = work
-        self._requests = Mailbox(8 * (rows * columns + 1))
+        self._compute, self._request, most_numbers = work
+        self._requests = Mailbox(OVERHEAD_BYTES + 8 * most_numbers)
         self._answers = Mailbox(LONGEST_BYTES)
 
     @property
@@ -42,9 +40,9 @@ class Desk:
         """Time of the worker's latest heartbeat."""
         return self._answers.beat_ns
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:  # noqa: ARG002
-        """Post a record."""
-        self._requests.post(number, np.float64(record.shape[1]).tobytes() + record.tobytes())
+    def submit(self, number: int, request: Request, now_ns: int) -> None:  # noqa: ARG002
+        """Post a request."""
+        self._requests.post(number, encode(request))
 
     def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
         """The answer, if it has arrived; a message that cannot be decoded is a refusal."""
@@ -70,9 +68,8 @@ class Desk:
         if data is None:
             return False
         try:
-            values = np.frombuffer(data)
-            record = values[1:].reshape(-1, int(values[0]))
-            self._answers.post(number, answer_bytes(self._compute(record)))
+            request = decoder(self._request, finite=False).decode(data)
+            self._answers.post(number, answer_bytes(self._compute(request)))
         except Exception as error:
             traceback.print_exc(file=sys.stderr)
             refusal = Refusal((f"the retuner failed: {type(error).__name__}: {error}",))

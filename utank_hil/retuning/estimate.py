@@ -1,13 +1,8 @@
-"""What the motion tells of waves and ship: the estimator's answer.
-
-Passes between processes as plain numbers.
-"""
+"""What the motion shows of waves and ship: the estimator's answer, and what it is asked with."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated, Final
-
-import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, range_problems, refuse
@@ -16,6 +11,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import SlopeSpectrum
 
 MOST_BANDS: Final = 1000
+"""Bands of a spectrum: more than a record of an hour has, and soon read between two ticks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +56,6 @@ class ShipFigures:
         )
 
 
-_HEAD: Final = 6
-MOST_NUMBERS: Final = _HEAD + len(fields(ShipFigures)) + 3 * MOST_BANDS
-"""Of an estimate."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEstimate:
     """Waves and ship, from the latest part of the motion's record.
@@ -85,6 +76,11 @@ class MotionEstimate:
         configuration gives.
     duration_s : float
         Length of the record that it is from.
+
+    Raises
+    ------
+    ValueError
+        If the waves have more bands than the loop can read between two ticks.
     """
 
     of_sea: Verdict
@@ -96,39 +92,23 @@ class MotionEstimate:
     tp_s: float = math.nan
     duration_s: float = 0.0
 
-    def numbers(self) -> FloatArray:
-        """The estimate as numbers, for another process."""
-        head = [self.of_sea, self.of_ship, self.rms_deviation, self.hs_m, self.tp_s]
-        head.append(self.duration_s)
-        ship = [math.nan] * len(fields(ShipFigures))
-        if self.ship is not None:
-            ship = [getattr(self.ship, field.name) for field in fields(ShipFigures)]
-        parts = [np.array([*head, *ship])]
-        if self.waves is not None:
-            deviation = self.waves.deviation
-            assert deviation is not None
-            parts += [self.waves.omega_rad_s, self.waves.density, deviation]
-        return np.concatenate(parts)
+    def __post_init__(self) -> None:
+        bands = 0 if self.waves is None else len(self.waves.omega_rad_s)
+        if bands > MOST_BANDS:
+            raise ValueError(f"an estimate has at most {MOST_BANDS} bands, got {bands}")
 
-    @classmethod
-    def of_numbers(cls, numbers: FloatArray) -> "MotionEstimate":
-        """The estimate that `numbers` gave.
 
-        Raises
-        ------
-        ValueError
-            If they are of no estimate.
-        """
-        ship_end = _HEAD + len(fields(ShipFigures))
-        bands, left = divmod(len(numbers) - ship_end, 3)
-        if left or not 0 <= bands <= MOST_BANDS:
-            raise ValueError(f"{len(numbers)} numbers are no estimate")
-        head, ship = numbers[:_HEAD].tolist(), numbers[_HEAD:ship_end]
-        spectrum = numbers[ship_end:].reshape(3, bands).copy()
-        return cls(
-            Verdict(head[0]),
-            Verdict(head[1]),
-            ShipFigures(*ship.tolist()) if np.isfinite(ship).all() else None,
-            SlopeSpectrum(*spectrum) if bands else None,
-            *head[2:],
-        )
+@dataclass(frozen=True, slots=True, eq=False)
+class EstimateRequest:
+    """What the estimator is asked with.
+
+    Attributes
+    ----------
+    ship : ShipFigures
+        The ship as it is known.
+    record : ndarray, shape (N, 4)
+        `estimator.COLUMNS` of the latest samples, gaps NaN.
+    """
+
+    ship: ShipFigures
+    record: FloatArray

@@ -10,7 +10,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Verdict
 from utank_hil.control import DesignPlant
 from utank_hil.identification.motion_fit import KNOWN_SPREAD, MotionFit, fit_motion
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.estimator import COLUMNS
 
 LEAST_PERIODS: Final = 45.0
@@ -55,20 +55,14 @@ class EstimateTask:
     effective_slope: float
 
 
-def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
+def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     """Tell waves and ship from a record.
 
     The ship is fitted to the whole record and to its last half. Where they contradict each other
     she was loaded meanwhile, and the half counts. Where the motion does not tell the ship, the
     waves are those of the known one, and uncertain if another would explain the motion far better.
-
-    Parameters
-    ----------
-    request : ndarray, shape (1 + N, 4)
-        The known ship's stiffness, inertia and damping, and a number of no meaning; then
-        `estimator.COLUMNS`, gaps NaN.
     """
-    known, record = request[0, :3], request[1:]
+    known, record = request.ship, request.record
     period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
     least = round(LEAST_PERIODS * period_s / task.sample_time_s)
     motion = _without_gaps(record[:, [COLUMNS.index(name) for name in _MOTION]])
@@ -88,9 +82,9 @@ def estimate(request: FloatArray, task: EstimateTask) -> MotionEstimate:
         likeliest = fit.log_likelihood
         ship = dataclasses.replace(
             task.plant.ship,
-            stiffness_nm_rad=known[0],
-            inertia_kg_m2=known[1],
-            damping_nms_rad=known[2],
+            stiffness_nm_rad=known.stiffness_nm_rad,
+            inertia_kg_m2=known.inertia_kg_m2,
+            damping_nms_rad=known.damping_nms_rad,
         )
         plant = dataclasses.replace(task.plant, ship=ship)
         fit = fit_motion(motion, plant, task.sample_time_s, KNOWN_SPREAD)

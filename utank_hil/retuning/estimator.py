@@ -18,7 +18,7 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 from utank_hil.retuning.answer import Refusal
-from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFigures
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.retuner import Retuner
 
@@ -65,9 +65,9 @@ class EstimateSettings:
         refuse("sea estimate", range_problems(self))
 
     @property
-    def longest_request(self) -> tuple[int, int]:
-        """Rows and columns of the longest request."""
-        return 1 + round(self.record_s / SAMPLE_TIME_S), len(COLUMNS)
+    def samples(self) -> int:
+        """Length of the record in samples."""
+        return round(self.record_s / SAMPLE_TIME_S)
 
 
 @dataclass(slots=True)
@@ -206,12 +206,9 @@ class Estimator:
         self._ship, self._tank = ship, tank
         self._least_gm_m = least_gm_m
         self._low = False
-        rows, columns = settings.longest_request
-        self._history = SampleHistory(rows - 1, columns - 1)
-        self._motion = np.zeros(columns - 1)
-        self._known = np.array(
-            [ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad, 0.0]
-        )
+        self._history = SampleHistory(settings.samples, len(COLUMNS) - 1)
+        self._motion = np.zeros(len(COLUMNS) - 1)
+        self._known = ShipFigures.of(ship)
         self._number = 0
         self._due_ns: int | None = None
         self._asked_ns: int | None = None
@@ -255,7 +252,7 @@ class Estimator:
             self._number += 1
             self._asked_ns = now_ns
             record = self._history.record(self._history.capacity)
-            self._desk.submit(self._number, np.vstack([self._known, record]), now_ns)
+            self._desk.submit(self._number, EstimateRequest(self._known, record), now_ns)
         self._grow_old(now_ns)
         outdated = self.figures.of_sea is Verdict.OUTDATED
         if now_ns - self._since_ns > self._outdated_ns and not outdated:
@@ -287,7 +284,7 @@ class Estimator:
         ship = answer.ship
         if answer.of_ship is Verdict.GOOD and ship is not None:
             self._ship_ns = asked_ns
-            self._known[:3] = ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad
+            self._known = ship
             self._show_ship(ship)
         self._show(answer)
         self.figures.gm_low = self._low

@@ -39,7 +39,7 @@ from utank_hil.retuning.answer import Answer, ModelSummary, Refusal
 from utank_hil.retuning.estimate import MotionEstimate
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
-from utank_hil.retuning.retuner import Retuner
+from utank_hil.retuning.retuner import Request, Retuner
 from utank_hil.retuning.settings import EARLIEST_VERDICT_S, TrialSettings
 from utank_hil.retuning.trial import MovingWindow, WindowStatistics, worsening
 
@@ -285,7 +285,7 @@ class LawExchange(ABC):
         else:
             self._check_trial()
 
-    def _submit(self, request: FloatArray, *reasons: str) -> None:
+    def _submit(self, request: Request, *reasons: str) -> None:
         """Ask the retuner for a law."""
         self._request_number += 1
         self._submitted_ns = self._now_ns

@@ -59,15 +59,8 @@ class TailedSpectrum:
         return np.where(omega_rad_s > self._top_rad_s, self._level / omega_rad_s, inside)
 
 
-def renew(request: FloatArray, task: RenewalTask) -> RenewedLaw | Refusal:
-    """Design a law for the estimated waves and ship.
-
-    Parameters
-    ----------
-    request : ndarray, shape (1, N)
-        `MotionEstimate.numbers` of an estimate that holds both.
-    """
-    estimate = MotionEstimate.of_numbers(request[0])
+def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
+    """Design a law for the estimated waves and ship."""
     if estimate.waves is None or estimate.ship is None:
         return Refusal(("there is no estimate of the waves to design a law for",))
     plant = dataclasses.replace(task.plant, ship=estimate.ship.ship(task.plant.ship))

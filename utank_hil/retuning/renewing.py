@@ -196,7 +196,7 @@ class RenewingController(LawExchange):
         if self._asked is None:
             self._abort(f"{reason}, but the waves are not known: try again later")
             return
-        self._submit(self._asked.numbers()[None], reason)
+        self._submit(self._asked, reason)
 
     def _admit(self, answer: Answer) -> WarmUp | str:
         if not isinstance(answer, RenewedLaw):

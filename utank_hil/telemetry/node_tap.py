@@ -9,11 +9,11 @@ from functools import cache
 from struct import Struct
 from typing import Any, Final
 
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.retuning import Retuner
 from utank_hil.retuning.answer import Answer, answer_bytes
+from utank_hil.retuning.retuner import Request
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind
 
 Sink = Callable[[bytes, int], None]
@@ -132,9 +132,9 @@ class RetunerTap:
         self._alive.append(self._retuner.alive)
         return self._alive[-1]
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
-        """Request an answer for a record, under a new number."""
-        self._retuner.submit(number, record, now_ns)
+    def submit(self, number: int, request: Request, now_ns: int) -> None:
+        """Ask for an answer, under a new number."""
+        self._retuner.submit(number, request, now_ns)
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
         """The answer to request `number`, None while there is none."""

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from utank_hil.assembly import build_controller_node, build_law
-from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame, load_catalogue
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 from utank_hil.control.python_law import PythonDesign
 from utank_hil.retuning.answer import Answer, read_answer
+from utank_hil.retuning.retuner import Request
 from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.bus_records import LAYOUT, PAYLOAD_BYTES, Kind, Records
 from utank_hil.telemetry.frame_log import FrameLog
@@ -143,8 +143,8 @@ class RecordedRetuner:
             return False
         return self._alive.popleft()
 
-    def submit(self, number: int, record: FloatArray, now_ns: int) -> None:
-        """Take a record: its answer is known."""
+    def submit(self, number: int, request: Request, now_ns: int) -> None:
+        """Take a request: its answer is known."""
 
     def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
         """The answer, if it was taken in this tick."""
