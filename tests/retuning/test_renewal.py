@@ -39,10 +39,15 @@ def estimated(ship: ShipFigures = SHIP, factor: float = 1.0) -> MotionEstimate:
 
 
 @pytest.mark.usefixtures("short_search")
-@pytest.mark.parametrize("period", [1.0, 14.4 / 12.57])
+@pytest.mark.parametrize(("period", "begun_with"), [(1.0, 0.5548), (14.4 / 12.57, 0.7352)])
 def test_the_law_is_for_the_estimated_ship_at_the_sample_time_of_the_one_in_charge(
-    period: float,
+    period: float, begun_with: float
 ) -> None:
+    """It rolls less than the law that the observer's search begins with.
+
+    That law comes from Riccati equations: its share of the passive roll, `begun_with`, is the same
+    to eleven digits on any processor. How far a search of ten steps comes from there is not.
+    """
     ship = replace(SHIP, stiffness_nm_rad=SHIP.stiffness_nm_rad / period**2)
     step_s = sample_time_of(PLANT)
     task = RenewalTask(PLANT, step_s)
@@ -56,8 +61,7 @@ def test_the_law_is_for_the_estimated_ship_at_the_sample_time_of_the_one_in_char
     assert waves is not None
     passive = passive_roll_rad(plant, TailedSpectrum(waves))
     assert answer.passive_roll_rad == pytest.approx(passive, rel=1e-9)
-    # where the short search ends depends on rounding: 0.70 to 0.73 on different processors
-    assert answer.roll_rad < 0.8 * passive
+    assert answer.roll_rad < begun_with * passive
 
 
 def test_beyond_the_bands_the_slope_falls_as_that_of_wind_waves() -> None:
