@@ -4,8 +4,6 @@ PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
 # a worker on each core; a file's tests stay together, for their fixtures; the longest files first
 PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile --no-loadscope-reorder
-PEERS := .cache/peers
-PEERS_READY := $(PEERS)/.ready
 # extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-strip-extras
@@ -15,25 +13,27 @@ export OPENBLAS_NUM_THREADS := 1
 # bytecode that is not kept is compiled anew by each of the hundreds of processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup compiled bench test test-fast evidence thesis search check format benchmark peers site sbom wheel docs lock clean
+.PHONY: help setup compiled bench test test-fast test-all mutants coverage evidence thesis search check format benchmark site sbom wheel docs lock clean
 
 help:
 	@echo "make setup      virtual environment with everything pinned in requirements.lock"
 	@echo "make bench      the main job: a controller quiets a rolling ship, table, picture, recording"
 	@echo "make test       lint, types and the tests, those on a real CAN bus included: 20 minutes"
 	@echo "make test-fast  the quick tests, without CAN: three minutes"
+	@echo "make test-all   'make test', then the tests that take minutes each: 90 minutes"
+	@echo "make mutants    the tests of the safety code against every small change of it: hours"
+	@echo "make coverage   lines and branches of the safety code that no test of it runs"
 	@echo "make compiled   simulations in 0.4 of the time, until the source changes; a minute, with gcc"
-	@echo "make evidence   what takes longer, where its result is missing or out of date: hours at first;"
-	@echo "                $(PYTHON) -m tools.evidence --list shows the parts, --part runs one"
+	@echo "make evidence   for a release: the measurements in docs/evidence that it has not, a day;"
+	@echo "                $(PYTHON) -m tools.evidence --list shows them"
 	@echo "make thesis     figures and printed numbers of the source thesis made anew, out/thesis: four minutes"
 	@echo "make search     the property tests with new random examples, until one fails or they end"
 	@echo "make check      lint, format, strict types, layers of the packages, generated documents"
-	@echo "make benchmark  speed, as ratios to something else in the same run; published packages too"
-	@echo "make peers      the environment of those packages, 480 MB, for tools/peers/compare_*.py"
+	@echo "make benchmark  speed, as ratios to something else in the same run"
 	@echo "make site       the documentation as web pages, out/site"
 	@echo "make sbom       the list of parts of a deployed controller, out/sbom.json"
 	@echo "make wheel      the package for a ship's PC and the lock of what it needs there, dist/"
-	@echo "make docs       write the generated documents and tables anew"
+	@echo "make docs       write the generated documents anew"
 	@echo "make lock       resolve the dependencies again"
 	@echo "make clean      remove everything that can be made again"
 
@@ -58,9 +58,6 @@ check: setup
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	MYPYPATH=tools $(VENV)/bin/mypy -p vcan_launcher
-	$(VENV)/bin/mypy tools/compiled.py tools/sbom.py
-	$(VENV)/bin/mypy --explicit-package-bases $(addprefix tools/,benchmarks documents evidence fuzz mutation peers reference_recordings studies thesis)
 	$(VENV)/bin/lint-imports --no-logo
 	$(PYTHON) -m tools.documents.write --check
 
@@ -68,12 +65,16 @@ test: setup
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target check site
 	$(PARALLEL) -m "not socketcan and not evidence"
 	tools/vcan $(VENV)/bin/pytest -m "socketcan and not evidence" tests/socketcan
-	$(PYTHON) -m tools.mutation.run --not-judged --within 60
 
 test-fast: setup
 	$(PARALLEL) -m "not socketcan and not slow and not evidence" --hypothesis-profile=few
 
-evidence: setup peers
+test-all: test
+	$(PARALLEL) -m "evidence and not socketcan"
+	tools/vcan $(VENV)/bin/pytest -m evidence tests/socketcan --ignore=tests/socketcan/test_service.py
+	tools/vcan --uml $(VENV)/bin/pytest -m evidence tests/socketcan/test_service.py
+
+evidence: setup
 	$(PYTHON) -m tools.evidence
 
 thesis: setup
@@ -87,23 +88,9 @@ format: setup
 	$(VENV)/bin/ruff check --fix .
 	$(VENV)/bin/ruff format .
 
-benchmark: setup peers
+benchmark: setup
 	@for name in $(basename $(notdir $(wildcard tools/benchmarks/*.py))); do \
 		echo; echo "== $$name"; $(PYTHON) -m tools.benchmarks.$$name || exit 1; done
-	@for name in $(basename $(notdir $(wildcard tools/peers/compare_*.py))); do \
-		echo; echo "== $$name"; $(PEERS)/bin/python -m tools.peers.$$name || exit 1; done
-
-peers: $(PEERS_READY)
-
-# its packages come on top of the project's (the .pth file), whose versions its lock repeats
-$(PEERS_READY): tools/peers/requirements.lock | $(READY)
-	rm -rf $(PEERS)
-	python3 -m venv $(PEERS)
-	$(PYTHON) -c "import sysconfig; print('import site; site.addsitedir(%r)' % sysconfig.get_path('purelib'))" \
-		> "$$($(PEERS)/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/project.pth"
-	$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes \
-		-r tools/peers/requirements.lock
-	@touch $@
 
 # the site of README, docs/ and docstrings; a link that leads nowhere is an error
 site: setup
@@ -127,8 +114,6 @@ docs: setup
 
 lock: setup
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
-	$(COMPILE) --constraints requirements.lock --excludes tools/peers/excludes.txt \
-		tools/peers/requirements.in -o tools/peers/requirements.lock
 
 clean:
 	rm -rf $(VENV) .cache build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

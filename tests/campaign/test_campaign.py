@@ -20,7 +20,6 @@ from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table
 from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
-from tools.evidence import campaign_part
 from utank_hil.commands.common import new_app
 from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import write_page
@@ -177,20 +176,6 @@ def test_campaign_stops_where_its_interval_is_narrow(run, tmp_path: Path):
     # more cases may have been computed; they do not count
     assert found["cases"] == 200
     assert group["counted"] == figure["cases"]
-
-
-def test_study_as_a_part_of_the_evidence_keeps_its_rows(
-    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    path = written(tmp_path, grid={"sea.heading_deg": [90.0, 0.0]})
-    monkeypatch.setattr(campaign_part, "FOLDER", tmp_path)
-    monkeypatch.setattr("sys.argv", ["campaign_part", str(path)])
-    assert campaign_part.main() == 0
-    found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
-    rows = {(row["sea.heading_deg"], row["run"]): row for row in found["rows"]}
-    assert list(rows) == [(90.0, "no tank"), (90.0, "passive"), (90.0, "gpc"), (0.0, "")]
-    assert rows[90.0, "no tank"]["strikes"] is None
-    assert rows[0.0, ""]["status"] == "failed"
 
 
 def test_interrupted_campaign_says_so_keeps_what_there_is_and_goes_on(

@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import gumbel_r
 
-from tools.evidence.sources import ROOT
+from tools.evidence import ROOT
 from tools.studies import false_alarms
-from tools.studies.false_alarms import by_monitor, code, hours, judged, rate_per_hour, sail
+from tools.studies.false_alarms import by_monitor, hours, judged, rate_per_hour, sail
 from tools.studies.monitor_margins import margins
 
 
@@ -31,7 +30,7 @@ def test_rate_is_the_tail_of_what_the_hours_were_drawn_from() -> None:
 def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
     draw = np.random.default_rng(2)
     whole = gumbel_r.rvs(0.6, 0.05, size=50, random_state=draw).tolist()
-    runs = [{"largest": {"drift": each}, "found_s": {}, "code": ""} for each in whole]
+    runs = [{"largest": {"drift": each}, "found_s": {}} for each in whole]
     expected = judged("gpc", "storm", runs)["rate_per_hour"]["drift"]
     for finding, monitor, counts in (
         ("LEVEL_LIMIT", "drift", False),
@@ -41,7 +40,7 @@ def test_an_hour_that_another_monitor_ended_is_not_in_the_fit() -> None:
         ("SATURATED", "drift", True),
     ):
         all_of_it = [run | {"largest": {monitor: run["largest"]["drift"]}} for run in runs]
-        cut = {"largest": {monitor: 0.05}, "found_s": {finding: 3.0}, "code": ""}
+        cut = {"largest": {monitor: 0.05}, "found_s": {finding: 3.0}}
         row = judged("gpc", "storm", [*all_of_it, *[cut] * 9])
         assert (row["rate_per_hour"][monitor] != pytest.approx(expected)) == counts
         assert row["maxima"][monitor][-1] == 0.05
@@ -66,7 +65,6 @@ def test_hours_that_were_sailed_are_kept_and_retuning_is_ordered_in_every_second
         return {"largest": {"drift": 0.1 * seed}, "found_s": {"DRIFT": 3.0} if seed == 2 else {}}
 
     monkeypatch.setattr(false_alarms, "CACHE", tmp_path)
-    monkeypatch.setattr(false_alarms, "RECORD", tmp_path / "false_alarms.json")
     monkeypatch.setattr(false_alarms, "margins", margins)
     sea, scenario = next(iter(hours("adaptive_gpc")))
     assert len(sail("adaptive_gpc", sea, scenario, 2)) == 2
@@ -85,76 +83,6 @@ def test_what_ends_control_is_found_though_no_monitor_finds_it() -> None:
     assert list(found_s) == ["LEVEL_LIMIT"]
     assert 5.0 < found_s["LEVEL_LIMIT"] < 60.0
     assert margins(scenario, "gpc", 1, 60.0)["found_s"] == {}
-
-
-@pytest.mark.parametrize(
-    ("of", "factor", "found", "more"),
-    [
-        ("", 1.0, "DRIFT", [4, 5]),
-        # of another code: the second once more, and all of them if it is another
-        ("another", 1.0, "DRIFT", [2, 4, 5]),
-        ("another", 1.001, "DRIFT", [2, 1, 2, 3, 4, 5]),
-        ("another", 1.0, "SPIKES", [2, 1, 2, 3, 4, 5]),
-    ],
-)
-def test_hours_of_the_record_are_gone_on_from_if_this_code_makes_the_same(
-    of: str,
-    factor: float,
-    found: str,
-    more: list[int],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    sailed: list[int] = []
-    now = {"factor": 1.0, "found": "DRIFT"}
-
-    def margins(scenario: Any, name: str, seed: int, seconds: float) -> dict[str, Any]:
-        sailed.append(seed)
-        finds = {now["found"]: 3.0} if seed == 2 else {}
-        return {"largest": {"drift": 0.1 * seed * now["factor"]}, "found_s": finds}
-
-    monkeypatch.setattr(false_alarms, "margins", margins)
-    monkeypatch.setattr(false_alarms, "RECORD", tmp_path / "false_alarms.json")
-    sea, scenario = next(iter(hours("gpc")))
-    monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "first")
-    row = judged("gpc", sea, sail("gpc", sea, scenario, 3))
-    assert row["hours_of_code"] == {code(): 3}
-    del row["hours_of_code"]
-    record = {"result": {"code": of or code(), "runs": [row]}}
-    (tmp_path / "false_alarms.json").write_text(json.dumps(record))
-    monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "then")
-    sailed.clear()
-    now.update(factor=factor, found=found)
-    whole = judged("gpc", sea, sail("gpc", sea, scenario, 5))
-    assert sailed == more
-    kept = len(more) < 4
-    assert whole["hours_of_code"] == ({of: 3, code(): 2} if of and kept else {code(): 5})
-    factors = [1.0 if kept and hour <= 3 else factor for hour in range(1, 6)]
-    drift = [0.1 * hour * each for hour, each in enumerate(factors, 1)]
-    assert whole["maxima"]["drift"] == pytest.approx(drift, abs=1e-4)
-    assert whole["found_in_hours"] == {found: [2]}
-    # a record that was gone on from says of each hour what it is of
-    if of and kept:
-        (tmp_path / "false_alarms.json").write_text(
-            json.dumps({"result": {"code": "a third", "runs": [whole]}})
-        )
-        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "later")
-        sailed.clear()
-        assert judged("gpc", sea, sail("gpc", sea, scenario, 5)) == whole
-        assert sailed == [2]
-        # the hours that there were have no new statistic
-        monkeypatch.setattr(false_alarms, "CACHE", tmp_path / "newer")
-        plain = margins
-        monkeypatch.setattr(
-            false_alarms,
-            "margins",
-            lambda *case: (run := plain(*case)) | {"largest": run["largest"] | {"sign": 0.5}},
-        )
-        more_hours = judged("gpc", sea, sail("gpc", sea, scenario, 6))
-        assert more_hours["maxima"]["sign"] == [None] * 5 + [0.5]
-        assert more_hours["maxima"]["drift"][:5] == whole["maxima"]["drift"]
-        # nor is a law kept that the record does not have
-        assert false_alarms.recorded("dpc", sea, lambda _: {}) == []
 
 
 def test_monitors_are_judged_over_all_hours_of_the_sound_laws() -> None:

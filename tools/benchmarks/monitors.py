@@ -23,7 +23,7 @@ import numpy as np
 
 from firmware_sim.scenario import Scenario
 from firmware_sim.ship_side import build_ship_side
-from tools.evidence.sources import ROOT
+from tools.evidence import ROOT
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import controller_of
 from utank_hil.base.tick import TICK_NS

@@ -25,7 +25,7 @@ from typing import Any
 import yaml
 
 from firmware_sim.scenario import Scenario
-from tools.evidence.sources import ROOT
+from tools.evidence import ROOT
 from tools.printing import command_line, show
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError

@@ -6,9 +6,7 @@ Each law of configs/controllers sails for so many hours in each sea and, where i
 half as many on the voyage; a law that can be retuned is so every second hour, pulses included. The
 unit is an hour of its own seed. Of each hour the largest statistic of each monitor over its
 threshold is kept (`monitor_margins`), in .cache/false_alarms: after Ctrl-C, or with more hours, the
-same command goes on, in a fresh clone with the hours of docs/evidence. Those of an earlier code are
-kept where the second of that law and sea comes out the same once more: each statistic that they
-have to four digits, and what was found. A Gumbel distribution is fitted to the hourly maxima of
+same command at the same commit goes on. A Gumbel distribution is fitted to the hourly maxima of
 each law in each sea; its tail beyond 1 is the rate of false alarms there. Over all laws and seas it
 is the mean. The aim is one in 1000 hours. An hour ends a minute after control has; where another
 monitor ended it, its maxima are not those of an hour, and are left out of the fit.
@@ -17,21 +15,18 @@ monitor ended it, its maxima are not those of an hour, and are left out of the f
 import json
 import math
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache
 from itertools import product
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import gumbel_r
 
 from firmware_sim.scenario import Scenario
-from tools.evidence.sources import ROOT, digest_of, imported
+from tools.evidence import ROOT, commit
 from tools.printing import command_line, show
 from tools.studies.monitor_margins import margins
 from utank_hil.base.one_thread import one_thread_each
@@ -39,13 +34,8 @@ from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.panel import Action, TimedAction
 
 CACHE = ROOT / ".cache" / "false_alarms"
-RECORD = ROOT / "docs" / "evidence" / "false_alarms.json"
-SAILED = ("controllers", "scenarios", "seas", "ships")
-"""Folders of configurations that an hour is made from."""
 HOUR_S = 3600.0
 ORDER_RETUNING_S = 400.0
-ONCE_MORE = 2
-"""Hour that is sailed again where the code has changed: one with a retuning."""
 AIM_PER_HOUR = 1e-3
 ENDS = {"ROLL_AMPLIFIED", "LEVEL_LIMIT"}
 """Findings of this study that end control."""
@@ -98,65 +88,14 @@ def ordered(scenario: Scenario, name: str, seed: int) -> Scenario:
     return scenario.model_copy(update={"operator": (*scenario.operator, order)})
 
 
-@cache
-def code() -> str:
-    """Digest of what an hour is made from."""
-    configs = (file for name in SAILED for file in (ROOT / "configs" / name).rglob("*.*"))
-    return digest_of(imported({Path(__file__)}) | set(configs))
-
-
-def recorded(name: str, sea: str, sailed: Callable[[int], dict[str, Any]]) -> list[dict[str, Any]]:
-    """Hours of docs/evidence of a law in a sea: of this code, or of one that makes the same."""
-    result = json.loads(RECORD.read_text(encoding="utf-8"))["result"] if RECORD.exists() else {}
-    rows = result.get("runs", ())
-    row = next((each for each in rows if (each["law"], each["sea"]) == (name, sea)), None)
-    if row is None:
-        return []
-    of_code = Counter(row.get("hours_of_code") or {result["code"]: row["hours"]}).elements()
-    runs = [
-        {
-            "code": of,
-            "largest": {
-                monitor: maxima[hour]
-                for monitor, maxima in row["maxima"].items()
-                if maxima[hour] is not None
-            },
-            "found_s": dict.fromkeys(
-                finding for finding, found in row["found_in_hours"].items() if hour + 1 in found
-            ),
-        }
-        for hour, of in enumerate(of_code)
-    ]
-    if result["code"] == code():
-        return runs
-    if len(runs) < ONCE_MORE or not same(runs[ONCE_MORE - 1], sailed(ONCE_MORE)):
-        return []
-    return runs
-
-
-def same(kept: dict[str, Any], now: dict[str, Any]) -> bool:
-    """Whether an hour finds the same as before, by the same statistics; there may be new ones."""
-    largest = now["largest"]
-    return set(kept["found_s"]) == set(now["found_s"]) and all(
-        round(largest.get(monitor, 0.0), DIGITS) == round(value, DIGITS)
-        for monitor, value in kept["largest"].items()
-    )
-
-
 def sail(name: str, sea: str, scenario: Scenario, count: int) -> list[dict[str, Any]]:
     """The hours of one law in one sea: those that are kept, and what is missing to `count`."""
-    file = CACHE / code() / f"{name}-{sea}.jsonl"
+    file = CACHE / commit() / f"{name}-{sea}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
-
-    def sailed(seed: int) -> dict[str, Any]:
-        return margins(ordered(scenario, name, seed), name, seed, HOUR_S)
-
-    if not file.exists():
-        before = "".join(f"{json.dumps(run)}\n" for run in recorded(name, sea, sailed))
-        file.write_text(before, encoding="utf-8")
+    file.touch()
     kept = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
     for seed in range(len(kept) + 1, count + 1):
-        run = sailed(seed) | {"code": code()}
+        run = margins(ordered(scenario, name, seed), name, seed, HOUR_S)
         with file.open("a", encoding="utf-8") as growing:
             growing.write(json.dumps(run) + "\n")
         kept.append(run)
@@ -202,7 +141,6 @@ def judged(name: str, sea: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
         "law": name,
         "sea": sea,
         "hours": len(runs),
-        "hours_of_code": Counter(run["code"] for run in runs),
         "found_in_hours": found,
         "maxima": maxima,
         "rate_per_hour": rates,
@@ -251,7 +189,6 @@ def main() -> int:
         rows = list(pool.map(rated, cases))
     show(
         {
-            "code": code(),
             "aim_per_hour": AIM_PER_HOUR,
             "by_monitor": by_monitor(rows),
             "runs": rows,

@@ -22,7 +22,6 @@ import numpy as np
 from tools.printing import show
 from tools.studies.causal_bound import CausalProblem, causal_bound
 from tools.studies.clairvoyant import NoHistoryError
-from tools.studies.model_errors import of_period
 from tools.studies.sea_trial import CLAIRVOYANT, PASSIVE, Entrant, Trial, TrialShip
 from tools.studies.trial_setup import (
     STORM_HOUR,
@@ -39,6 +38,7 @@ from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.motion.confidence import Interval, mean_interval
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.control.sea_model import SeaModel
+from utank_hil.dynamics import RollShip
 from utank_hil.sea import EffectiveSlope, Sea, Spectrum, jonswap
 
 GPC, CONSTRAINED, TUNED, UNTOLD = "GPC, roll", "constrained", "self-tuned", "no sea known"
@@ -86,6 +86,11 @@ class Case:
         )
         energy, _ = np.histogram(waves.frequency_rad_s, edges, weights=waves.amplitude**2 / 2)
         return SeaModel.of_slope((edges[1:] + edges[:-1]) / 2, energy / _STEP_RAD_S, **settings)
+
+
+def of_period(ship: RollShip, scale: float) -> RollShip:
+    """The ship with another roll period, by its stiffness."""
+    return replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / scale**2)
 
 
 def both(first: Spectrum, second: Spectrum) -> Spectrum:

@@ -15,14 +15,11 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import Progress
 
-from firmware_sim.scenario import Scenario
 from tools.printing import command_line
 from tools.studies.sea_trial import Entrant, Trial, TrialFigures, run_trials
 from utank_hil.assembly import build_law
-from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.configuration.files import located
-from utank_hil.control import BuiltLaw, ConstrainedDesign, PumpLimits
+from utank_hil.control import ConstrainedDesign, PumpLimits
 from utank_hil.sea import Spectrum, load_ndbc
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -33,24 +30,6 @@ Case = TypeVar("Case")
 def shipped(name: str) -> ControllerConfig:
     """A configuration of ``configs/controllers``."""
     return load_config(CONFIGS / "controllers" / f"{name}.yaml", ControllerConfig)
-
-
-def designed(path: Path) -> tuple[Scenario, dict[str, BuiltLaw]]:
-    """A scenario and the laws of its controllers.
-
-    Raises
-    ------
-    ConfigError
-        If the file is not right, or a law can't be designed.
-    """
-    scenario = load_config(path, Scenario)
-    laws = {}
-    for name, config in scenario.controllers.items():
-        try:
-            laws[name] = build_law(config)
-        except ParameterError as error:
-            raise located(error, path, f"controllers.{name}") from error
-    return scenario, laws
 
 
 def entrant(name: str, config: ControllerConfig) -> Entrant:

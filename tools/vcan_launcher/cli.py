@@ -4,8 +4,8 @@ import os
 import shutil
 import sys
 
-from vcan_launcher import debian, native, uml
-from vcan_launcher.command import execute
+from tools.vcan_launcher import debian, native, uml
+from tools.vcan_launcher.command import execute
 
 USAGE = """\
 usage: tools/vcan [--native|--uml] [--] COMMAND ARGS...

@@ -17,10 +17,10 @@ import time
 from collections.abc import Iterator
 from typing import Any, NoReturn
 
-sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 
-from vcan_launcher import linux
-from vcan_launcher.command import execute
+from tools.vcan_launcher import linux
+from tools.vcan_launcher.command import execute
 
 CONTROL, STDIN, STDOUT, STDERR = (f"/dev/ttyS{number}" for number in range(4))
 READY, TAKEN, ENDED = b"R", b"T", b"E"  # what is said on the control line

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from vcan_launcher import linux
+from tools.vcan_launcher import linux
 
 
 class NativeUnavailableError(Exception):

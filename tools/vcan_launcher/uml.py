@@ -23,7 +23,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from vcan_launcher import debian, xstate
+from tools.vcan_launcher import debian, xstate
 
 BOOT_LIMIT_S = 60.0
 POWER_OFF_LIMIT_S = 10.0

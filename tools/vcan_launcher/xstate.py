@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from vcan_launcher import debian
+from tools.vcan_launcher import debian
 
 SOURCE = Path(__file__).with_name("whole_xstate.c")
 
