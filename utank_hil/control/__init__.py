@@ -1,9 +1,6 @@
 """Controllers: steppable objects, and the design functions they come from."""
 
 from utank_hil.control.arx import ARX as ARX
-from utank_hil.control.constrained.arx_design import (
-    design_constrained_gpc as design_constrained_gpc,
-)
 from utank_hil.control.constrained.design import ConstrainedDesign as ConstrainedDesign
 from utank_hil.control.design_plant import DesignPlant as DesignPlant
 from utank_hil.control.feedback_linearization import FeedbackLinearization as FeedbackLinearization

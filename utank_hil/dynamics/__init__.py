@@ -7,6 +7,7 @@ from utank_hil.dynamics.nonlinear import Impact as Impact
 from utank_hil.dynamics.nonlinear import RollModel as RollModel
 from utank_hil.dynamics.reference import RollRun as RollRun
 from utank_hil.dynamics.reference import simulate_reference as simulate_reference
+from utank_hil.dynamics.sampling import sampled_model as sampled_model
 from utank_hil.dynamics.ship import RollShip as RollShip
 from utank_hil.dynamics.simulate import BatchResult as BatchResult
 from utank_hil.dynamics.simulate import WaveMoment as WaveMoment

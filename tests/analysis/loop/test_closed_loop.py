@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 from utank_hil.analysis.loop.closed_loop import closed_loop_radius, closed_loop_response
-from utank_hil.control import PredictiveLaw, pump_model
-from utank_hil.dynamics import RollShip, Tank, coupled_model
+from utank_hil.control import ARX, PredictiveLaw, design_gpc, pump_model
+from utank_hil.dynamics import RollShip, Tank, coupled_model, sampled_model
 from utank_hil.dynamics.sampling import sample
 
 SHIP = RollShip(1.9275e9, 1.9275e9 * 0.25, 4.87e7)
@@ -97,3 +97,21 @@ def test_model_without_python_control_is_the_coupled_model():
     model = pump_model(SHIP, TANK, MEASURED)
     for mine, theirs in zip(model[:4], (system.A, system.B, system.C, system.D), strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-12)
+
+
+def test_a_gpc_law_on_the_sampled_plant_quiets_the_ship_it_was_made_for():
+    ship = RollShip(inertia_kg_m2=1.9275e9, stiffness_nm_rad=4.81875e8, damping_nms_rad=4.81875e7)
+    tank = Tank(17.1, 4.88, 17.11, 6.22, lz_m=1.83, damping_ratio=0.1)
+    system = coupled_model(ship, tank)[["roll_rad"], ["pressure_pa"]]
+    plant = sampled_model(system, sample_time_s=0.2, delay_s=0.05, lag_s=0.1)
+    arx = ARX.from_state_space(plant, order=6)
+    law = design_gpc(arx, control_horizon=50, prediction_horizon=50)
+    assert closed_loop_radius(law, plant) == pytest.approx(0.976, abs=1e-3)
+    controller, x = law.controller(), np.zeros(plant.nstates)
+    x[0] = 0.05
+    y = plant.C @ x
+    for _ in range(600):
+        command = controller.step(y)
+        y = plant.C @ x + plant.D @ command
+        x = plant.A @ x + plant.B @ command
+    assert abs(y[0]) < 1e-3 * 0.05

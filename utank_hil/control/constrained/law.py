@@ -215,9 +215,14 @@ class ConstrainedController:
         self._allowed_pa = share * self._pressure_pa
 
     def observe(self, y: FloatArray) -> None:
-        """Take a measurement as `step` does, and plan nothing: how a law learns the past."""
+        """Take a measurement as `step` does, and plan nothing: how a law learns the past.
+
+        A measurement that is not finite, whichever output it is of, corrects nothing.
+        """
         state, mean = self._state, self._mean_pa
         surprise = y - self._c.dot(state) - self._d * mean
+        if not math.isfinite(surprise.sum()):
+            surprise = np.zeros(len(surprise))
         self._state = self._a.dot(state) + self._b * mean + self._observer_gain.dot(surprise)
         self._mean_before_pa = mean
 
