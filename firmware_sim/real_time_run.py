@@ -42,7 +42,7 @@ from utank_hil.runners import (
 )
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import Tapped
-from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rows import RowWriter
 
 
 class Meeting(Watch, Protocol):
@@ -138,10 +138,10 @@ def _load_kernel(job: Job) -> None:
         plant.advance(now_ns)
 
 
-def _ring(job: Job) -> RingWriter:
+def _ring(job: Job) -> RowWriter:
     """The ring of a run in real time, for `utank-hil monitor`."""
     about = describe("bench", job.controller, Path.cwd(), options={"run": job.name}, seed=job.seed)
-    return RingWriter(SIGNALS, about=about)
+    return RowWriter(SIGNALS, about=about)
 
 
 @contextmanager

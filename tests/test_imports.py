@@ -36,14 +36,14 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.runners import RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.assembly import build_controller_node
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rows import RowWriter
 
 assert SocketCanPort
 files = sorted(Path("configs/controllers").glob("*.yaml"))
 configs = [load(path, ControllerConfig) for path in files]
 # one of each kind
 for config in {{(type(each.law), each.retuning is None): each for each in configs}}.values():
-    with RingWriter(SIGNALS, capacity=64) as ring:
+    with RowWriter(SIGNALS, slots=64) as ring:
         node = build_controller_node(config, sink=ring.write)
         with stop_on_signals() as stop, real_time_scheduling():
             RealTimeLoop([node]).run(stop, 300_000_000)

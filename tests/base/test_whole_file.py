@@ -1,30 +1,16 @@
 """Files are there whole or not at all, on a full disk too."""
 
-import resource
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from little_room import ROOM, little_room
 
 from utank_hil.base.whole_file import left_whole, write_whole
 from utank_hil.pictures.report_page import write_report_page
 from utank_hil.pictures.style import picture
 from utank_hil.telemetry.recording import write_recording
-
-ROOM = 1024
-
-
-@contextmanager
-def little_room() -> Iterator[None]:
-    """No file can grow beyond `ROOM`, as on a disk that fills up while it is written."""
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 def a_text(path: Path) -> None:

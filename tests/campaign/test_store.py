@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from little_room import little_room
 from studies import small
-from test_whole_file import little_room
 
 from firmware_sim.campaign.store import Store, StoreError, read_results
 from firmware_sim.campaign.work import FAILED, LOST, OK, failed_row

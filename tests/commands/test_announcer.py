@@ -12,14 +12,13 @@ from pathlib import Path
 import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
+from utank_hil.canbus.events import AlarmEvent, ModelSummary, RetuningEvent
 from utank_hil.commands import announcer as module
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.lines import Lines
 from utank_hil.configuration import ControllerConfig, load_config
-from utank_hil.retuning import ModelSummary, RetuningEvent
-from utank_hil.safety.alarms import AlarmEvent
-from utank_hil.telemetry.event_ring import EventReader
+from utank_hil.telemetry.events import EventReader
 from utank_hil.telemetry.ring import RingError
 
 pytestmark = pytest.mark.slow
@@ -235,7 +234,7 @@ def test_process_that_can_not_be_started_leaves_the_events_to_the_recorder(
     assert announcer.ring is not None
     with EventReader(announcer.ring) as reader:
         announcer.write(TRIAL, 0)
-        assert [event.state for event in reader.read()] == [RetuningState.TRIAL]
+        assert [event.state for event in reader.read_events()] == [RetuningState.TRIAL]
     announcer.stop()
 
 

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.event_log import EventLog
-from utank_hil.retuning import RetuningEvent
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.safety.faults import FAULTS
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_whole_file import little_room
+from little_room import little_room
 from typer.testing import CliRunner
 
 from utank_hil.cli import app

@@ -7,8 +7,8 @@ import time
 import pytest
 
 from utank_hil.canbus import AlarmState, Fault, Mode
+from utank_hil.canbus.events import AlarmEvent
 from utank_hil.commands.lines import Lines
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.safety.faults import FAULTS
 
 START_NS = 7_000_000_000

@@ -20,7 +20,7 @@ from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
 from utank_hil.telemetry.recording import write_recording
-from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rows import RowWriter
 
 pytestmark = pytest.mark.slow
 
@@ -71,7 +71,7 @@ def test_a_stream_whose_port_was_taken_is_refused_instead_of_showing_nothing(
 ) -> None:
     monkeypatch.setattr(live, "hold_port", taken.dup)
     monkeypatch.setattr(os, "nice", lambda by: by)  # of the tests
-    with RingWriter(SIGNALS):
+    with RowWriter(SIGNALS):
         said = refused("monitor", str(os.getpid()))
     assert (
         f"port {viewer.port_of(taken)} of this machine was taken; start it again: it takes another"
@@ -92,7 +92,7 @@ def test_a_run_says_that_its_viewer_found_its_port_taken_and_goes_on(
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    with RingWriter(SIGNALS), ExitStack() as stack:
+    with RowWriter(SIGNALS), ExitStack() as stack:
         run._show(stack)  # and does not wait for it
         assert started[0].wait() == ExitCode.USAGE
     assert f"port {port} of this machine was taken" in " ".join(capfd.readouterr().err.split())

@@ -195,13 +195,24 @@ def test_a_part_from_the_middle_of_a_run_is_refused(folder: Path, tmp_path: Path
     assert "give the run's first part" in result.stderr
 
 
-def test_a_log_does_not_choose_code_to_run(folder: Path, tmp_path: Path) -> None:
-    log = FrameLog(log_of(folder))
-    law = {"kind": "python", "factory": "os:system", "measured": ["roll_rad"]}
-    log.head["about"]["configuration"]["law"] = law | {"parameters": {"command": "false"}}
+@pytest.mark.parametrize("holder", [None, "pump_with_valve", "valve_clipped", "two deep"])
+def test_a_log_does_not_choose_code_to_run(holder: str | None, tmp_path: Path) -> None:
+    log = FrameLog(Path("tests/replay/valve-and-pump.frames"))
+    law: dict[str, Any] = {
+        "kind": "python",
+        "factory": "os:system",
+        "measured": ["roll_rad"],
+        "parameters": {"command": f"touch {tmp_path / 'ran'}"},
+    }
+    if holder is not None:
+        law = {"kind": holder if holder != "two deep" else "valve_clipped", "pump": law}
+    if holder == "two deep":
+        law = {"kind": "pump_with_valve", "pump": law}
+    log.head["about"]["configuration"]["law"] = law
     changed = tmp_path / "run-x.frames"
     FrameLogWriter(changed, log.head).close()
     result = invoke(replay, changed)
+    assert not (tmp_path / "ran").exists()
     assert result.exit_code == 2
     assert "os:system, which a log must not choose" in result.stderr
 

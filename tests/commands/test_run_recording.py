@@ -8,9 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,10 +20,11 @@ from utank_hil.commands import recording as module
 from utank_hil.commands import run as command
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.recorder import RecorderError, RecorderReport
+from utank_hil.telemetry.recorder import RecorderReport, RecordingTask
+from utank_hil.telemetry.recorder_process import RecorderError
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.ring import RingReader
 from utank_hil.telemetry.rotation import Rotation
+from utank_hil.telemetry.rows import RowReader
 
 SHM = Path("/dev/shm")
 
@@ -57,18 +56,8 @@ class Instant:
     url = None
     has_ended = False
 
-    def __init__(
-        self,
-        ring: str,
-        file: Path,
-        live: bool = False,
-        events: str | None = None,
-        about: Mapping[str, Any] | None = None,
-        rotation: Rotation | None = None,
-        frames: str | None = None,
-        head: Mapping[str, Any] | None = None,
-    ) -> None:
-        file.write_text(ring)
+    def __init__(self, task: RecordingTask) -> None:
+        Path(task.file).write_text(task.rows)
 
     def stop(self) -> RecorderReport:
         return RecorderReport(rows=5, lost=2)
@@ -105,9 +94,9 @@ def test_a_recording_goes_on_in_another_file_each_hour_within_the_bound(
 ) -> None:
     given: list[object] = []
 
-    def recorder(ring: str, file: Path, **others: object) -> Instant:
-        given.append(others["rotation"])
-        return Instant(ring, file)
+    def recorder(task: RecordingTask) -> Instant:
+        given.append(task.rotation)
+        return Instant(task)
 
     monkeypatch.setattr(module, "RecorderProcess", recorder)
     RunRecording(tmp_path, keep_bytes=keep_bytes).stop()
@@ -149,9 +138,9 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
     # a folder that is gone when the recorder comes to it, as a disk may be
     folder = tmp_path / "gone"
 
-    def unplugged(ring: str, file: Path, **others: object) -> Instant:
+    def unplugged(task: RecordingTask) -> Instant:
         shutil.rmtree(folder)
-        raise RecorderError(f"the recorder of {file} did not start: no such folder")
+        raise RecorderError(f"the recorder of {task.file} did not start: no such folder")
 
     monkeypatch.setattr(module, "RecorderProcess", unplugged)
     summary = record(folder, 10)
@@ -163,18 +152,18 @@ def test_recorder_that_does_not_start_is_told_and_leaves_no_ring_behind(
 def test_without_a_recorder_viewers_still_see_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(ring: str, file: Path, **others: object) -> Instant:
-        raise RecorderError(f"the recorder of {file} did not start: no room")
+    def full(task: RecordingTask) -> Instant:
+        raise RecorderError(f"the recorder of {task.file} did not start: no room")
 
     monkeypatch.setattr(module, "RecorderProcess", full)
     before = rings()
     recording = RunRecording(tmp_path, head={"x": 1})
     assert not recording.keeps_records
     (ring,) = rings() - before
-    with RingReader(ring) as viewer:
+    with RowReader(ring) as viewer:
         recording.write(rows(1)[0])
         assert viewer.columns == SIGNALS
-        assert len(viewer.read()) == 1
+        assert len(viewer.read_rows()) == 1
     recording.stop()
     assert rings() <= before
 

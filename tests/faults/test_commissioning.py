@@ -27,16 +27,15 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.nodes.commissioning.node import REST_S, ROW_S, CommissioningNode, Stage
 from utank_hil.nodes.commissioning.pulse_checks import Each, remedies_of
 from utank_hil.nodes.commissioning.pulses import plan_pulses
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.redundancy import Redundancy
-from utank_hil.retuning import RetuningEvent
 from utank_hil.runners import Lockstep
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.telemetry.bus_records import RECORD
-from utank_hil.telemetry.event_ring import event_text
+from utank_hil.telemetry.events import event_text
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.replay import entries_of, replay
 

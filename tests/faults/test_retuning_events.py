@@ -14,7 +14,7 @@ from utank_hil.retuning import (
     SimulatedRetuner,
 )
 from utank_hil.runners import Lockstep
-from utank_hil.telemetry.event_ring import EventReader, EventWriter
+from utank_hil.telemetry.events import EventReader, EventWriter
 
 SECOND = 1_000_000_000
 SCRIPT = (TimedAction(1.0, Action.ARM), TimedAction(2.0, Action.RETUNE))
@@ -32,7 +32,7 @@ def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
         def tell(event: RetuningEvent, start_ns: int) -> None:
             assert start_ns == node.start_ns
             heard.append((len(times_s), event))  # place of the row that this tick is to write
-            writer.write(event, start_ns)
+            writer.write_event(event, start_ns)
 
         node = build_controller_node(
             config,
@@ -43,7 +43,7 @@ def test_events_are_handed_on_when_they_happen_and_no_event_twice() -> None:
         )
         lockstep = Lockstep([*build_ship_side(storm(), 1, SCRIPT).nodes, node])
         lockstep.run_until(60 * SECOND)
-        told = reader.read()
+        told = reader.read_events()
     assert [event for _, event in heard] == list(node.retuning_events)
     for place, event in heard:
         assert times_s[place] == pytest.approx((event.time_ns - node.start_ns) / SECOND, abs=1e-9)

@@ -16,8 +16,8 @@ from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from firmware_sim.voyage import Waypoint
 from utank_hil.canbus import RetuningState
+from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.configuration import load_config
-from utank_hil.retuning import ModelSummary, RetuningEvent
 
 ADAPTIVE = load_config(Path("configs/scenarios/adaptive.yaml"), Scenario)
 IDLE, IDENTIFY, DESIGN, TRIAL, RETUNED, REFUSED, UNDONE = list(RetuningState)

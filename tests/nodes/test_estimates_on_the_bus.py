@@ -18,6 +18,7 @@ from utank_hil.canbus import (
     Verdict,
     load_catalogue,
 )
+from utank_hil.canbus.events import AlarmEvent
 from utank_hil.configuration import load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import (
@@ -30,7 +31,6 @@ from utank_hil.retuning import (
 )
 from utank_hil.retuning.adaptive import AdaptiveController
 from utank_hil.runners import Lockstep
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.sea import SlopeSpectrum
 
 STORM = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"

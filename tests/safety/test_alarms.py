@@ -18,7 +18,8 @@ from utank_hil.canbus import (
     SensorMotion,
     Switch,
 )
-from utank_hil.safety.alarms import GONE_NS, AlarmEvent, AlarmList, Gravity
+from utank_hil.canbus.events import AlarmEvent
+from utank_hil.safety.alarms import GONE_NS, AlarmList, Gravity
 
 SECOND_NS = 1_000_000_000
 HIGH, SILENT = Fault.LEVEL_LIMIT, Fault.TANK_SILENT

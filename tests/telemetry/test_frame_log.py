@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_whole_file import little_room
+from little_room import little_room
 
 from utank_hil.telemetry.bus_records import LAYOUT, RECORD, Kind, Records
 from utank_hil.telemetry.frame_log import BlockSink, FrameLog, FrameLogError, FrameLogWriter
@@ -136,16 +136,3 @@ def test_a_log_that_does_not_fit_is_named_and_goes_on_in_the_next_part(tmp_path:
     second, _ = write_log(tmp_path / "a-part002.frames", 20, seed=1)
     records, _ = read(file)
     assert records.tobytes() == first.tobytes() + second
-
-
-def test_the_last_block_can_be_taken_back_once(tmp_path: Path) -> None:
-    file = tmp_path / "a.frames"
-    blocks = [np.frombuffer(tick(n, random.Random(n)), RECORD) for n in range(3)]
-    with FrameLogWriter(file, HEAD) as log:
-        for block in blocks[:2]:
-            log.write(block)
-        log.take_back()
-        log.take_back()
-        log.write(blocks[2])
-    records, _ = read(file)
-    assert records.tobytes() == blocks[0].tobytes() + blocks[2].tobytes()

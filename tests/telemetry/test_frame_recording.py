@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind, Records
+from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, Kind, Records, frame_ring
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.recorder import FrameRecording, RecorderProcess
+from utank_hil.telemetry.recorder import FrameRecording, RecorderState, RecordingTask
+from utank_hil.telemetry.recorder_process import RecorderProcess
 from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rotation import part_of
+from utank_hil.telemetry.rows import RowWriter
 
 pytestmark = pytest.mark.slow
 
@@ -50,9 +53,11 @@ def read(file: Path) -> Records:
 
 def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
+    with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
         data = feed(frames, range(50))  # before the recorder is there
-        recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
+        recorder = RecorderProcess(
+            RecordingTask(ring.name, str(file), frames=frames.name, head=HEAD)
+        )
         data += feed(frames, range(50, 200))
         ring.write(np.zeros(len(SIGNALS)))
     report = recorder.stop()
@@ -61,31 +66,24 @@ def test_every_record_reaches_the_log_beside_the_recording(tmp_path: Path) -> No
     assert read(file.with_suffix(".frames")).tobytes() == data
 
 
-def test_what_the_recording_beside_it_could_not_take_is_in_the_next_part_alone(
-    tmp_path: Path,
-) -> None:
+def test_a_log_goes_on_in_the_next_part_where_the_last_ended(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(ROW, rows=IN_A_SLOT) as frames:
+    with frame_ring(8192) as frames:
         data = feed(frames, range(10))
         with FrameRecording(frames.name, file, HEAD) as log:
             log.write()
-            place = log.place
-            log.take_back(place)  # nothing came since
-            log.write()
-            log.take_back(0)  # nor was anything written
-            data += feed(frames, range(10, 20))
-            log.write()
-            log.take_back(place)
-        data += feed(frames, range(20, 30))
-        with FrameRecording(frames.name, tmp_path / "run-a-part002.rrd", HEAD, place) as log:
-            log.write()
+        data += feed(frames, range(10, 20))
+        with FrameRecording(frames.name, part_of(file, 2), HEAD, log.place) as later:
+            later.write()
     assert read(file.with_suffix(".frames")).tobytes() == data
 
 
 def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
-        recorder = RecorderProcess(ring.name, file, frames=frames.name, head=HEAD)
+    with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
+        recorder = RecorderProcess(
+            RecordingTask(ring.name, str(file), frames=frames.name, head=HEAD)
+        )
         begin_s, data = time.monotonic(), b""
         for number in count():
             data += feed(frames, range(number, number + 1))
@@ -101,7 +99,7 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> Non
 
 
 def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Path) -> None:
-    with RingWriter(ROW, capacity=64, rows=IN_A_SLOT) as frames:
+    with frame_ring(64) as frames:
         feed(frames, range(10))
         recording = FrameRecording(frames.name, tmp_path / "a.rrd", HEAD)
         recording.write()
@@ -122,17 +120,15 @@ def test_rows_that_came_too_fast_are_counted_where_they_are_missing(tmp_path: Pa
 
 def test_without_rerun_there_is_the_frame_log_and_nothing_else(tmp_path: Path) -> None:
     file = tmp_path / "run-a.rrd"
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
+    with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
         data = feed(frames, range(20))
-        words = ["--ring", ring.name, "--file", str(file), "--frames", frames.name, "--content"]
+        task = RecordingTask(ring.name, str(file), frames=frames.name, head=HEAD)
         process = subprocess.Popen(
-            [sys.executable, "-c", NO_RERUN, *words],
-            stdin=subprocess.PIPE,
+            [sys.executable, "-c", NO_RERUN],
+            stdin=RecorderState(task).as_input(),
             stdout=subprocess.PIPE,
             text=True,
         )
-        process.stdin.write('{"head": {"about": {"x": 1}}}')
-        process.stdin.close()
         assert process.stdout.readline() == '{"ready": 1}\n'
     with process.stdout as output:
         assert '"parts": 1' in output.read()

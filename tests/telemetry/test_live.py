@@ -16,13 +16,14 @@ from rerun.chunk import RrdReader
 from rerun.error_utils import RerunWarning
 
 from utank_hil.canbus import RetuningState
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.commands.monitor import _chosen
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.live import LiveRun, LiveStream, live_runs
 from utank_hil.telemetry.recording import _read_chunks, read_about, read_recording
-from utank_hil.telemetry.ring import RingWriter, ring_names
+from utank_hil.telemetry.ring import ring_names
+from utank_hil.telemetry.rows import RowWriter
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 ABOUT = {
@@ -75,7 +76,7 @@ def saved(url: str, file: Path, seconds: float = 20.0) -> Iterator[dict[str, np.
 
 def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
     assert here() == []
-    with RingWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events, RingWriter(["x"]):
+    with RowWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events, RowWriter(["x"]):
         (run,) = here()
         assert run == LiveRun(ring.name, events.name, os.getpid(), ABOUT)
         assert str(run) == f"{os.getpid()}: run, a law"
@@ -84,9 +85,9 @@ def test_a_run_is_found_by_its_ring_and_says_what_it_is() -> None:
 
 def test_a_killed_run_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = (
-        "import time; from utank_hil.telemetry.ring import RingWriter;"
+        "import time; from utank_hil.telemetry.rows import RowWriter;"
         "from utank_hil.nodes.signals import SIGNALS;"
-        "ring = RingWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
+        "ring = RowWriter(SIGNALS); print(ring.name, flush=True); time.sleep(60)"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     name = process.stdout.readline().strip()
@@ -120,10 +121,10 @@ def test_of_several_runs_one_is_chosen_by_its_number(capsys: pytest.CaptureFixtu
 @pytest.mark.slow
 def test_a_late_viewer_has_data_layout_events_and_what_comes(tmp_path: Path) -> None:
     event = RetuningEvent(2_000_000_000, RetuningState.REFUSED, ("too short",))
-    with RingWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events:
+    with RowWriter(SIGNALS, about=ABOUT) as ring, EventWriter() as events:
         for row in rows(0, 300):
             ring.write(row)
-        events.write(event, 1_000_000_000)
+        events.write_event(event, 1_000_000_000)
         (run,) = here()
         with LiveStream(run) as stream:
             assert listening(urlsplit(stream.url).port) == {"0100007F"}

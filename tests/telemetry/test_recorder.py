@@ -19,24 +19,22 @@ import pytest
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus import Mode, RetuningState
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind
-from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.bus_records import LAYOUT, Kind, frame_ring
+from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.part import RecordingPart
 from utank_hil.telemetry.recorder import (
-    Places,
-    Progress,
-    RecorderError,
-    RecorderProcess,
     RecorderReport,
-    Source,
+    RecorderState,
+    RecordingTask,
     record_part,
 )
+from utank_hil.telemetry.recorder_process import RecorderError, RecorderProcess
 from utank_hil.telemetry.recording import read_recording
-from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rotation import Rotation
+from utank_hil.telemetry.rows import RowWriter
 
 pytestmark = pytest.mark.slow
 
@@ -51,7 +49,7 @@ def table(rows: int) -> np.ndarray:
     return values
 
 
-def feed(ring: RingWriter, rows: np.ndarray) -> None:
+def feed(ring: RowWriter, rows: np.ndarray) -> None:
     for row in rows:
         ring.write(row)
 
@@ -98,20 +96,20 @@ def any_recorded(file: Path) -> bool:
 def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) -> None:
     rows = table(500)
     file = tmp_path / "run.rrd"
-    with RingWriter(SIGNALS) as ring:
+    with RowWriter(SIGNALS) as ring:
         feed(ring, rows[:100])  # before the recorder is there
-        recorder = RecorderProcess(ring.name, file)
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
         feed(ring, rows[100:])
     report = recorder.stop()
-    assert report == RecorderReport(rows=500, lost=0)
+    assert report == RecorderReport(rows=500, lost=0, parts=1)
     assert recorder.stop() is report
     np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
     RrdReader(file).store()  # needs the footer
 
 
 def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None:
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, tmp_path / "run.rrd")
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
         feed(ring, table(10))
     wait_for(lambda: recorder._process.poll() == 0)
     assert recorder.stop().rows == 10
@@ -120,8 +118,8 @@ def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None
 def test_killed_recorder_leaves_all_but_the_last_second(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     rows = table(200)
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, file)
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
         feed(ring, rows)
         time.sleep(1.0)
         recorder._process.kill()
@@ -167,9 +165,9 @@ def test_a_power_cut_leaves_all_but_the_half_second_of_the_last_batch(
 
     monkeypatch.setattr(signal, "sigtimedwait", sleep)
     (tmp_path / "left").mkdir()
-    with RingWriter(SIGNALS) as ring, RingWriter(ROW, rows=IN_A_SLOT) as frames:
-        source = Source(ring.name, tmp_path / "run.rrd", None, None, frames.name, {})
-        assert not record_part(source, Progress(RecorderReport(0, 0, 0), Places()))
+    with RowWriter(SIGNALS) as ring, frame_ring(8192) as frames:
+        task = RecordingTask(ring.name, str(tmp_path / "run.rrd"), frames=frames.name)
+        assert not record_part(RecorderState(task))
     for now, kept in cuts:
         assert now - min(left(kept)) <= 50
     assert left(disk) == (written, written)
@@ -185,7 +183,10 @@ def test_a_power_cut_leaves_all_of_a_file_that_was_finished(
 
 
 def test_it_gives_way_to_the_loop_and_is_out_of_reach_of_ctrl_c(tmp_path: Path) -> None:
-    with RingWriter(SIGNALS) as ring, RecorderProcess(ring.name, tmp_path / "run.rrd") as recorder:
+    with (
+        RowWriter(SIGNALS) as ring,
+        RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd"))) as recorder,
+    ):
         own = os.getpriority(os.PRIO_PROCESS, 0)
         assert os.getpriority(os.PRIO_PROCESS, recorder.pid) == min(own + 5, 19)
         assert os.getsid(recorder.pid) == recorder.pid
@@ -208,8 +209,8 @@ def test_killed_at_any_instant_it_leaves_what_can_be_read(
     for number in range(kills):
         file = tmp_path / f"{number}.rrd"
         started = number % 3 > 0  # else it may not even have begun to read
-        with RingWriter(SIGNALS) as ring:
-            recorder = RecorderProcess(ring.name, file)
+        with RowWriter(SIGNALS) as ring:
+            recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
             times_s: list[float] = []
             while started and not any_recorded(file):
                 write_next(ring, rows, times_s)
@@ -234,7 +235,7 @@ def test_killed_at_any_instant_it_leaves_what_can_be_read(
     wait_for(lambda: open_files() <= descriptors[0])  # some are closed a little later
 
 
-def write_next(ring: RingWriter, rows: np.ndarray, times_s: list[float]) -> None:
+def write_next(ring: RowWriter, rows: np.ndarray, times_s: list[float]) -> None:
     ring.write(rows[len(times_s)])
     times_s.append(time.monotonic())
     time.sleep(0.002)
@@ -243,13 +244,13 @@ def write_next(ring: RingWriter, rows: np.ndarray, times_s: list[float]) -> None
 def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     rows = table(300)
-    with RingWriter(SIGNALS, capacity=64) as ring:
-        recorder = RecorderProcess(ring.name, file)
+    with RowWriter(SIGNALS, slots=64) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
         os.kill(recorder._process.pid, signal.SIGSTOP)
         feed(ring, rows)
         os.kill(recorder._process.pid, signal.SIGCONT)
     report = recorder.stop()
-    assert report == RecorderReport(rows=64, lost=236)
+    assert report == RecorderReport(rows=64, lost=236, parts=1)
     np.testing.assert_allclose(recorded(file), rows[236:], rtol=4e-16)
     states = [Mode(number).name for number in sorted(set(rows[236:, SIGNALS.index("mode")]))]
     assert [line.text for line in text_log(file)] == [
@@ -260,11 +261,11 @@ def test_a_stopped_recorder_costs_rows_counts_them_and_holds_up_nobody(tmp_path:
 
 def test_lost_events_are_noted_in_the_recording(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
-    with EventWriter() as events, RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, file, events=events.name)
+    with EventWriter() as events, RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file), events=events.name))
         os.kill(recorder._process.pid, signal.SIGSTOP)
         for number in range(1000):
-            events.write(RetuningEvent(number, RetuningState.IDENTIFY, ("ordered",)), 0)
+            events.write_event(RetuningEvent(number, RetuningState.IDENTIFY, ("ordered",)), 0)
         feed(ring, table(2))
         os.kill(recorder._process.pid, signal.SIGCONT)
     recorder.stop()
@@ -277,12 +278,12 @@ def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None
     file = tmp_path / "run.rrd"
     began = RetuningEvent(5_000_000_000, RetuningState.IDENTIFY, ("ordered by the operator",))
     refused = RetuningEvent(7_500_000_000, RetuningState.REFUSED, ("too short", "or too long"))
-    with EventWriter() as events, RingWriter(SIGNALS) as ring:
-        events.write(began, 4_000_000_000)  # before the recorder is there
-        recorder = RecorderProcess(ring.name, file, events=events.name)
+    with EventWriter() as events, RowWriter(SIGNALS) as ring:
+        events.write_event(began, 4_000_000_000)  # before the recorder is there
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file), events=events.name))
         feed(ring, table(100))
-        events.write(refused, 4_000_000_000)
-    assert recorder.stop() == RecorderReport(rows=100, lost=0)
+        events.write_event(refused, 4_000_000_000)
+    assert recorder.stop() == RecorderReport(rows=100, lost=0, parts=1)
     assert [line for line in text_log(file) if "retuning" in line.text] == [
         Line(1_000_000_000, "INFO", "retuning IDENTIFY: ordered by the operator"),
         Line(3_500_000_000, "WARN", "retuning REFUSED: too short; or too long"),
@@ -295,15 +296,15 @@ def test_reasons_survive_a_controller_that_is_killed(tmp_path: Path) -> None:
 import os, signal, sys
 import numpy as np
 from utank_hil.canbus import RetuningState
-from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry.event_ring import EventWriter
-from utank_hil.telemetry.ring import RingWriter
+from utank_hil.canbus.events import RetuningEvent
+from utank_hil.telemetry.events import EventWriter
+from utank_hil.telemetry.rows import RowWriter
 from utank_hil.telemetry.rotation import Rotation
-ring, events = RingWriter({SIGNALS!r}), EventWriter()
+ring, events = RowWriter({SIGNALS!r}), EventWriter()
 print(ring.name, events.name, flush=True)
 sys.stdin.readline()
 ring.write(np.zeros({len(SIGNALS)}))
-events.write(RetuningEvent(0, RetuningState.REFUSED, ("why it was",)), 0)
+events.write_event(RetuningEvent(0, RetuningState.REFUSED, ("why it was",)), 0)
 os.kill(os.getpid(), signal.SIGKILL)
 """
     writer = subprocess.Popen(
@@ -314,7 +315,7 @@ os.kill(os.getpid(), signal.SIGKILL)
         text=True,
     )
     ring, events = writer.stdout.readline().split()
-    recorder = RecorderProcess(ring, file, events=events)
+    recorder = RecorderProcess(RecordingTask(ring, str(file), events=events))
     writer.communicate("\n")
     wait_for(lambda: recorder._process.poll() == 0)
     recorder.stop()
@@ -328,7 +329,7 @@ def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
 ) -> None:
     file = tmp_path / "run.rrd"
     module = "utank_hil.telemetry.recorder"
-    with RingWriter(SIGNALS) as ring:
+    with RowWriter(SIGNALS) as ring:
         command = [sys.executable, "-W", "error", "-m", module, "--ring", ring.name]
         process = subprocess.Popen(
             [*command, "--file", str(file)], stdout=subprocess.PIPE, text=True
@@ -346,9 +347,9 @@ def test_recorder_ends_when_the_writer_is_killed(tmp_path: Path) -> None:
     file = tmp_path / "run.rrd"
     code = f"""
 import sys, numpy as np
-from utank_hil.telemetry.ring import RingWriter
+from utank_hil.telemetry.rows import RowWriter
 from utank_hil.telemetry.rotation import Rotation
-ring = RingWriter({SIGNALS!r})
+ring = RowWriter({SIGNALS!r})
 ring.write(np.zeros({len(SIGNALS)}))
 print(ring.name, flush=True)
 sys.stdin.read()
@@ -360,11 +361,11 @@ sys.stdin.read()
         stderr=subprocess.DEVNULL,
         text=True,
     )
-    recorder = RecorderProcess(writer.stdout.readline().strip(), file)
+    recorder = RecorderProcess(RecordingTask(writer.stdout.readline().strip(), str(file)))
     writer.kill()
     wait_for(lambda: recorder._process.poll() == 0)
     writer.communicate()
-    assert recorder.stop() == RecorderReport(rows=1, lost=0)
+    assert recorder.stop() == RecorderReport(rows=1, lost=0, parts=1)
     assert len(recorded(file)) == 1
 
 
@@ -372,13 +373,75 @@ def test_recorder_whose_starter_is_gone_ends_without_a_complaint(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "run.rrd"
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, file)
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
         recorder._output.close()  # as if this process were dead
         feed(ring, table(5))
     assert recorder._process.wait(20) == 0
     assert capfd.readouterr().err == ""
     RrdReader(file).store()  # needs the footer
+
+
+STRAY = """
+import os, sys
+os.write(1, b'{"ready": 1}\\n' + bytes.fromhex(sys.argv[1]))
+"""
+
+
+@pytest.mark.parametrize("end", ["", "; os._exit(3)"], ids=["ended well", "failed"])
+@pytest.mark.parametrize(
+    "output",
+    [
+        b"thread panicked\n",
+        b'{"rows": 7, "lo',
+        b"\xff\n",
+        b"[7]\n",
+        b'{"rows": "x"}\n',
+        b'{"y": 1}\n',
+    ],
+)
+def test_what_a_dead_recorder_left_on_its_output_ends_no_controller(
+    output: bytes, end: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The loop asks it why it has ended."""
+    popen = subprocess.Popen
+
+    def stray(command: list[str], **options: object) -> object:
+        code = STRAY + end.lstrip("; ")
+        return popen([sys.executable, "-c", code, output.hex()], **options)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(subprocess, "Popen", stray)
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
+        wait_for(lambda: recorder.has_ended)
+        with pytest.raises(RecorderError, match="exit code 3" if end else "how it went"):
+            recorder.stop()
+
+
+@pytest.mark.timeout(20)
+def test_a_pipe_that_a_dead_recorders_child_holds_open_holds_nobody_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    popen = subprocess.Popen
+    code = """
+import os, time
+os.write(1, b'{"ready": 1}\\n')
+if os.fork() == 0:
+    time.sleep(60)
+"""
+    monkeypatch.setattr(
+        subprocess,
+        "Popen",
+        lambda command, **options: popen([sys.executable, "-c", code], **options),
+    )
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
+        try:
+            wait_for(lambda: recorder.has_ended)
+            with pytest.raises(RecorderError, match="how it went"):
+                recorder.stop()
+        finally:
+            os.killpg(recorder.pid, signal.SIGKILL)
 
 
 def test_reason_of_a_failure_is_told_where_standard_error_takes_nothing(tmp_path: Path) -> None:
@@ -395,7 +458,7 @@ def test_a_full_disk_ends_the_recorder_and_leaves_what_was_written(tmp_path: Pat
     file = tmp_path / "run.rrd"
     limit = 400_000  # the layout takes most of it
     module = "utank_hil.telemetry.recorder"
-    with RingWriter(SIGNALS) as ring:
+    with RowWriter(SIGNALS) as ring:
         command = ["-m", module, "--ring", ring.name, "--file", str(file)]
         process = subprocess.Popen(
             ["prlimit", f"--fsize={limit}", sys.executable, "-X", "dev", *command],
@@ -423,8 +486,8 @@ def test_file_that_lacks_its_end_or_its_rows_is_a_failure_with_its_reason(
 ) -> None:
     """As on a full disk: with few rows only the footer does not fit, and Rerun says nothing."""
     file = tmp_path / "run.rrd"
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, file)
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file)))
         feed(ring, table(100))
         wait_for(lambda: any_recorded(file))
         pid = recorder._process.pid
@@ -455,8 +518,8 @@ def test_where_it_may_go_on_in_another_file_it_does_so_when_there_is_room_again(
         return "tried again every 10 s" in "".join(complaint)
 
     complaint: list[str] = []
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, file, rotation=Rotation(3600.0))
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(file), rotation=Rotation(3600.0)))
         feed(ring, table(100))
         wait_for(lambda: any_recorded(file))
         limit("400000:unlimited")
@@ -482,8 +545,10 @@ def test_where_nobody_writes_any_more_no_further_file_is_tried(
     """Else it would go on for ever: a folder that is gone does not come back."""
     folder = tmp_path / "log"
     folder.mkdir()
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, folder / "run-a.rrd", rotation=Rotation(3600.0))
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(
+            RecordingTask(ring.name, str(folder / "run-a.rrd"), rotation=Rotation(3600.0))
+        )
         feed(ring, table(100))
         wait_for(lambda: any_recorded(folder / "run-a.rrd"))
         subprocess.run(["prlimit", f"--pid={recorder.pid}", "--fsize=400000:unlimited"], check=True)
@@ -497,18 +562,18 @@ def test_where_nobody_writes_any_more_no_further_file_is_tried(
 
 def test_failures_to_start_are_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(RecorderError, match=r"did not start: .* is its writer running"):
-        RecorderProcess("utank-no-such-ring", tmp_path / "run.rrd")
+        RecorderProcess(RecordingTask("utank-no-such-ring", str(tmp_path / "run.rrd")))
     assert "is its writer running" in capfd.readouterr().err
-    with RingWriter(SIGNALS) as ring, pytest.raises(RecorderError, match="no-such-folder"):
-        RecorderProcess(ring.name, tmp_path / "no-such-folder" / "run.rrd")
+    with RowWriter(SIGNALS) as ring, pytest.raises(RecorderError, match="no-such-folder"):
+        RecorderProcess(RecordingTask(ring.name, str(tmp_path / "no-such-folder" / "run.rrd")))
     assert "no-such-folder" in capfd.readouterr().err
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))  # the child has it too
         with (
-            RingWriter(["time_s"], capacity=2) as ring,
+            RowWriter(["time_s"], slots=2) as ring,
             pytest.raises(RecorderError, match=r"did not start: .*File too large"),
         ):
-            RecorderProcess(ring.name, tmp_path / "run.rrd")
+            RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run.rrd")))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -7,8 +7,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus.enumerations import Fault, RetuningState
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import RetuningEvent
 from utank_hil.telemetry.recording import read_recording, write_recording
 
 COLUMNS = (*SIGNALS, "true_roll_rad", "wave_moment_nm")

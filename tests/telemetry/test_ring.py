@@ -16,7 +16,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from utank_hil.telemetry.ring import RingError, RingReader, RingWriter
+from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
+from utank_hil.telemetry.rows import RowReader, RowWriter
 
 SHM = Path("/dev/shm")
 
@@ -40,7 +41,7 @@ class BroadcastModel(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.writer = RingWriter(["a", "b"], capacity=self.CAPACITY, rows=self.ROWS)
+        self.writer = RingWriter(RingKind.FRAMES, 16, self.ROWS, self.CAPACITY)
         self.written: list[np.ndarray] = []  # by slot
         self.readers: list[RingReader] = []
         self.cursors: list[int] = []
@@ -64,10 +65,10 @@ class BroadcastModel(RuleBasedStateMachine):
     def read(self, which: int) -> None:
         which = which % len(self.readers)
         oldest = max(self.cursors[which], len(self.written) - self.CAPACITY)
-        self.lost[which] += self.ROWS * (oldest - self.cursors[which])
+        self.lost[which] += oldest - self.cursors[which]
         self.cursors[which] = len(self.written)
         got = self.readers[which].read()
-        np.testing.assert_array_equal(got, np.vstack([np.empty((0, 2)), *self.written[oldest:]]))
+        assert got == [rows.tobytes() for rows in self.written[oldest:]]
 
     @invariant()
     def losses_are_counted(self) -> None:
@@ -86,78 +87,79 @@ TestBroadcastModel.settings = settings(max_examples=40, stateful_step_count=30)
 
 
 def test_reader_drains_a_ring_after_its_writer_closed_it() -> None:
-    writer = RingWriter(["a", "b", "c"])
-    with RingReader(writer.name) as reader:
+    writer = RowWriter(["a", "b", "c"])
+    with RowReader(writer.name) as reader:
         writer.write(np.array([1.0, np.nan, -np.inf]))
         writer.close()
         assert reader.columns == ("a", "b", "c")
         assert reader.ended
-        np.testing.assert_array_equal(reader.read(), [[1.0, np.nan, -np.inf]])
+        np.testing.assert_array_equal(reader.read_rows(), [[1.0, np.nan, -np.inf]])
 
 
 def test_rows_read_stay_valid_after_both_ends_are_closed() -> None:
-    with RingWriter(["a"]) as writer, RingReader(writer.name) as reader:
+    with RowWriter(["a"]) as writer, RowReader(writer.name) as reader:
         writer.write(np.array([7.0]))
-        rows = reader.read()
+        rows = reader.read_rows()
     np.testing.assert_array_equal(rows, [[7.0]])
 
 
 def test_a_half_written_row_is_held_back_then_counted_as_lost() -> None:
-    with RingWriter(["a", "b"], capacity=4) as writer, RingReader(writer.name) as reader:
+    with RowWriter(["a", "b"], slots=4) as writer, RowReader(writer.name) as reader:
         for row in rows_from(0, 3, 2):
             writer.write(row)
         with (SHM / writer.name).open("r+b") as segment:  # the second value of row 1
             size = os.fstat(segment.fileno()).st_size
             segment.seek(size - 4 * 24 + 24 + 8)
             segment.write(b"\x01")
-        np.testing.assert_array_equal(reader.read(), rows_from(0, 1, 2))
-        assert len(reader.read()) == 0
+        np.testing.assert_array_equal(reader.read_rows(), rows_from(0, 1, 2))
+        assert len(reader.read_rows()) == 0
         assert reader.lost == 0
         for row in rows_from(3, 2, 2):  # row 4 takes the place of row 0, row 5 would that of row 1
             writer.write(row)
-        np.testing.assert_array_equal(reader.read(), rows_from(2, 3, 2))
+        np.testing.assert_array_equal(reader.read_rows(), rows_from(2, 3, 2))
         assert reader.lost == 1
 
 
 def test_a_row_of_the_previous_lap_is_not_taken_for_a_new_one() -> None:
-    with RingWriter(["a"], capacity=2) as writer, RingReader(writer.name) as reader:
+    with RowWriter(["a"], slots=2) as writer, RowReader(writer.name) as reader:
         for value in (1.0, 2.0):
             writer.write(np.array([value]))
         slots = (SHM / writer.name).read_bytes()[-32:]
-        assert len(reader.read()) == 2
+        assert len(reader.read_rows()) == 2
         for value in (3.0, 4.0):
             writer.write(np.array([value]))
         with (SHM / writer.name).open("r+b") as segment:  # new stores not visible yet
             segment.seek(-32, os.SEEK_END)
             segment.write(slots)
-        assert len(reader.read()) == 0
+        assert len(reader.read_rows()) == 0
 
 
 def test_a_reader_cannot_write() -> None:
-    with RingWriter(["a"]) as writer, RingReader(writer.name) as reader:
-        assert not reader._slots.flags.writeable
-        with pytest.raises(ValueError, match="read-only"):
+    with RowWriter(["a"]) as writer, RowReader(writer.name) as reader:
+        with pytest.raises(TypeError, match="read-only"):
             reader._words[0] = 0
+        with pytest.raises(TypeError, match="readonly"):
+            reader._map[0] = 0
 
 
 def test_a_stalled_reader_does_not_hold_up_the_writer() -> None:
-    with RingWriter(["a"], capacity=8) as writer, RingReader(writer.name) as reader:
+    with RowWriter(["a"], slots=8) as writer, RowReader(writer.name) as reader:
         for row in rows_from(0, 1000, 1):
             writer.write(row)
-        np.testing.assert_array_equal(reader.read(), rows_from(992, 8, 1))
+        np.testing.assert_array_equal(reader.read_rows(), rows_from(992, 8, 1))
         assert reader.lost == 992
 
 
 @pytest.mark.parametrize("row", [np.zeros(2), np.zeros(4), np.zeros(0)])
 def test_a_row_of_another_width_is_refused(row: np.ndarray) -> None:
-    with RingWriter(["a", "b", "c"]) as writer:
-        with pytest.raises(ValueError, match="3 columns"):
+    with RowWriter(["a", "b", "c"]) as writer:
+        with pytest.raises(ValueError, match="of 24 bytes each"):
             writer.write(row)
         assert writer.count == 0
 
 
 def test_a_closed_ring_takes_no_rows() -> None:
-    writer = RingWriter(["a"])
+    writer = RowWriter(["a"])
     writer.close()
     writer.close()
     with pytest.raises(ValueError, match="closed"):
@@ -166,40 +168,112 @@ def test_a_closed_ring_takes_no_rows() -> None:
 
 def test_bad_arguments_are_refused() -> None:
     with pytest.raises(ValueError, match="different names"):
-        RingWriter(["a", "a"])
+        RowWriter(["a", "a"])
     with pytest.raises(ValueError, match="columns"):
-        RingWriter([])
+        RowWriter([])
     with pytest.raises(ValueError, match="two slots"):
-        RingWriter(["a"], capacity=1)
+        RowWriter(["a"], slots=1)
 
 
 def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
     with pytest.raises(RingError, match="is its writer running"):
-        RingReader(f"utank-{os.getpid()}-none")
+        RowReader(f"utank-{os.getpid()}-none")
     foreign = SHM / f"utank-{os.getpid()}-foreign"
     for content in (b"short", bytes(4096)):
         foreign.write_bytes(content)
         with pytest.raises(RingError, match="telemetry ring"):
-            RingReader(foreign.name)
+            RowReader(foreign.name)
         with pytest.raises(RingError, match="remove it"):
-            RingWriter(["a"], name=foreign.name)
+            RowWriter(["a"], name=foreign.name)
     foreign.unlink()
 
 
-@pytest.mark.parametrize("word", [2, 3, 4, 7, None])
+@pytest.mark.parametrize("word", [2, 3, 4, None])
 def test_a_damaged_segment_is_refused_and_stops_no_writer(word: int | None) -> None:
-    with RingWriter(["a", "b"]) as whole:
+    with RowWriter(["a", "b"]) as whole:
         content = bytearray((SHM / whole.name).read_bytes())
     if word is None:
-        content = content.replace(b'[["a"', b'}{]["')
+        content = content.replace(b'{"kind"', b'}{kind"')
     else:
         content[8 * word : 8 * word + 8] = (-5).to_bytes(8, "little", signed=True)
     damaged = SHM / f"utank-{os.getpid()}-damaged"
     damaged.write_bytes(content)
     with pytest.raises(RingError, match="telemetry ring"):
-        RingReader(damaged.name)
-    RingWriter(["a"]).close()
+        RowReader(damaged.name)
+    RowWriter(["a"]).close()
     damaged.unlink()
+
+
+def saying(text: bytes) -> bytes:
+    """A segment that is whole, except for what it says of its content."""
+    with RowWriter(["a"]) as whole:
+        content = (SHM / whole.name).read_bytes()
+    words = np.frombuffer(content[:128], dtype=np.int64).copy()
+    words[3], words[4] = 2, len(text)
+    return words.tobytes() + text + content[128 + len(text) :]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(b"5", b"null", b"{}", b'["a"]', b"[5,5]", b"\xff\xfe", b"[" * 100_000),
+        *(b'{"kind": "x"}', b'{"kind": []}', b'{"kind": "events"}', b'{"kind": "rows"}'),
+        *(b'{"kind": "rows", "columns": 5}', b'{"kind": "rows", "columns": ["a", "b"]}'),
+    ],
+    ids=lambda text: repr(text[:40]),
+)
+def test_a_segment_that_says_odd_things_of_itself_is_refused_and_stops_no_writer(
+    text: bytes,
+) -> None:
+    """Any user may put a file there."""
+    odd = SHM / f"utank-{os.getpid()}-odd"
+    odd.write_bytes(saying(text))
+    try:
+        with pytest.raises(RingError, match="telemetry ring"):
+            RowReader(odd.name)
+        RowWriter(["a"]).close()
+    finally:
+        odd.unlink()
+
+
+def test_what_others_own_or_may_write_to_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may change while it is looked at: a file that is cut short ends its reader (SIGBUS)."""
+    name = f"utank-{os.getpid()}-of-another"
+    with RowWriter(["a"]) as ring:
+        content = bytearray((SHM / ring.name).read_bytes())
+    content[48:56] = bytes(8)  # no process started then: its writer is dead
+    opened: list[str] = []
+    real = RingReader.__init__
+    monkeypatch.setattr(
+        RingReader, "__init__", lambda self, name: (opened.append(name), real(self, name))[1]
+    )
+    (SHM / name).write_bytes(content)
+    try:
+        (SHM / name).chmod(0o666)
+        RowWriter(["a"]).close()
+        assert name not in opened
+        (SHM / name).chmod(0o600)
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+            RowWriter(["a"]).close()
+        assert name not in opened
+        RowWriter(["a"]).close()
+        assert not (SHM / name).exists()
+    finally:
+        (SHM / name).unlink(missing_ok=True)
+
+
+def test_a_link_is_not_followed(tmp_path: Path) -> None:
+    """To open a device may already do something."""
+    link = SHM / f"utank-{os.getpid()}-link"
+    link.symlink_to(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "pipe")
+    try:
+        with pytest.raises(OSError, match="symbolic links"):
+            RowReader(link.name)
+        RowWriter(["a"]).close()
+    finally:
+        link.unlink()
 
 
 @pytest.mark.timeout(20)
@@ -207,21 +281,21 @@ def test_a_pipe_of_somebody_else_holds_nobody_up() -> None:
     pipe = SHM / f"utank-{os.getpid()}-pipe"
     os.mkfifo(pipe)
     with pytest.raises(RingError, match="no telemetry ring"):
-        RingReader(pipe.name)
-    RingWriter(["a"]).close()
+        RowReader(pipe.name)
+    RowWriter(["a"]).close()
     assert pipe.is_fifo()
     pipe.unlink()
 
 
 def test_the_name_of_a_living_writer_is_not_taken_over() -> None:
-    with RingWriter(["a"]) as writer, pytest.raises(RingError, match="its writer runs"):
-        RingWriter(["a"], name=writer.name)
+    with RowWriter(["a"]) as writer, pytest.raises(RingError, match="its writer runs"):
+        RowWriter(["a"], name=writer.name)
 
 
 WRITE_FOR_EVER = """
 import sys, numpy as np
-from utank_hil.telemetry.ring import RingWriter
-writer = RingWriter([str(i) for i in range(14)], capacity=64, name=sys.argv[1])
+from utank_hil.telemetry.rows import RowWriter
+writer = RowWriter([str(i) for i in range(14)], slots=64, name=sys.argv[1])
 print("ready", flush=True)
 sys.stdin.readline()
 number, steps = 0, np.arange(1.0, 15.0)
@@ -267,11 +341,11 @@ def test_no_torn_row_from_a_writer_at_full_speed() -> None:
     name = f"utank-{os.getpid()}-stress"
     seen = 0
     last = -1.0
-    with python(WRITE_FOR_EVER, name) as process, RingReader(name) as reader:
+    with python(WRITE_FOR_EVER, name) as process, RowReader(name) as reader:
         begin(process)
         deadline = time.monotonic() + 1.5
         while time.monotonic() < deadline and (seen < 200_000 or reader.lost == 0):
-            rows = reader.read()
+            rows = reader.read_rows()
             if len(rows):
                 np.testing.assert_array_equal(rows, rows[:, :1] * np.arange(1, 15))
                 assert rows[0, 0] > last
@@ -288,9 +362,9 @@ def test_no_torn_row_from_a_writer_at_full_speed() -> None:
 
 def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed() -> None:
     name = f"utank-{os.getpid()}-killed"
-    with python(WRITE_FOR_EVER, name) as process, RingReader(name) as reader:
+    with python(WRITE_FOR_EVER, name) as process, RowReader(name) as reader:
         begin(process)
-        wait_for(lambda: len(reader.read()) > 0)
+        wait_for(lambda: len(reader.read_rows()) > 0)
         assert not reader.ended
         os.kill(process.pid, signal.SIGKILL)
         wait_for(lambda: reader.ended)  # nobody has waited for the process yet
@@ -306,7 +380,7 @@ def test_the_segment_of_a_dead_writer_is_replaced() -> None:
         process.kill()
         process.wait()
     # it is there, unless a writer of a test beside this one has removed it
-    with RingWriter(["new"], name=name) as writer, RingReader(writer.name) as reader:
+    with RowWriter(["new"], name=name) as writer, RowReader(writer.name) as reader:
         assert reader.columns == ("new",)
 
 
@@ -319,11 +393,11 @@ def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> Non
     foreign.write_bytes(bytes(1000))
     try:
         with python(untracked, name) as process:
-            with RingWriter(["a"]) as writer:
+            with RowWriter(["a"]) as writer:
                 assert (SHM / name).exists()  # its writer lives
             process.kill()
             process.wait()
-        with RingWriter(["a"]) as writer, RingWriter(["b"]):
+        with RowWriter(["a"]) as writer, RowWriter(["b"]):
             assert not (SHM / name).exists()
             assert (SHM / writer.name).exists()
         assert foreign.exists()
@@ -335,12 +409,12 @@ def test_a_ring_that_is_being_closed_is_not_removed_by_another_that_begins(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Two controllers, or two benches: one begins between the other's last word and its unlink."""
-    ring = RingWriter(["a"])
+    ring = RowWriter(["a"])
     close = SharedMemory.close
 
     def meanwhile(segment: SharedMemory) -> None:
         monkeypatch.undo()
-        RingWriter(["b"]).close()
+        RowWriter(["b"]).close()
         assert (SHM / ring.name).exists()
         close(segment)
 
@@ -353,8 +427,8 @@ def test_a_ring_whose_segment_was_removed_meanwhile_closes_quietly() -> None:
     """systemd-logind removes those of a user who logs out, whatever still runs (RemoveIPC)."""
     code = """
 import os
-from utank_hil.telemetry.ring import RingWriter
-with RingWriter(["a"]) as writer:
+from utank_hil.telemetry.rows import RowWriter
+with RowWriter(["a"]) as writer:
     os.unlink(f"/dev/shm/{writer.name}")
     writer.write(bytes(8))
 """
@@ -366,11 +440,11 @@ with RingWriter(["a"]) as writer:
 def test_a_reader_process_that_exits_does_not_take_the_ring_with_it() -> None:
     code = """
 import sys
-from utank_hil.telemetry.ring import RingReader
-reader = RingReader(sys.argv[1])
-assert reader.read().shape == (1, 1)
+from utank_hil.telemetry.rows import RowReader
+reader = RowReader(sys.argv[1])
+assert reader.read_rows().shape == (1, 1)
 """
-    with RingWriter(["a"]) as writer:
+    with RowWriter(["a"]) as writer:
         writer.write(np.zeros(1))
         for _ in range(2):
             subprocess.run([sys.executable, "-W", "error", "-c", code, writer.name], check=True)
@@ -385,5 +459,5 @@ def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(
 
     monkeypatch.setattr(os, "posix_fallocate", full)
     with pytest.raises(RingError, match=r"no room for .* No space left"):
-        RingWriter(["a"], name="utank-no-room")
+        RowWriter(["a"], name="utank-no-room")
     assert not (SHM / "utank-no-room").exists()

@@ -13,15 +13,16 @@ from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
 from utank_hil.canbus import RetuningState
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import RetuningEvent
-from utank_hil.telemetry.bus_records import IN_A_SLOT, LAYOUT, ROW, Kind
-from utank_hil.telemetry.event_ring import EventWriter
+from utank_hil.telemetry.bus_records import LAYOUT, Kind, frame_ring
+from utank_hil.telemetry.events import EventWriter
 from utank_hil.telemetry.frame_log import FrameLog
-from utank_hil.telemetry.recorder import RecorderProcess, RecorderReport
+from utank_hil.telemetry.recorder import RecorderReport, RecordingTask
+from utank_hil.telemetry.recorder_process import RecorderProcess
 from utank_hil.telemetry.recording import read_about, read_recording
-from utank_hil.telemetry.ring import RingWriter
-from utank_hil.telemetry.rotation import Rotation, make_room, part_of, remove_oldest
+from utank_hil.telemetry.rotation import Rotation, part_of, remove_oldest
+from utank_hil.telemetry.rows import RowWriter
 
 TIME = SIGNALS.index("time_s")
 EVENT_EVERY = 4  # rows: the ring's 64 last while a busy machine starts the recorder
@@ -48,17 +49,19 @@ def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path: Path) ->
     oldest.write_bytes(bytes(2_000_000))
     head, records = {"x": 1}, b""
     with (
-        RingWriter(SIGNALS, about=head) as ring,
-        RingWriter(ROW, rows=IN_A_SLOT) as frames,
+        RowWriter(SIGNALS, about=head) as ring,
+        frame_ring(8192) as frames,
         EventWriter() as events,
     ):
         recorder = RecorderProcess(
-            ring.name,
-            tmp_path / "run-a.rrd",
-            events.name,
-            Rotation(0.4, 2_200_000),
-            frames.name,
-            head,
+            RecordingTask(
+                ring.name,
+                str(tmp_path / "run-a.rrd"),
+                events=events.name,
+                rotation=Rotation(0.4, 2_200_000),
+                frames=frames.name,
+                head=head,
+            )
         )
         pid, sent = recorder.pid, 0
         while not (tmp_path / "run-a-part003.rrd").exists():
@@ -68,7 +71,7 @@ def test_no_row_event_or_frame_is_lost_or_twice_between_files(tmp_path: Path) ->
             frames.write(tick)
             if sent % EVENT_EVERY == 0:
                 time_ns = 50_000_000 * sent
-                events.write(RetuningEvent(time_ns, RetuningState.REFUSED, (f"<{sent}>",)), 0)
+                events.write_event(RetuningEvent(time_ns, RetuningState.REFUSED, (f"<{sent}>",)), 0)
             records += tick
             sent += 1
             time.sleep(0.05)
@@ -102,12 +105,13 @@ def texts(file: Path) -> list[str]:
 @pytest.mark.slow
 def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: Path) -> None:
     """When the signal comes, the process is a program that has not set anything up yet."""
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, tmp_path / "run-a.rrd", rotation=Rotation(1.0))
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(
+            RecordingTask(ring.name, str(tmp_path / "run-a.rrd"), rotation=Rotation(1.0))
+        )
         ring.write(rows(0, 110))
-        started = Path(f"/proc/{recorder.pid}/cmdline")
         deadline = time.monotonic() + 20.0
-        while b"--content" not in started.read_bytes():
+        while "part2" not in os.readlink(f"/proc/{recorder.pid}/fd/0"):
             assert time.monotonic() < deadline
         ring.write(rows(110, 7))
     assert recorder.stop() == RecorderReport(117, 0, 2)
@@ -116,8 +120,8 @@ def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: 
 
 @pytest.mark.slow
 def test_without_rotation_there_is_one_file(tmp_path: Path) -> None:
-    with RingWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(ring.name, tmp_path / "run-a.rrd")
+    with RowWriter(SIGNALS) as ring:
+        recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run-a.rrd")))
         ring.write(rows(0, 350))
     assert recorder.stop() == RecorderReport(350, 0, 1)
     assert [path.name for path in tmp_path.iterdir()] == ["run-a.rrd"]
@@ -131,7 +135,7 @@ def test_the_parts_of_a_recording_stay_within_the_bound(sizes: list[int], keep_b
     with TemporaryDirectory() as folder:
         file = Path(folder) / "run-a.rrd"
         for number, size in enumerate(sizes, 1):
-            make_room(file, number, Rotation(1.0, keep_bytes))
+            Rotation(1.0, keep_bytes).make_room(file, number)
             part = part_of(file, number)
             part.write_bytes(bytes(size))
             os.utime(part, ns=(number, number))

@@ -32,7 +32,7 @@ from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.runners import Lockstep
 from utank_hil.telemetry.node_tap import NodeTap
 from utank_hil.telemetry.recording import read_recording, write_recording
-from utank_hil.telemetry.ring import RingReader, RingWriter
+from utank_hil.telemetry.rows import RowReader, RowWriter
 from utank_hil.telemetry.viewer import rerun_binary, rerun_environment
 
 STORM: Final = Path(__file__).resolve().parents[2] / "configs" / "scenarios" / "storm.yaml"
@@ -53,13 +53,13 @@ def ring() -> dict[str, float]:
     """Time single writes, and reads of all that a full ring holds."""
     row = np.zeros(len(SIGNALS))
     writes_s = []
-    with RingWriter(SIGNALS) as writer, RingReader(writer.name) as reader:
+    with RowWriter(SIGNALS) as writer, RowReader(writer.name) as reader:
         for _ in range(20_000):
             start = time.perf_counter()
             writer.write(row)
             writes_s.append(time.perf_counter() - start)
         start = time.perf_counter()
-        rows = len(reader.read())
+        rows = len(reader.read_rows())
         read_s = time.perf_counter() - start
     p50, p99 = np.percentile(writes_s, (50, 99)) * 1e6
     return {"write_p50_us": p50, "write_p99_us": p99, "read_us_a_row": read_s / rows * 1e6}

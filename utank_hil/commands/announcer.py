@@ -16,13 +16,13 @@ from typing import Final
 
 from utank_hil.base.background import give_way
 from utank_hil.canbus import RetuningState
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.commands.terminal import shown
-from utank_hil.retuning import RetuningEvent
 from utank_hil.runners.stopping import SIGNALS, signals_waiting
-from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text
+from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5
 _NICENESS: Final = 5
@@ -82,7 +82,7 @@ class Announcer:
     def write(self, event: Event, start_ns: int) -> None:
         """Take one event; never waits."""
         if self._writer is not None:
-            self._writer.write(event, start_ns)
+            self._writer.write_event(event, start_ns)
 
     def failure(self) -> str:
         """Why the process has ended before the run, once; never waits."""
@@ -134,7 +134,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
         give_way(_NICENESS)
         while True:
             last = reader.ended
-            for event in reader.read():
+            for event in reader.read_events():
                 if events is not None:
                     _log(events, event, reader.start_ns, lines)
                 if isinstance(event, RetuningEvent):  # alarms are printed at once, by the run

@@ -11,6 +11,7 @@ from rich.text import Text
 from utank_hil.assembly import build_commissioning_node
 from utank_hil.base.tick import TICK_S
 from utank_hil.canbus import AlarmState, Fault, PortError, SocketCanPort
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.commands.commissioning_record import (
     make_record,
     record_path,
@@ -24,9 +25,7 @@ from utank_hil.commands.lines import Lines, printed_lines
 from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
-from utank_hil.retuning.law_exchange import RetuningEvent
 from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.safety.faults import fault_text
 
 SAY_TICKS: Final = 500

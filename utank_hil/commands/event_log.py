@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from utank_hil.safety.alarms import AlarmEvent
+from utank_hil.canbus.events import AlarmEvent
 from utank_hil.safety.faults import FAULTS
-from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.events import Event
 
 NAME: Final = "log-{}.jsonl"
 

@@ -10,11 +10,13 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.commands.common import why_not_writable
 from utank_hil.commands.stamps import claimed_files
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.bus_records import IN_A_SLOT, ROW
+from utank_hil.telemetry.bus_records import frame_ring
 from utank_hil.telemetry.frame_log import SUFFIX
-from utank_hil.telemetry.recorder import NEEDS_RERUN, RecorderError, RecorderProcess
+from utank_hil.telemetry.recorder import RecordingTask
+from utank_hil.telemetry.recorder_process import NEEDS_RERUN, RecorderError, RecorderProcess
 from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rotation import Rotation
+from utank_hil.telemetry.rows import RowWriter
 
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
@@ -92,7 +94,7 @@ class RunRecording:
         self._records: RingWriter | None = None
         self._recorder: RecorderProcess | None = None
         try:
-            self._ring = RingWriter(SIGNALS, RING_SLOTS, about=about)
+            self._ring = RowWriter(SIGNALS, RING_SLOTS, about=about)
         except OSError as error:
             self.summary.error = str(error)
             return
@@ -110,15 +112,16 @@ class RunRecording:
             return
         try:
             if head is not None:
-                self._records = RingWriter(ROW, RING_SLOTS, rows=IN_A_SLOT)
-            self._recorder = RecorderProcess(
+                self._records = frame_ring(RING_SLOTS)
+            task = RecordingTask(
                 self._ring.name,
-                files[0],
+                str(files[0]),
                 events=events,
-                rotation=Rotation(PART_S, keep_bytes),
                 frames=None if self._records is None else self._records.name,
-                head=head,
+                head=head or {},
+                rotation=Rotation(PART_S, keep_bytes),
             )
+            self._recorder = RecorderProcess(task)
         except (OSError, RecorderError) as error:
             self.summary.error = str(error)
             self._close_records()

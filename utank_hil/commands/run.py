@@ -15,6 +15,7 @@ import typer
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
+from utank_hil.canbus.events import AlarmEvent
 from utank_hil.commands import event_log
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
@@ -40,9 +41,8 @@ from utank_hil.runners import (
     real_time_scheduling,
     stop_on_signals,
 )
-from utank_hil.safety.alarms import AlarmEvent
 from utank_hil.safety.faults import fault_text
-from utank_hil.telemetry.event_ring import Event, event_text
+from utank_hil.telemetry.events import Event, event_text
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
 from utank_hil.telemetry.replay_head import replay_head
 

@@ -25,6 +25,7 @@ from utank_hil.canbus import (
     SeaEstimate,
     ShipEstimate,
 )
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
 from utank_hil.control.interface import PRESSURE, VALVE, Controller, Plans, StartsAnew
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
@@ -37,9 +38,9 @@ from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.nodes.signals import SIGNALS, put_quick, put_slow
 from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning.estimator import SAMPLE_TIME_S, EstimateFigures, Estimator
-from utank_hil.retuning.law_exchange import LawExchange, RetuningEvent
+from utank_hil.retuning.law_exchange import LawExchange
 from utank_hil.runners.statistics import LoopStatistics
-from utank_hil.safety.alarms import AlarmEvent, AlarmList, Gravity, active_faults, all_stopping
+from utank_hil.safety.alarms import AlarmList, Gravity, active_faults, all_stopping
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.judging import all_halving, first_stopping
 from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE

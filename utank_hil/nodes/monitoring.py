@@ -14,12 +14,12 @@ import numpy as np
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import PassiveTwin as PassiveTwinMessage
 from utank_hil.canbus import Quality
+from utank_hil.canbus.events import ModelSummary
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.nodes.inbox import Inbox
 from utank_hil.nodes.motion_sensors import MotionSensors
-from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
 from utank_hil.safety.monitors.finding import Finding

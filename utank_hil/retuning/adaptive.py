@@ -16,9 +16,10 @@ import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningState
+from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import Controller, LinearLaw
 from utank_hil.retuning.admission import Admission, WarmUp
-from utank_hil.retuning.answer import Answer, Candidate, ModelSummary
+from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 from utank_hil.retuning.law_bank import MonitoredLaw

@@ -10,6 +10,7 @@ from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.retuning.answer import Answer, Candidate
 from utank_hil.retuning.change_monitor import ChangeMonitor
+from utank_hil.retuning.estimate import ShipFigures
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import MonitoredLaw
 
@@ -52,7 +53,7 @@ class Admission:
         if candidate.law.output_gains.shape[1:] != (1, self._history.outputs):
             return "the law is for other signals"
         try:
-            law, figures = candidate.whole_law(), candidate.summary.figures
+            law, figures = candidate.whole_law(), ShipFigures.identified(candidate.summary)
         except ValueError as error:
             return str(error)
         if law.sample_time_s != self._sample_time_s:

@@ -5,18 +5,17 @@ and anything too large for the loop to read, to build and to step between two ti
 """
 
 import math
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from typing import Annotated, Final
 
 import msgspec
 
+from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import LinearLaw, PredictiveLaw
 from utank_hil.control.predictive.design import MOST_ORDER, MOST_SAMPLES
 from utank_hil.control.washout import WashoutLaw
 from utank_hil.dynamics.linear import STATES
-from utank_hil.dynamics.ship import RollShip
-from utank_hil.dynamics.tank import Tank
-from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate, ShipFigures
+from utank_hil.retuning.estimate import MOST_BANDS, MotionEstimate
 from utank_hil.retuning.renewed_law import MOST_NUMBERS, RenewedLaw, RenewedLawMessage
 from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode, refuse_shapes, refuse_sizes
 
@@ -30,56 +29,6 @@ LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
     4 * _MOST_REASONS * _MOST_CHARACTERS,  # a character has up to four bytes
 )
 """Of an answer that can be read."""
-
-
-@dataclass(frozen=True, slots=True)
-class ModelSummary:
-    """The identified ship, and the law's predicted performance.
-
-    Attributes
-    ----------
-    roll_period_s : float
-        Natural roll period of the ship without tank water.
-    period_deviation : float
-        Relative standard deviation of that period.
-    inertia_kg_m2, stiffness_nm_rad, damping_nms_rad : float
-        Roll inertia, stiffness and linear damping of the ship.
-    held_out_fit : float
-        Worst one-step fit of an output on validation data.
-    peak_sensitivity : float
-        Peak of the sensitivity function on the identified ship.
-    roll_below_passive : float
-        Relative reduction of the roll RMS in the recorded waves, against the passive tank.
-    """
-
-    roll_period_s: float
-    period_deviation: float
-    inertia_kg_m2: float
-    stiffness_nm_rad: float
-    damping_nms_rad: float
-    tank_damping_ratio: float
-    held_out_fit: float
-    peak_sensitivity: float
-    roll_below_passive: float
-
-    def ship(self, configured: RollShip) -> RollShip:
-        """The configured ship as she was identified."""
-        return self.figures.ship(configured)
-
-    def tank(self, configured: Tank) -> Tank:
-        """The configured tank as it was identified."""
-        return replace(configured, damping_ratio=self.tank_damping_ratio)
-
-    @property
-    def figures(self) -> ShipFigures:
-        """The ship, for the change monitor; its stiffness is as uncertain as its square root is."""
-        return ShipFigures(
-            self.stiffness_nm_rad,
-            self.inertia_kg_m2,
-            self.damping_nms_rad,
-            2 * self.period_deviation,
-            self.period_deviation,
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

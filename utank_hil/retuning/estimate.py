@@ -7,6 +7,7 @@ from typing import Annotated, Final
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.canbus import Verdict
+from utank_hil.canbus.events import ModelSummary
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import SlopeSpectrum
 
@@ -43,6 +44,17 @@ class ShipFigures:
     def of(cls, ship: RollShip) -> "ShipFigures":
         """The figures of a ship that is known."""
         return cls(ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad)
+
+    @classmethod
+    def identified(cls, found: ModelSummary) -> "ShipFigures":
+        """The figures of an identified ship; its stiffness is as uncertain as its square root."""
+        return cls(
+            found.stiffness_nm_rad,
+            found.inertia_kg_m2,
+            found.damping_nms_rad,
+            2 * found.period_deviation,
+            found.period_deviation,
+        )
 
     @property
     def roll_period_s(self) -> float:

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.canbus.events import ModelSummary
 from utank_hil.control import Controller
-from utank_hil.retuning.answer import ModelSummary
 from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 

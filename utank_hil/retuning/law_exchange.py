@@ -27,15 +27,15 @@ The limits on pressure, rate, level and power apply downstream.
 
 from abc import ABC, abstractmethod
 from collections import deque
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import RetuningOrder, RetuningState
+from utank_hil.canbus.events import ModelSummary, RetuningEvent
 from utank_hil.retuning.admission import WARM_UP_CHUNK, WARM_UP_SAMPLES, WarmUp
-from utank_hil.retuning.answer import Answer, ModelSummary, Refusal
+from utank_hil.retuning.answer import Answer, Refusal
 from utank_hil.retuning.estimate import MotionEstimate
 from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.law_bank import LawBank, MonitoredLaw
@@ -61,37 +61,6 @@ _COMPARABLE: Final = (
 _BUSY: Final = (RetuningState.IDENTIFY, RetuningState.DESIGN, RetuningState.TRIAL)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
 _, _DESIGN, _TRIAL = _BUSY
-
-
-@dataclass(frozen=True, slots=True)
-class RetuningEvent:
-    """A state change of the retuning controller, or a message without one.
-
-    Attributes
-    ----------
-    time_ns : int
-        Time on the node's clock.
-    state : RetuningState
-        State entered; the present state for a message.
-    reasons : tuple of str
-        Why, in words.
-    found : ModelSummary or None
-        Identified ship that the law on trial, or the accepted law, was designed for.
-    """
-
-    time_ns: int
-    state: RetuningState
-    reasons: tuple[str, ...]
-    found: ModelSummary | None = None
-
-    def as_json(self, start_ns: int = 0) -> dict[str, Any]:
-        """The event, ready for `json.dumps`; `time_s` counts from `start_ns`."""
-        return {
-            "time_s": (self.time_ns - start_ns) * 1e-9,
-            "state": self.state.name,
-            "reasons": list(self.reasons),
-            "found": None if self.found is None else asdict(self.found),
-        }
 
 
 class LawExchange(ABC):

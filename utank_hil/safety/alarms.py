@@ -19,6 +19,7 @@ from enum import IntEnum, auto
 from typing import Final, TypeAlias
 
 from utank_hil.canbus import Alarm, AlarmState, Fault, Mode
+from utank_hil.canbus.events import AlarmEvent
 from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.observations import Observations
@@ -41,27 +42,6 @@ class Gravity(IntEnum):
 
 
 Active: TypeAlias = Mapping[Fault, Gravity]
-
-
-@dataclass(frozen=True, slots=True)
-class AlarmEvent:
-    """A state change of an alarm, or a reset that was refused.
-
-    Attributes
-    ----------
-    time_ns : int
-        Time on the node's clock.
-    code : Fault
-    state : AlarmState or None
-        State entered; None: a reset was refused since this lasts.
-    mode : Mode
-        Of the controller.
-    """
-
-    time_ns: int
-    code: Fault
-    state: AlarmState | None
-    mode: Mode
 
 
 @dataclass(slots=True)

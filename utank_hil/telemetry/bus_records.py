@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from utank_hil.base.arrays import FloatArray
+from utank_hil.telemetry.ring import RingKind, RingWriter
 
 PAYLOAD_BYTES: Final = 8
 RECORD: Final = np.dtype(
@@ -32,10 +32,8 @@ LAYOUT: Final = struct.Struct("<I9pB2xq")
 Records = npt.NDArray[np.void]
 """Records, shape (n,), of type `RECORD`."""
 
-ROW: Final = tuple(f"word_{number}" for number in range(LAYOUT.size // 8))
-"""Columns of a ring whose rows are the bytes of records."""
 IN_A_SLOT: Final = 32
-"""Records in one slot of such a ring; five ticks have 25 or so."""
+"""Records in one slot of a ring; five ticks have some 25."""
 
 
 class Kind(IntEnum):
@@ -66,9 +64,15 @@ class Kind(IntEnum):
     """As ALIVE and ANSWER, of the estimator of sea and ship."""
 
 
-def records_of(rows: FloatArray) -> Records:
-    """The records in rows of a ring, shape (n, len(ROW)), in order."""
-    return np.frombuffer(rows.tobytes(), dtype=RECORD)
+def frame_ring(slots: int) -> RingWriter:
+    """A ring for packed records.
+
+    Raises
+    ------
+    RingError
+        If there is no room in shared memory.
+    """
+    return RingWriter(RingKind.FRAMES, LAYOUT.size, IN_A_SLOT, slots)
 
 
 def pack(records: Records) -> bytes:

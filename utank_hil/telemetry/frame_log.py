@@ -59,7 +59,6 @@ class FrameLogWriter(Closing):
     def __init__(self, file: Path, head: Mapping[str, Any], *, small: bool = False) -> None:
         self._small = small
         self._content = file.open("wb", buffering=0)  # what fails is not tried again on closing
-        self._place_before = 0
         self._content.write(_MARK)
         self._append(_HEAD, zlib.compress(json.dumps(head).encode()))
 
@@ -73,11 +72,6 @@ class FrameLogWriter(Closing):
         else:
             self._append(_QUICK, zlib.compress(packed))
 
-    def take_back(self) -> None:
-        """Remove the last block: its records will be written to another file."""
-        self._content.truncate(self._place_before)
-        self._content.seek(self._place_before)
-
     def close(self) -> None:
         """Close the file; idempotent."""
         with errors_name(Path(self._content.name)):
@@ -87,13 +81,14 @@ class FrameLogWriter(Closing):
         header = _BLOCK.pack(kind, len(payload), zlib.crc32(payload, zlib.crc32(kind)))
         left = memoryview(header + payload)
         with errors_name(Path(self._content.name)):
-            self._place_before = self._content.tell()
+            before = self._content.tell()
             try:
                 while left:
                     left = left[self._content.write(left) :]
                 os.fsync(self._content.fileno())
-            except OSError:
-                self.take_back()  # half a block ends the reading, of the parts that follow too
+            except OSError:  # half a block would end the reading, of the parts that follow too
+                self._content.truncate(before)
+                self._content.seek(before)
                 raise
 
 

@@ -12,11 +12,10 @@ import rerun as rr
 
 from utank_hil.base.closing import Closing
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.telemetry.blueprint import columns_of, make_blueprint
-from utank_hil.telemetry.event_ring import EventReader, is_event_ring
-from utank_hil.telemetry.rerun_log import APPLICATION, LIVE_RUN, RunLog, run_paths, write_about
-from utank_hil.telemetry.ring import RingReader, ring_names
-from utank_hil.telemetry.scene import scene_size
+from utank_hil.telemetry.events import EventReader
+from utank_hil.telemetry.part import live_log, open_stream
+from utank_hil.telemetry.ring import RingKind, RingReader, ring_names
+from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 
 MEMORY: Final = "64MiB"
@@ -59,11 +58,12 @@ def live_runs() -> list[LiveRun]:
             with RingReader(name) as ring:
                 if ring.ended:
                     continue
-                if ring.columns == SIGNALS:
-                    found.append((name, ring.writer_pid, ring.about or {}))
-                elif is_event_ring(ring):
+                if ring.kind is RingKind.EVENTS:
                     events[ring.writer_pid] = name
-        except OSError:  # gone since, no ring of this version, or somebody else's
+            with RowReader(name) as rows:
+                if rows.columns == SIGNALS:
+                    found.append((name, rows.writer_pid, rows.about or {}))
+        except OSError:  # gone since, of another version or kind, or somebody else's
             continue
     return [LiveRun(ring, events.get(pid), pid, about) for ring, pid, about in found]
 
@@ -84,41 +84,31 @@ class LiveStream(Closing):
 
     def __init__(self, run: LiveRun) -> None:
         with ExitStack() as stack:
-            self._ring = stack.enter_context(RingReader(run.ring))
+            self._ring = stack.enter_context(RowReader(run.ring))
             self._events = None if run.events is None else EventReader(run.events)
             if self._events is not None:
                 stack.enter_context(self._events)
-            self._recording = rr.RecordingStream(APPLICATION, recording_id=run.ring)
             port = port_of(stack.enter_context(hold_port()))
             self.url = live_url(port)
-            columns = self._ring.columns
-            self._recording.set_sinks(
-                rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=MEMORY),
-                default_blueprint=make_blueprint(
-                    columns_of(columns, run.about),
-                    [LIVE_RUN],
-                    size=scene_size(columns, run.about),
-                ),
-            )
-            stack.callback(self._recording.disconnect)
+            sink = rr.GrpcServerSink(LOOPBACK, port, server_memory_limit=MEMORY)
+            stream = open_stream(run.ring, sink, self._ring.columns, run.about)
+            stack.callback(stream.disconnect)
             try:
-                self._recording.flush(timeout_sec=_START_S)
+                stream.flush(timeout_sec=_START_S)
             except RuntimeError as error:  # or viewers would show what somebody else sends there
                 again = "start it again: it takes another"
                 raise OSError(f"port {port} of this machine was taken; {again}") from error
-            if run.about:
-                write_about(self._recording, run.about)
-            self._log = RunLog(self._recording, run_paths([LIVE_RUN])[0], columns, run.about)
+            self._log = live_log(stream, self._ring.columns, run.about)
             self._stack = stack.pop_all()
 
     def send(self) -> bool:
         """Send what has come since the last call; returns whether more may come."""
         ended = self._ring.ended
-        rows = self._ring.read()
+        rows = self._ring.read_rows()
         if len(rows):
             self._log.write(rows)
         if self._events is not None:
-            self._log.write_events(self._events.read())
+            self._log.write_events(self._events.read_events())
         return not ended
 
     def close(self) -> None:

@@ -1,17 +1,17 @@
-"""One file of a live recording."""
+"""The stream of a run that goes on: into one file of its recording, or to viewers."""
 
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.closing import Closing
 from utank_hil.telemetry.blueprint import columns_of, make_blueprint
-from utank_hil.telemetry.event_ring import Event
+from utank_hil.telemetry.events import Event
 from utank_hil.telemetry.rerun_log import (
     APPLICATION,
     LIVE_RUN,
@@ -22,9 +22,34 @@ from utank_hil.telemetry.rerun_log import (
 )
 from utank_hil.telemetry.scene import scene_size
 
+Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
+
 _FLUSH_TIMEOUT_S: Final = 5.0
 _RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
 _FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
+
+
+def open_stream(
+    name: str, sink: Sink, columns: Sequence[str], about: Mapping[str, Any] | None
+) -> rr.RecordingStream:
+    """A stream of one run, with its layout, to a file or to viewers."""
+    stream = rr.RecordingStream(APPLICATION, recording_id=name)
+    size = scene_size(columns, about)
+    layout = make_blueprint(columns_of(columns, about), [LIVE_RUN], size=size)
+    stream.set_sinks(sink, default_blueprint=layout)
+    return stream
+
+
+def live_log(
+    stream: rr.RecordingStream,
+    columns: Sequence[str],
+    about: Mapping[str, Any] | None,
+    batch_s: float = 0.0,
+) -> RunLog:
+    """The log of that run in its stream, after what says where it comes from."""
+    if about:
+        write_about(stream, about)
+    return RunLog(stream, run_paths([LIVE_RUN])[0], columns, about, batch_s)
 
 
 class RecordingPart(Closing):
@@ -55,15 +80,8 @@ class RecordingPart(Closing):
         self._rows = 0
         self._lost = Counter[str]()
         self._open = True
-        self._recording = rr.RecordingStream(APPLICATION, recording_id=file.stem)
-        size = scene_size(columns, about)
-        self._recording.set_sinks(
-            rr.FileSink(file),
-            default_blueprint=make_blueprint(columns_of(columns, about), [LIVE_RUN], size=size),
-        )
-        if about is not None:
-            write_about(self._recording, about)
-        self._log = RunLog(self._recording, run_paths([LIVE_RUN])[0], columns, about, PICTURES_S)
+        self._recording = open_stream(file.stem, rr.FileSink(file), columns, about)
+        self._log = live_log(self._recording, columns, about, PICTURES_S)
 
     def write(self, rows: FloatArray) -> None:
         """Append rows, shape (n, width), n above zero."""

@@ -15,7 +15,7 @@ from rerun.error_utils import RerunWarning
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.whole_file import write_whole
-from utank_hil.retuning.law_exchange import RetuningEvent
+from utank_hil.canbus.events import RetuningEvent
 from utank_hil.telemetry.blueprint import MOST_SHADES, columns_of, make_blueprint, run_color
 from utank_hil.telemetry.rerun_log import (
     ABOUT,

@@ -100,10 +100,10 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
             places[name] = str(Path(folder, f"{number}-{Path(name).name}"))
             Path(places[name]).write_bytes(zlib.decompress(base64.b85decode(data)))
         content = _put(head["about"]["configuration"], places)
-        if content.get("law", {}).get("kind") == _CODE:
+        if code := next(_code(content.get("law")), None):
             raise ReplayHeadError(
-                f"its law is Python code, {content['law'].get('factory')}, which a log must not "
-                "choose: name the configuration that it ran with by --config"
+                f"its law is Python code, {code}, which a log must not choose: name the "
+                "configuration that it ran with by --config"
             )
         try:
             config = ControllerConfig.model_validate(content)
@@ -115,6 +115,17 @@ def recorded_config(head: Mapping[str, Any]) -> Iterator[ControllerConfig]:
                 "that it takes by --config, or replay it with the version that recorded it"
             ) from error
         yield config
+
+
+def _code(law: Any) -> Iterator[str]:
+    """Factories of a law, and of those that it holds at any depth, that are code of one's own."""
+    if isinstance(law, dict):
+        if law.get("kind") == _CODE:
+            yield str(law.get("factory"))
+        law = list(law.values())
+    if isinstance(law, list):
+        for part in law:
+            yield from _code(part)
 
 
 def recorded_law(

@@ -18,7 +18,7 @@ import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
-from utank_hil.telemetry.event_ring import Event, event_text, warns
+from utank_hil.telemetry.events import Event, event_text, warns
 from utank_hil.telemetry.motion_figures import NEEDED, MotionFigures
 from utank_hil.telemetry.scene import Scene, scene_size
 from utank_hil.telemetry.units import field_of

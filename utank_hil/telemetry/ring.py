@@ -1,38 +1,38 @@
-"""A ring buffer of float64 rows in shared memory: one non-blocking writer, any number of readers.
+"""A ring of records in shared memory: one writer that never waits, any number of readers.
 
-The controller writes; the recorder reads in a process of its own. It is a broadcast ring: the
-writer overwrites the oldest slot, never blocks and has no information about readers. A slot holds
-the rows of one write: several at once cost hardly more than one. Each reader has its own cursor,
-detects when the writer has overtaken it, and counts the rows it lost. Readers map the segment
-read-only, so they cannot affect the controller.
+The controller writes; recorder, announcer and viewers read in processes of their own. A record is a
+piece of bytes, of which the ring says the kind. It is a broadcast ring: the writer overwrites the
+oldest slot, never blocks and has no information about readers. A slot holds the records of one
+write: several at once cost hardly more than one. Each reader has its own cursor, detects when the
+writer has overtaken it, and counts the slots it lost. Readers map the segment read-only, so they
+cannot affect the controller.
 
-Layout, in 8-byte words: header (`_Word`), column names and origin as JSON, then `capacity` slots of
-`rows` times `width` values and one word that closes the slot: in its upper half how many rows there
-are, in its lower half the CRC-32 of their bytes. That of write number k is started from k, so that
-a slot of an earlier lap, or a part of one, fails it.
+Layout, in 8-byte words: header (`_Word`), kind and content as JSON, then the slots: each has room
+for some bytes and one word that closes it, in its upper half how many bytes there are, in its lower
+half their CRC-32. That of write number k is started from k, so that a slot of an earlier lap, or a
+part of one, fails it.
 
-Ordering. The writer stores values, then the closing word, then the count of writes; a reader loads
-the count and then the slots. Count and closing word are aligned 8-byte words, which x86-64 and
-AArch64 store and load atomically. x86-64 also keeps the order of stores and of loads, so a slot
+Ordering. The writer stores the bytes, then the closing word, then the count of writes; a reader
+loads the count and then the slots. Count and closing word are aligned 8-byte words, which x86-64
+and AArch64 store and load atomically. x86-64 also keeps the order of stores and of loads, so a slot
 below the count is complete. AArch64 may reorder both, and Python has no memory fence: there the
 checksum decides. A slot with a wrong checksum is never returned: it was either overwritten
 meanwhile (lost, as the count shows) or is not visible yet (left for the next read).
 
 Lifetime. The writer owns the segment: `close` marks it closed and unlinks it, and attached readers
 drain the rest. If the writer is killed, its `multiprocessing` resource tracker unlinks it; if that
-is killed with it, the next writer does, whoever it is. Readers
-open the segment as a file, not as `SharedMemory`, whose tracker (Python below 3.13) would unlink it
-when a reader exits.
+is killed with it, the next writer of the same user does. Readers open the segment as a file, not as
+`SharedMemory`, whose tracker (Python below 3.13) would unlink it when a reader exits.
 """
 
-import contextlib
 import json
 import mmap
 import os
 import secrets
 import stat
-from collections.abc import Mapping, Sequence
-from enum import IntEnum
+from collections.abc import Mapping
+from contextlib import suppress
+from enum import IntEnum, StrEnum
 from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
@@ -40,15 +40,24 @@ from typing import Any, Final
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.closing import Closing
 
 _SHM: Final = Path("/dev/shm")
+_PREFIX: Final = "utank-"
+_HELD: Final = "/proc/self/fd/"
 _MAGIC: Final = int.from_bytes(b"UTNKRING", "little")
-_VERSION: Final = 3
+_VERSION: Final = 4
 _HEADER_WORDS: Final = 16
+
+
+class RingKind(StrEnum):
+    """What the records of a ring are."""
+
+    ROWS = "rows"
+    EVENTS = "events"
+    FRAMES = "frames"
 
 
 class _Word(IntEnum):
@@ -56,12 +65,11 @@ class _Word(IntEnum):
 
     MAGIC = 0
     VERSION = 1
-    WIDTH = 2
-    CAPACITY = 3
+    SLOT_BYTES = 2
+    SLOTS = 3
     TEXT_BYTES = 4
     WRITER_PID = 5
     WRITER_START = 6
-    ROWS = 7
     COUNT = 8
     CLOSED = 9
 
@@ -79,16 +87,18 @@ class RingWriter(Closing):
 
     Parameters
     ----------
-    columns : sequence of str
-        Names of a row's values; one or more, all different.
-    capacity : int
-        Slots in the ring. The default is seven minutes of one row each at 20 Hz, some 2 MB.
+    kind : RingKind
+        Of all its records.
+    record_bytes : int
+        Length of a record; 1 where each has its own.
+    records : int
+        Records that a slot has room for; together a multiple of 8 bytes.
+    slots : int
+        Slots in the ring, two or more.
+    content : mapping, optional
+        What readers need to know of the records, ready for `json.dumps`.
     name : str, optional
         Name of the ring, for readers; generated by default.
-    about : mapping, optional
-        Where its rows come from (`utank_hil.base.provenance`), for readers.
-    rows : int
-        Rows that a slot has room for.
 
     Attributes
     ----------
@@ -98,30 +108,31 @@ class RingWriter(Closing):
     Raises
     ------
     ValueError
-        If there are no columns, a name comes twice, or there are fewer than two slots.
+        If there are fewer than two slots, or their length is no multiple of 8 bytes.
     RingError
         If a ring of that name exists and its writer lives, or there is no room for it.
     """
 
     def __init__(
         self,
-        columns: Sequence[str],
-        capacity: int = 8192,
+        kind: RingKind,
+        record_bytes: int,
+        records: int,
+        slots: int,
+        content: Mapping[str, Any] | None = None,
         name: str | None = None,
-        about: Mapping[str, Any] | None = None,
-        rows: int = 1,
     ) -> None:
-        self.columns = tuple(columns)
-        if not self.columns or len(set(self.columns)) != len(self.columns):
-            raise ValueError(f"a ring needs columns with different names, got {self.columns}")
-        if capacity < 2:
-            raise ValueError(f"a ring needs two slots or more, got {capacity}")
-        text = json.dumps([self.columns, about]).encode()
-        width = len(self.columns)
-        first = _first_slot_word(len(text))
-        stride = rows * width + 1
-        size = 8 * (first + capacity * stride)
-        self.name = name or f"utank-{os.getpid()}-{secrets.token_hex(4)}"
+        slot_bytes = record_bytes * records
+        if slots < 2 or slot_bytes % 8 or slot_bytes <= 0:
+            raise ValueError(
+                f"a ring needs two slots or more of a multiple of 8 bytes, got {slots} of "
+                f"{slot_bytes}"
+            )
+        text = json.dumps({"kind": kind, **(content or {})}).encode()
+        first = _first_slot_byte(len(text))
+        stride = slot_bytes + 8
+        size = first + slots * stride
+        self.name = name or f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}"
         # a killed process group has nobody left to unlink its own
         for left_over in {self.name, *ring_names()}:
             _remove_if_orphaned(left_over)
@@ -141,48 +152,43 @@ class RingWriter(Closing):
         memory[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + len(text)] = text
         words = memory[:size].cast("q")
         words[_Word.VERSION] = _VERSION
-        words[_Word.WIDTH] = width
-        words[_Word.CAPACITY] = capacity
-        words[_Word.ROWS] = rows
+        words[_Word.SLOT_BYTES] = slot_bytes
+        words[_Word.SLOTS] = slots
         words[_Word.TEXT_BYTES] = len(text)
         words[_Word.WRITER_PID] = os.getpid()
         words[_Word.WRITER_START] = _process_start(os.getpid()) or 0
         words[_Word.MAGIC] = _MAGIC  # last: from here on readers accept the segment
         self._words = words
         # Views are created once, so that a write allocates nothing permanent.
-        starts = range(8 * first, size, 8 * stride)
-        self._slots = [memory[start : start + 8 * (stride - 1)] for start in starts]
-        self._closing = words[first + stride - 1 :: stride]
-        self._row_bytes, self._slot_bytes = 8 * width, 8 * (stride - 1)
-        self._capacity = capacity
+        self._slots = [memory[at : at + slot_bytes] for at in range(first, size, stride)]
+        self._closing = words[(first + slot_bytes) // 8 :: stride // 8]
+        self._record_bytes, self._slot_bytes, self._slot_count = record_bytes, slot_bytes, slots
         self.count = 0
 
-    def write(self, rows: FloatArray | bytes | bytearray) -> None:
-        """Append rows, over the oldest if the ring is full; never blocks.
+    def write(self, records: FloatArray | bytes | bytearray) -> None:
+        """Append records, over the oldest if the ring is full; never blocks.
 
         Parameters
         ----------
-        rows : array (width,) or (n, width)
-            Or its bytes. Those that a slot has no room for go into the next ones.
+        records : bytes, or array of float64
+            One or more. Those that a slot has no room for go into the next ones.
 
         Raises
         ------
         ValueError
-            If the length is not one or more of the ring's width, or the ring is closed.
+            If they are none, or not whole, or the ring is closed.
         """
-        data = rows.tobytes() if isinstance(rows, np.ndarray) else rows
-        if len(data) % self._row_bytes or not data:
-            columns = len(self.columns)
-            raise ValueError(f"rows have {len(data) // 8} values, the ring {columns} columns")
+        data = records.tobytes() if isinstance(records, np.ndarray) else records
+        if len(data) % self._record_bytes or not data:
+            raise ValueError(f"{len(data)} bytes are no records of {self._record_bytes} bytes each")
         if self._shm is None:
             raise ValueError(f"ring {self.name!r} is closed")
         for start in range(0, len(data), self._slot_bytes):
             part = data[start : start + self._slot_bytes]
             count = self.count
-            index = count % self._capacity
+            index = count % self._slot_count
             self._slots[index][: len(part)] = part
-            held = len(part) // self._row_bytes
-            self._closing[index] = held << 32 | crc32(part, count & 0xFFFFFFFF)
+            self._closing[index] = len(part) << 32 | crc32(part, count & 0xFFFFFFFF)
             self.count = count = count + 1
             self._words[_COUNT] = count
 
@@ -209,23 +215,27 @@ class RingReader(Closing):
     name : str
         The writer's `name`.
     place : int, optional
-        `place` of another reader, from where this one goes on; it starts at the oldest row if not
+        `place` of another reader, from where this one goes on; it starts at the oldest slot if not
         given.
+    kind : RingKind, optional
+        The only kind to be accepted.
 
     Attributes
     ----------
-    about : mapping or None
-        Where the rows come from, if the writer says.
+    kind : RingKind
+        Of its records.
+    content : mapping
+        What the writer says of them.
     lost : int
-        Rows overwritten before they were read; a slot counts as full.
+        Slots overwritten before they were read.
 
     Raises
     ------
     RingError
-        If there is no such ring, or the segment is not a ring of this version.
+        If there is no such ring, or the segment is not a ring of this version and kind.
     """
 
-    def __init__(self, name: str, place: int | None = None) -> None:
+    def __init__(self, name: str, place: int | None = None, kind: RingKind | None = None) -> None:
         self.name = name
         descriptor = _opened(name)
         try:
@@ -235,56 +245,45 @@ class RingReader(Closing):
             self._map = mmap.mmap(descriptor, size, access=mmap.ACCESS_READ)
         finally:
             os.close(descriptor)
-        words = np.frombuffer(self._map, dtype=np.int64, count=size // 8)
-        magic, version, width, capacity, text_bytes, pid, start, rows = map(int, words[:8])
-        first = _first_slot_word(text_bytes)
-        stride = rows * width + 1
-        fits = min(width, capacity, text_bytes, rows) > 0 and size >= 8 * (
-            first + capacity * stride
-        )
-        if (magic, version) != (_MAGIC, _VERSION) or not fits:
+        self._words = memoryview(self._map)[: 8 * _HEADER_WORDS].cast("q")
+        magic, version, slot_bytes, slots, text_bytes, pid, start = self._words[:7].tolist()
+        self._first, self._stride = _first_slot_byte(text_bytes), slot_bytes + 8
+        fits = min(slot_bytes, slots, text_bytes) > 0 and slot_bytes % 8 == 0
+        if (magic, version) != (_MAGIC, _VERSION) or not (
+            fits and size >= self._first + slots * self._stride
+        ):
             raise RingError(f"{name!r} is not a telemetry ring of version {_VERSION}")
         text = self._map[8 * _HEADER_WORDS : 8 * _HEADER_WORDS + text_bytes]
         try:
-            columns, about = json.loads(text)
-        except ValueError as error:
+            self.content: Mapping[str, Any] = dict(json.loads(text))
+            self.kind = RingKind(self.content["kind"])
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
             raise RingError(f"{name!r} is a damaged telemetry ring") from error
-        self.columns: tuple[str, ...] = tuple(columns)
-        self.about: dict[str, Any] | None = about
-        self.writer_pid = pid
+        if kind not in (None, self.kind):
+            raise RingError(f"{name!r} is a telemetry ring of {self.kind}, not of {kind}")
+        self.writer_pid: int = pid
         self.lost = 0
-        self._words = words
-        self._slots = words[first : first + capacity * stride].reshape(capacity, stride)
-        self._rows = rows
-        self._writer_start = start
-        self._next = max(0, int(words[_Word.COUNT]) - capacity) if place is None else place
+        self._slots: int = slots
+        self._writer_start: int = start
+        self._next: int = max(0, self._words[_COUNT] - slots) if place is None else place
 
-    def read(self) -> FloatArray:
-        """Return the rows written since the last call, oldest first; never blocks.
-
-        Returns
-        -------
-        array (n, width)
-            A copy; n may be zero.
-        """
-        capacity, rows, width = len(self._slots), self._rows, len(self.columns)
-        stop = int(self._words[_Word.COUNT])
-        oldest = max(self._next, stop - capacity)
-        numbers = np.arange(oldest, stop)
-        copies: npt.NDArray[np.int64] = self._slots[numbers % capacity]
-        held = copies[:, -1] >> 32
-        intact = np.zeros(len(numbers), dtype=np.bool_)
-        for index, number in enumerate(range(oldest, stop)):
-            slot = copies[index]
-            written, checksum = slot[: held[index] * width], slot[-1] & 0xFFFFFFFF
-            intact[index] = crc32(written, number & 0xFFFFFFFF) == checksum
-            if not intact[index] and number > int(self._words[_Word.COUNT]) - capacity:
+    def read(self) -> list[bytes]:
+        """Return what was written since the last call, slot by slot, oldest first; never blocks."""
+        stop = self._words[_COUNT]
+        found: list[bytes] = []
+        for number in range(max(self._next, stop - self._slots), stop):
+            start = self._first + number % self._slots * self._stride
+            slot = self._map[start : start + self._stride]
+            closing = int.from_bytes(slot[-8:], "little")
+            data = slot[: closing >> 32]
+            if crc32(data, number & 0xFFFFFFFF) == closing & 0xFFFFFFFF:
+                found.append(data)
+            elif number > self._words[_COUNT] - self._slots:
                 stop = number  # written, but not yet visible to this processor
                 break
-        self.lost += rows * (stop - self._next - int(intact.sum()))
+        self.lost += stop - self._next - len(found)
         self._next = stop
-        values = copies[intact, :-1].view(np.float64).reshape(-1, rows, width)
-        return values[np.arange(rows) < held[intact, None]]
+        return found
 
     @property
     def place(self) -> int:
@@ -293,7 +292,7 @@ class RingReader(Closing):
 
     @property
     def ended(self) -> bool:
-        """Whether no more rows will be written: the writer closed the ring, or is dead.
+        """Whether no more records will be written: the writer closed the ring, or is dead.
 
         Check before reading, and stop when it was true and the read returns nothing.
         """
@@ -305,10 +304,9 @@ class RingReader(Closing):
         return _process_start(self.writer_pid) == self._writer_start
 
     def close(self) -> None:
-        """Release the memory; idempotent. Returned rows stay valid."""
-        if not self._map.closed:
-            del self._words, self._slots  # mapped memory can be released only without views
-            self._map.close()
+        """Release the memory; idempotent. What was read stays valid."""
+        self._words.release()  # mapped memory can be released only without views
+        self._map.close()
 
 
 def held_ring(name: str) -> str:
@@ -323,14 +321,16 @@ def held_ring(name: str) -> str:
     """
     descriptor = _opened(name)
     os.set_inheritable(descriptor, True)
-    return f"/proc/self/fd/{descriptor}"
+    return f"{_HELD}{descriptor}"
 
 
 def _opened(name: str) -> int:
     """Descriptor of a ring's segment, to read."""
+    # somebody else's may be a pipe, which waits for a writer, or a link to a device
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
+    flags |= 0 if name.startswith(_HELD) else os.O_NOFOLLOW
     try:
-        # somebody else's may be a pipe, which waits for a writer
-        descriptor = os.open(_SHM / name, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        descriptor = os.open(_SHM / name, flags)
     except FileNotFoundError as error:
         raise RingError(f"no ring {name!r}: is its writer running?") from error
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -341,12 +341,12 @@ def _opened(name: str) -> int:
 
 def ring_names() -> list[str]:
     """Names of the rings on this machine, in order; what of them can be read is not known."""
-    return sorted(path.name for path in _SHM.glob("utank-*"))
+    return sorted(path.name for path in _SHM.glob(f"{_PREFIX}*"))
 
 
-def _first_slot_word(text_bytes: int) -> int:
-    """Word at which the slots begin, on a cache line."""
-    return _HEADER_WORDS + 8 * -(-text_bytes // 64)
+def _first_slot_byte(text_bytes: int) -> int:
+    """Byte at which the slots begin, on a cache line."""
+    return 8 * _HEADER_WORDS + 64 * -(-text_bytes // 64)
 
 
 def _reserve(name: str, size: int) -> None:
@@ -364,20 +364,23 @@ def _process_start(pid: int) -> int | None:
     With the pid it identifies a process uniquely, since pids are reused.
     """
     try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
+        status = Path(f"/proc/{pid}/stat").read_text()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    fields = stat.rpartition(")")[2].split()  # the command name may contain spaces and parentheses
+    fields = status.rpartition(")")[2].split()  # the command name may hold spaces, parentheses
     return None if fields[0] in "ZX" else int(fields[19])
 
 
 def _remove_if_orphaned(name: str) -> None:
-    """Unlink a segment of that name if its writer died without unlinking it."""
-    try:
+    """Unlink a segment of that name if it is this user's and its writer died without unlinking it.
+
+    What belongs to somebody else, or can be changed by others, is not even read.
+    """
+    with suppress(OSError):  # none, no ring, or gone since
+        status = os.stat(_SHM / name, follow_symlinks=False)
+        if status.st_uid != os.geteuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return
         with RingReader(name) as left_over:
             lives = left_over.writer_lives  # one that has closed it is about to unlink it
-    except OSError:  # none, no ring, or somebody else's
-        return
-    if not lives:
-        with contextlib.suppress(OSError):
+        if not lives:
             os.unlink(_SHM / name)

@@ -1,15 +1,20 @@
-"""How long a file of a recording may be, and how many stay; imports no Rerun."""
+"""The files of a recording, one after the other; how long one is, and how many stay.
 
-import os
+A recording is a `.rrd` file, a frame log, or both; they have one name and come and go together. One
+that goes on has parts: `run-x.rrd`, `run-x-part002.rrd`, ...
+"""
+
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from os import stat_result
 from pathlib import Path
 from typing import Final
 
-_GROWTH: Final = 1.05  # compression differs from file to file
+_GROWTH: Final = 1.05
+"""Of a file over the one before: compression differs from file to file."""
 SUFFIXES: Final = (".rrd", ".frames")
-"""Files of one recording, which come and go together."""
+"""Files of one recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,14 @@ class Rotation:
     part_s: float
     keep_bytes: int | None = None
 
+    def make_room(self, file: Path, number: int) -> None:
+        """Remove the oldest recordings before part `number` of the recording `file` begins."""
+        if self.keep_bytes is not None:
+            before = part_of(file, number - 1).with_suffix
+            files = [] if number == 1 else [before(suffix) for suffix in SUFFIXES]
+            last_bytes = sum(status.st_size for _, status in _found(files))
+            remove_oldest(part_of(file, number), self.keep_bytes - round(_GROWTH * last_bytes))
+
 
 def part_of(file: Path, number: int) -> Path:
     """Name of the part of a recording with a number; the first has the recording's own."""
@@ -40,28 +53,8 @@ def whole_of(file: Path) -> tuple[Path, int]:
     return (file.with_stem(stem), int(number)) if mark and number.isdecimal() else (file, 1)
 
 
-def make_room(file: Path, number: int, rotation: Rotation | None) -> None:
-    """Remove the oldest recordings before a part of one begins, if its rotation says so.
-
-    Parameters
-    ----------
-    file : Path
-        Of the first part.
-    number : int
-        Of the part that begins.
-    """
-    if rotation is not None and rotation.keep_bytes is not None:
-        room_bytes = 0 if number == 1 else round(_GROWTH * bytes_of(part_of(file, number - 1)))
-        remove_oldest(part_of(file, number), rotation.keep_bytes - room_bytes)
-
-
-def bytes_of(file: Path) -> int:
-    """Size of a recording, all its files together."""
-    return sum(status.st_size for _, status in _found(file.with_suffix(s) for s in SUFFIXES))
-
-
-def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, os.stat_result]]:
-    """Files and what is known of them; whoever else clears the folder may be quicker."""
+def _found(paths: Iterable[Path]) -> Iterator[tuple[Path, stat_result]]:
+    """Files and their status; another process that clears the folder may be quicker."""
     for path in paths:
         with suppress(FileNotFoundError):
             yield path, path.stat()
@@ -73,15 +66,15 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
     Parameters
     ----------
     file : Path
-        A recording of the folder, there or to come, which stays; other parts of it go last. Others
-        are those whose names begin alike, up to the first hyphen.
+        A recording of the folder, there or to come, which stays; other parts of it go last. Only
+        recordings whose names begin alike, up to the first hyphen, are counted and removed.
 
     Returns
     -------
     list of Path
         What was removed.
     """
-    alike: dict[str, dict[Path, os.stat_result]] = {}
+    alike: dict[str, dict[Path, stat_result]] = {}
     for suffix in SUFFIXES:
         for path, status in _found(file.parent.glob(f"{file.stem.partition('-')[0]}-*{suffix}")):
             if path.stem != file.stem:
@@ -92,16 +85,13 @@ def remove_oldest(file: Path, keep_bytes: int) -> list[Path]:
         of_own_run = whole_of(file.with_stem(stem))[0].stem == own.stem
         return of_own_run, max(status.st_mtime_ns for status in alike[stem].values()), stem
 
-    sizes = {
-        stem: sum(status.st_size for status in files.values()) for stem, files in alike.items()
-    }
-    left = sum(sizes.values())
+    left = sum(status.st_size for files in alike.values() for status in files.values())
     removed: list[Path] = []
     for stem in sorted(alike, key=age):
         if left <= keep_bytes:
             break
-        for path in alike[stem]:
+        for path, status in alike[stem].items():
             path.unlink(missing_ok=True)
-        left -= sizes[stem]
-        removed += alike[stem]
+            left -= status.st_size
+            removed.append(path)
     return removed

@@ -7,9 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from utank_hil.canbus import AlarmState, Fault, Mode, RetuningState
-from utank_hil.retuning import ModelSummary, RetuningEvent
-from utank_hil.safety.alarms import AlarmEvent
-from utank_hil.telemetry.event_ring import Event, EventReader, EventWriter, event_text, warns
+from utank_hil.canbus.events import AlarmEvent, ModelSummary, RetuningEvent
+from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text, warns
 from utank_hil.telemetry.ring import RingError
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -35,9 +34,9 @@ def test_events_come_out_as_they_went_in_at_times_since_the_start(
 ) -> None:
     with EventWriter() as writer, EventReader(writer.name) as reader:
         for event in told:
-            writer.write(event, start_ns)
-        assert reader.read() == [replace(e, time_ns=e.time_ns - start_ns) for e in told]
-        assert reader.read() == []
+            writer.write_event(event, start_ns)
+        assert reader.read_events() == [replace(e, time_ns=e.time_ns - start_ns) for e in told]
+        assert reader.read_events() == []
         assert not told or reader.start_ns == start_ns
         assert not reader.ended
         assert reader.lost == 0
@@ -48,8 +47,8 @@ def test_reasons_too_long_for_the_ring_are_cut_and_the_rest_is_told(character: s
     summary = ModelSummary(*[1 / 3] * 9)
     event = RetuningEvent(1, RetuningState.REFUSED, ("it was this: " + character * 9000,), summary)
     with EventWriter() as writer, EventReader(writer.name) as reader:
-        writer.write(event, 0)
-        (told,) = reader.read()
+        writer.write_event(event, 0)
+        (told,) = reader.read_events()
     assert told.reasons[0].startswith("it was this: ")
     assert told.reasons[0].endswith(" ...")
     assert len(told.reasons[0]) > 500
@@ -60,14 +59,14 @@ def test_every_reader_hears_every_event_and_what_was_lost_is_counted() -> None:
     told = [RetuningEvent(number, RetuningState.IDENTIFY, ()) for number in range(100)]
     with EventWriter() as writer:
         early, late = EventReader(writer.name), EventReader(writer.name)
-        writer.write(told[0], 0)
-        assert early.read() == told[:1]
+        writer.write_event(told[0], 0)
+        assert early.read_events() == told[:1]
         for event in told[1:]:
-            writer.write(event, 0)
-    heard = late.read()
+            writer.write_event(event, 0)
+    heard = late.read_events()
     assert heard == told[-len(heard) :]
     assert (len(heard), late.lost) == (64, 36)
-    assert early.read() == heard
+    assert early.read_events() == heard
     assert early.ended
     assert late.ended
     early.close()

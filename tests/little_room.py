@@ -1,0 +1,19 @@
+"""A disk that fills up while a file is written."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+ROOM: Final = 1024
+
+
+@contextmanager
+def little_room() -> Iterator[None]:
+    """No file can grow beyond `ROOM` bytes in here."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)

@@ -1,0 +1,106 @@
+"""What a controller reports beside its frames: steps of retuning and of its alarm list.
+
+The records are plain: recorder, announcer and report read them without what makes them.
+"""
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from utank_hil.canbus.enumerations import AlarmState, Fault, Mode, RetuningState
+
+if TYPE_CHECKING:
+    from utank_hil.dynamics.ship import RollShip
+    from utank_hil.dynamics.tank import Tank
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmEvent:
+    """A state change of an alarm, or a reset that was refused.
+
+    Attributes
+    ----------
+    time_ns : int
+        Time on the node's clock.
+    code : Fault
+    state : AlarmState or None
+        State entered; None: a reset was refused since this lasts.
+    mode : Mode
+        Of the controller.
+    """
+
+    time_ns: int
+    code: Fault
+    state: AlarmState | None
+    mode: Mode
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSummary:
+    """The identified ship, and the law's predicted performance.
+
+    Attributes
+    ----------
+    roll_period_s : float
+        Natural roll period of the ship without tank water.
+    period_deviation : float
+        Relative standard deviation of that period.
+    inertia_kg_m2, stiffness_nm_rad, damping_nms_rad : float
+        Roll inertia, stiffness and linear damping of the ship.
+    held_out_fit : float
+        Worst one-step fit of an output on validation data.
+    peak_sensitivity : float
+        Peak of the sensitivity function on the identified ship.
+    roll_below_passive : float
+        Relative reduction of the roll RMS in the recorded waves, against the passive tank.
+    """
+
+    roll_period_s: float
+    period_deviation: float
+    inertia_kg_m2: float
+    stiffness_nm_rad: float
+    damping_nms_rad: float
+    tank_damping_ratio: float
+    held_out_fit: float
+    peak_sensitivity: float
+    roll_below_passive: float
+
+    def ship(self, configured: "RollShip") -> "RollShip":
+        """The configured ship as it was identified."""
+        return configured.with_figures(
+            self.inertia_kg_m2, self.stiffness_nm_rad, self.damping_nms_rad
+        )
+
+    def tank(self, configured: "Tank") -> "Tank":
+        """The configured tank as it was identified."""
+        return replace(configured, damping_ratio=self.tank_damping_ratio)
+
+
+@dataclass(frozen=True, slots=True)
+class RetuningEvent:
+    """A state change of the retuning controller, or a message without one.
+
+    Attributes
+    ----------
+    time_ns : int
+        Time on the node's clock.
+    state : RetuningState
+        State entered; the present state for a message.
+    reasons : tuple of str
+        Why, in words.
+    found : ModelSummary or None
+        Identified ship that the law on trial, or the accepted law, was designed for.
+    """
+
+    time_ns: int
+    state: RetuningState
+    reasons: tuple[str, ...]
+    found: ModelSummary | None = None
+
+    def as_json(self, start_ns: int = 0) -> dict[str, Any]:
+        """The event, ready for `json.dumps`; `time_s` counts from `start_ns`."""
+        return {
+            "time_s": (self.time_ns - start_ns) * 1e-9,
+            "state": self.state.name,
+            "reasons": list(self.reasons),
+            "found": None if self.found is None else asdict(self.found),
+        }

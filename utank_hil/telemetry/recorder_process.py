@@ -1,0 +1,143 @@
+"""The recorder as the loop's process sees it: started before the loop, asked without waiting."""
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from dataclasses import fields
+from importlib.util import find_spec
+from typing import Any, Final
+
+from utank_hil.base.closing import Closing
+from utank_hil.telemetry.recorder import RecorderReport, RecorderState, RecordingTask
+
+NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
+_MODULE: Final = "utank_hil.telemetry.recorder"
+_START_TIMEOUT_S: Final = 30.0
+_STOP_TIMEOUT_S: Final = 30.0
+_FIELDS: Final = {each.name for each in fields(RecorderReport)}
+_READ_BYTES: Final = 1 << 16
+"""What a pipe holds."""
+
+
+class RecorderError(RuntimeError):
+    """The recorder process did not start, or ended badly."""
+
+
+class RecorderProcess(Closing):
+    """A recorder in a process of its own; ready when the constructor returns.
+
+    Start it before the loop: it takes about a second, mostly for importing Rerun. It runs in a
+    session of its own, so that Ctrl-C in the terminal does not end it before the loop's last rows.
+
+    Raises
+    ------
+    RecorderError
+        If the recorder does not start, with the reason.
+    """
+
+    def __init__(self, task: RecordingTask) -> None:
+        if find_spec("rerun") is None and task.frames is None:
+            raise RecorderError(NEEDS_RERUN)
+        self._end: RecorderReport | RecorderError | None = None
+        state = RecorderState(task).as_input()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", _MODULE],
+                stdin=state,
+                stdout=subprocess.PIPE,
+                start_new_session=True,
+            )
+        finally:
+            os.close(state)
+        output = self._process.stdout
+        assert output is not None
+        self._output = output
+        self._said = b""
+        os.set_blocking(output.fileno(), False)
+        deadline_s = time.monotonic() + _START_TIMEOUT_S
+        open_, waits = True, True
+        while open_ and waits and not self._message("ready", "error"):
+            left_s = max(0.0, deadline_s - time.monotonic())
+            waits = bool(select.select([output], [], [], left_s)[0])
+            open_ = self._listen()
+        if not self._message("ready"):
+            self._kill()
+            ended = f"silent for {_START_TIMEOUT_S:g} s" if not waits else "it ended"
+            reason = self._message("error").get("error", ended)
+            raise RecorderError(f"the recorder of {task.file} did not start: {reason}")
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process has ended."""
+        return self._process.poll() is not None
+
+    def stop(self) -> RecorderReport:
+        """Write the last rows and wait for the end of the process; idempotent.
+
+        Raises
+        ------
+        RecorderError
+            If the process failed, with the reason, or does not end.
+        """
+        if self._end is None:
+            self._end = self._ended()
+        if isinstance(self._end, RecorderError):
+            raise self._end
+        return self._end
+
+    def close(self) -> None:
+        """Same as `stop`."""
+        self.stop()
+
+    def _ended(self) -> RecorderReport | RecorderError:
+        self._process.terminate()
+        try:
+            code = self._process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._kill()
+            return RecorderError("the recorder did not end and was killed")
+        with self._output:
+            self._listen()
+        if code != 0:
+            reason = self._message("error").get("error", f"exit code {code}")
+            return RecorderError(f"the recorder failed: {reason}")
+        report = self._message(*_FIELDS)
+        if report.keys() != _FIELDS or not all(type(each) is int for each in report.values()):
+            return RecorderError("the recorder ended and did not say how it went")
+        return RecorderReport(**report)
+
+    def _listen(self) -> bool:
+        """Take what the process has said so far, never waiting; returns whether more may come."""
+        try:
+            heard = os.read(self._output.fileno(), _READ_BYTES)
+        except BlockingIOError:  # the pipe is open, by the process or by one that it left behind
+            return True
+        self._said += heard
+        return bool(heard)
+
+    def _message(self, *keys: str) -> dict[str, Any]:
+        """The last message with one of these keys; empty if there is none.
+
+        Whatever else stands on the output, as of a library or of half a line, is passed over.
+        """
+        for line in reversed(self._said.split(b"\n")):
+            try:
+                message = json.loads(line)
+            except (ValueError, RecursionError):
+                continue
+            if isinstance(message, dict) and not message.keys().isdisjoint(keys):
+                return message
+        return {}
+
+    def _kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        self._output.close()

@@ -1,0 +1,67 @@
+"""The ring of numbers: a record is one telemetry row of float64, in the order of its columns."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from utank_hil.base.arrays import FloatArray
+from utank_hil.telemetry.ring import RingError, RingKind, RingReader, RingWriter
+
+
+class RowWriter(RingWriter):
+    """The writing end of a ring of rows.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Names of a row's values; one or more, all different.
+    slots : int
+        Rows in the ring. The default is seven minutes at 20 Hz, some 2 MB.
+    about : mapping, optional
+        Where its rows come from (`utank_hil.base.provenance`).
+
+    Raises
+    ------
+    ValueError
+        If there are no columns, a name comes twice, or there are fewer than two slots.
+    RingError
+        As of `RingWriter`.
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[str],
+        slots: int = 8192,
+        name: str | None = None,
+        about: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not columns or len(set(columns)) != len(columns):
+            raise ValueError(f"a ring needs columns with different names, got {tuple(columns)}")
+        content = {"columns": tuple(columns), "about": about}
+        super().__init__(RingKind.ROWS, 8 * len(columns), 1, slots, content, name)
+
+
+class RowReader(RingReader):
+    """A reading end of a ring of rows.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Names of a row's values.
+    about : mapping or None
+        Where the rows come from, if the writer says.
+    """
+
+    def __init__(self, name: str, place: int | None = None) -> None:
+        super().__init__(name, place, RingKind.ROWS)
+        columns, about = self.content.get("columns"), self.content.get("about")
+        if not isinstance(columns, list) or self._stride != 8 * len(columns) + 8:
+            raise RingError(f"{name!r} is a damaged telemetry ring: {columns} are its columns")
+        self.columns: tuple[str, ...] = tuple(map(str, columns))
+        self.about: Mapping[str, Any] | None = about if isinstance(about, dict) else None
+
+    def read_rows(self) -> FloatArray:
+        """Return the rows written since the last call, shape (n, width), n may be zero."""
+        values: FloatArray = np.frombuffer(b"".join(self.read()))
+        return values.reshape(-1, len(self.columns))
