@@ -1,6 +1,6 @@
 """Command line ``firmware-sim``: the ship's side alone."""
 
-from utank_hil.commands.interruptible import quietly_interruptible
+from utank_hil.console.interruptible import quietly_interruptible
 
 with quietly_interruptible():
     from dataclasses import asdict
@@ -9,8 +9,8 @@ with quietly_interruptible():
 
     import typer
 
-    import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.commands.failures import failures_named
+    import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
+    from utank_hil.console.failures import failures_named
 
     with failures_named():
         from firmware_sim.external_nodes import ExternalDrive
@@ -26,7 +26,7 @@ with quietly_interruptible():
         )
         from utank_hil.base.arrays import FloatArray
         from utank_hil.canbus import SocketCanPort
-        from utank_hil.commands.common import (
+        from utank_hil.console.common import (
             Duration,
             Json,
             Version,
@@ -35,9 +35,9 @@ with quietly_interruptible():
             new_app,
             print_json,
         )
-        from utank_hil.commands.exit_codes import ExitCode
-        from utank_hil.commands.terminal import Terminal, notes
-        from utank_hil.commands.timing import timing_table
+        from utank_hil.console.exit_codes import ExitCode
+        from utank_hil.console.terminal import Terminal, notes
+        from utank_hil.console.timing import timing_table
         from utank_hil.runners import (
             LoopStatistics,
             Node,

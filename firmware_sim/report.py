@@ -17,13 +17,14 @@ from firmware_sim.run import COLUMNS, Run
 from firmware_sim.scenario import PASSIVE
 from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.motion.statistics import RollStatistics
+from utank_hil.base.finite import finite
 from utank_hil.base.whole_file import write_whole
-from utank_hil.commands.common import finite, why
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.failures import KILLED
-from utank_hil.commands.report import PAGE, write_page
+from utank_hil.console.common import why
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.failures import KILLED
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
+from utank_hil.report.page import PAGE, write_page
 from utank_hil.telemetry.recording import write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"

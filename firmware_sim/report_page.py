@@ -11,16 +11,16 @@ import numpy as np
 from firmware_sim.report_tables import tables
 from firmware_sim.scenario import PASSIVE
 from utank_hil.base.arrays import FloatArray
-from utank_hil.commands.report_parts import (
+from utank_hil.configuration import Vessel
+from utank_hil.console.ship_report import power_words, ship_line
+from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
+from utank_hil.report.parts import (
     Report,
     ReportKind,
     about_section,
     printed,
     roll_figure,
 )
-from utank_hil.commands.ship_report import power_words, ship_line
-from utank_hil.configuration import Vessel
-from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
 from utank_hil.telemetry.recording import read_recording
 
 Recorded = Mapping[str, Mapping[str, FloatArray]]

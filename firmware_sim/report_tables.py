@@ -8,7 +8,7 @@ from rich.table import Table as RichTable
 
 from firmware_sim.retuning_figures import SETTLING_S
 from firmware_sim.scenario import PASSIVE
-from utank_hil.commands.terminal import new_table
+from utank_hil.console.terminal import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
 NO_TANK: Final = "no tank"

@@ -16,7 +16,7 @@ os.environ.setdefault("UTANK_HIL_COMPILED", "0")
 import pytest
 from hypothesis import settings
 
-import utank_hil.commands.single_thread  # noqa: F401, as the commands do, before numpy loads
+import utank_hil.console.single_thread  # noqa: F401, as the commands do, before numpy loads
 from utank_hil.pictures import style
 from utank_hil.runners import process_priority
 

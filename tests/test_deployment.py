@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from utank_hil.base.tick import TICK_NS
 from utank_hil.cli import app
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ControllerConfig
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.runners.process_priority import PRIORITY
 
 DEPLOY = Path("deploy").resolve()

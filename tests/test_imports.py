@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.failures import EXTRA_OF
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.failures import EXTRA_OF
 from utank_hil.telemetry.frame_log import FrameLog
 
 pytestmark = pytest.mark.slow
@@ -29,7 +29,7 @@ COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.pane
 LOOP = f"""{SHORT_SEARCH}
 from pathlib import Path
 from utank_hil.canbus import SocketCanPort
-from utank_hil.commands.common import load
+from utank_hil.console.common import load
 from utank_hil.commands.recording import RunRecording
 from utank_hil.commands.run import run
 from utank_hil.configuration import ControllerConfig
@@ -78,7 +78,7 @@ def test_controllers_process_loads_nothing_heavy(source: str) -> None:
 def test_margins_are_judged_without_anything_heavy_because_run_does_it_first() -> None:
     source = """
 from pathlib import Path
-from utank_hil.commands.gate import admit
+from utank_hil.console.admission import admit
 from utank_hil.configuration import ControllerConfig, load_config
 path = Path("configs/controllers/gpc.yaml")
 assert admit(load_config(path, ControllerConfig), path).linear is not None

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from rich.table import Table
 
-from utank_hil.commands.common import print_json
-from utank_hil.commands.terminal import Terminal
+from utank_hil.console.common import print_json
+from utank_hil.console.terminal import Terminal
 
 WIDTH: Final = 160  # of what goes to a file
 LISTED: Final = 12  # a cell with more values than these says how many there are

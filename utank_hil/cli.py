@@ -4,7 +4,7 @@ A command's module is imported when the command is named, so ``run`` starts with
 package beside this one adds commands of its own.
 """
 
-from utank_hil.commands.interruptible import end_as_by_ctrl_c, quietly_interruptible
+from utank_hil.console.interruptible import end_as_by_ctrl_c, quietly_interruptible
 
 with quietly_interruptible():
     from functools import cache
@@ -14,9 +14,9 @@ with quietly_interruptible():
     import typer
     from typer.core import TyperGroup
 
-    import utank_hil.commands.single_thread  # noqa: F401, first: it must run before numpy loads
-    from utank_hil.commands.common import Version, new_app
-    from utank_hil.commands.failures import failures_named
+    import utank_hil.console.single_thread  # noqa: F401, first: it must run before numpy loads
+    from utank_hil.console.common import Version, new_app
+    from utank_hil.console.failures import failures_named
 
 GROUP = "utank_hil.commands"
 

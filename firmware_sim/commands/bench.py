@@ -8,22 +8,13 @@ import typer
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from utank_hil.base.provenance import describe
-from utank_hil.commands.common import (
-    CONFIGS,
-    OUT,
-    Duration,
-    Json,
-    View,
-    fail,
-    load,
-    prepare_out,
-    print_json,
-)
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.gate import admit
 from utank_hil.commands.monitor import watch
-from utank_hil.commands.terminal import Terminal, notes, shown
-from utank_hil.commands.timing import timing_table
+from utank_hil.configuration.shipped import CONFIGS
+from utank_hil.console.admission import admit
+from utank_hil.console.common import OUT, Duration, Json, View, fail, load, prepare_out, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.timing import timing_table
 
 if TYPE_CHECKING:
     from firmware_sim.bench import BenchOptions

@@ -7,10 +7,10 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from utank_hil.base.provenance import describe
-from utank_hil.commands.common import OUT, Json, fail, fail_with, prepare_out, print_json
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration import ConfigError
+from utank_hil.console.common import OUT, Json, fail, fail_with, prepare_out, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, shown
 
 if TYPE_CHECKING:
     from firmware_sim.campaign.study import LoadedStudy

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 from rich.table import Table
 
-from utank_hil.commands.common import Json, fail, print_json
-from utank_hil.commands.terminal import Terminal, new_table, shown
+from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.terminal import Terminal, new_table, shown
 
 if TYPE_CHECKING:
     from firmware_sim.comparison.difference import Comparison, Difference

@@ -2,7 +2,7 @@
 
 from firmware_sim.commands.design_controller import controller
 from firmware_sim.commands.design_tank import tank
-from utank_hil.commands.common import new_app
+from utank_hil.console.common import new_app
 
 design = new_app("Design a law or a tank: what it could be, and what it would cost.")
 design.command()(controller)

@@ -16,9 +16,9 @@ from firmware_sim.pooled_waves import pooled_wave_moment
 from firmware_sim.scenario import Scenario
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
-from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
-from utank_hil.commands.terminal import Terminal, new_table, notes
 from utank_hil.configuration import ControllerConfig
+from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.terminal import Terminal, new_table, notes
 
 if TYPE_CHECKING:
     from utank_hil.analysis.loop.trade import Trade, TradePoint

@@ -12,9 +12,9 @@ from rich.table import Table
 from firmware_sim.commands.shipped_scenarios import shipped_scenario
 from utank_hil.base.provenance import describe
 from utank_hil.base.whole_file import write_whole
-from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
-from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
+from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.tank import Tank
 
 if TYPE_CHECKING:

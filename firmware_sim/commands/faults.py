@@ -12,10 +12,11 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from utank_hil.base.provenance import describe
-from utank_hil.commands.common import CONFIGS, Json, fail, load, prepare_out, why
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.failures import KILLED
-from utank_hil.commands.terminal import Terminal, notes, shown
+from utank_hil.configuration.shipped import CONFIGS
+from utank_hil.console.common import Json, fail, load, prepare_out, why
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.failures import KILLED
+from utank_hil.console.terminal import Terminal, notes, shown
 
 if TYPE_CHECKING:
     from firmware_sim.fault_campaign.campaign import Campaign, LiveRow

@@ -12,9 +12,9 @@ from firmware_sim.tank_report import cost_rows, power, prediction_json, roll_row
 from utank_hil.analysis.tank_sizing import tank_cost
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.whole_file import write_whole
-from utank_hil.commands.common import Json, fail, prepare_out, print_json
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.terminal import Terminal, new_table, notes, shown
+from utank_hil.console.common import Json, fail, prepare_out, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, new_table, notes, shown
 
 if TYPE_CHECKING:
     from firmware_sim.starter import StarterProject

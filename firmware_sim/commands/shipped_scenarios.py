@@ -5,8 +5,8 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from firmware_sim.commands.bench import STORM
-from utank_hil.commands.common import load
 from utank_hil.configuration import Vessel
+from utank_hil.console.common import load
 
 
 class _VesselOfScenario(BaseModel):

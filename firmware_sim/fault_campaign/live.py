@@ -30,7 +30,7 @@ from utank_hil.canbus import (
     SocketCanPort,
     load_catalogue,
 )
-from utank_hil.commands.common import CONFIGS
+from utank_hil.configuration.shipped import CONFIGS
 
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
 CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"

@@ -20,9 +20,10 @@ from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table
 from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
-from utank_hil.commands.common import new_app
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.report import write_page
+from utank_hil.console.common import new_app
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.report.page import write_page
 
 pytestmark = pytest.mark.slow
 
@@ -219,7 +220,7 @@ def test_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch):
 
 
 def test_without_dask_the_remedy_is_named(monkeypatch, capsys):
-    from utank_hil.commands.failures import failures_named
+    from utank_hil.console.failures import failures_named
 
     with pytest.raises(SystemExit), failures_named():
         raise ModuleNotFoundError("No module named 'distributed'", name="distributed")

@@ -23,9 +23,9 @@ from utank_hil.commands.commissioning_record import (
     why_not_replaceable,
     write_record,
 )
-from utank_hil.commands.common import new_app
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import ControllerConfig, load_config
+from utank_hil.console.common import new_app
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.commissioning.checks import Check
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep

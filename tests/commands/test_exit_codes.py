@@ -18,7 +18,7 @@ from utank_hil.commands import commission as commissioning
 from utank_hil.commands import lines
 from utank_hil.commands import panel as operating
 from utank_hil.commands import run as module
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 GPC = Path("configs/controllers/gpc.yaml")
 

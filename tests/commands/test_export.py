@@ -18,10 +18,10 @@ from utank_hil.assembly import build_controller_node, build_law
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus import Frame
 from utank_hil.canbus.catalogue import DBC_PATH
-from utank_hil.commands.common import new_app
 from utank_hil.commands.export import export
 from utank_hil.commands.identify import identify_log
 from utank_hil.commands.replay import replay
+from utank_hil.console.common import new_app
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import Kind

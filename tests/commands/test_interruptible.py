@@ -6,11 +6,11 @@ import sys
 
 import pytest
 
-from utank_hil.commands.interruptible import quietly_interruptible
+from utank_hil.console.interruptible import quietly_interruptible
 
 LOADING = """
 import time
-from utank_hil.commands.interruptible import quietly_interruptible
+from utank_hil.console.interruptible import quietly_interruptible
 with quietly_interruptible():
     print("loading", flush=True)
     time.sleep(60)
@@ -36,7 +36,7 @@ def test_interrupt_ends_it_at_once_and_without_a_traceback() -> None:
 TERMINATED = (
     LOADING.replace(
         "with quietly_interruptible():\n",
-        "from utank_hil.commands.interruptible import end_as_by_ctrl_c\nend_as_by_ctrl_c()\ntry:\n",
+        "from utank_hil.console.interruptible import end_as_by_ctrl_c\nend_as_by_ctrl_c()\ntry:\n",
     )
     + """
 except KeyboardInterrupt:

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from utank_hil.cli import app
 from utank_hil.commands import run
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry import live, viewer
 from utank_hil.telemetry.recording import write_recording

@@ -10,9 +10,9 @@ from ports import QuietBus
 from typer.testing import CliRunner
 
 from utank_hil.cli import app
-from utank_hil.commands import gate
 from utank_hil.commands import run as module
-from utank_hil.commands.terminal import Terminal
+from utank_hil.console import admission
+from utank_hil.console.terminal import Terminal
 
 CONFIGS = Path("configs").resolve()
 LAW, SHIP, SEA, RUN = "law [/red]", "ship [/b]", "sea [/i]", "gpc [bold]"
@@ -47,7 +47,7 @@ def test_a_terminal_shows_that_a_law_is_being_designed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown = io.StringIO()
-    monkeypatch.setattr(gate, "notes", Terminal(file=shown, force_terminal=True, _environ={}))
+    monkeypatch.setattr(admission, "notes", Terminal(file=shown, force_terminal=True, _environ={}))
     told("check", controller(tmp_path))
     assert f"{LAW}: designing its law" in shown.getvalue()
 

@@ -12,10 +12,10 @@ from typer.testing import CliRunner, Result
 
 from utank_hil.canbus import Mode, PumpCommand, load_catalogue
 from utank_hil.commands import run as run_module
-from utank_hil.commands.common import new_app
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.replay import replay
 from utank_hil.commands.run import run
+from utank_hil.console.common import new_app
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry import law_values
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog, FrameLogWriter

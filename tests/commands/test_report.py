@@ -19,10 +19,10 @@ from utank_hil.base.provenance import describe
 from utank_hil.canbus.enumerations import Fault, Mode
 from utank_hil.cli import app
 from utank_hil.commands import run as run_module
-from utank_hil.commands.report import write_page
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
+from utank_hil.report.page import write_page
 from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow

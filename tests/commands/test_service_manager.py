@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from utank_hil.cli import app
 from utank_hil.commands import run as module
 from utank_hil.commands import service_manager
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.lines import Lines
 from utank_hil.commands.service_manager import ServiceManager
+from utank_hil.console.exit_codes import ExitCode
 
 GPC = Path("configs/controllers/gpc.yaml")
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from utank_hil.commands import stamps
-from utank_hil.commands.stamps import claimed_files
+from utank_hil.base import stamps
+from utank_hil.base.stamps import claimed_files
 
 
 def test_files_share_the_time_and_are_made(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from utank_hil.commands.terminal import Terminal, new_table, shown
+from utank_hil.console.terminal import Terminal, new_table, shown
 
 CELLS = {"passive": ("2.08", "4.04"), "gpc": ("1.54", "")}
 

@@ -15,8 +15,8 @@ from firmware_sim.cli import app as ship_app
 from utank_hil.canbus import Fault, Frame, Quality, load_catalogue
 from utank_hil.canbus.messages import DBC_NAMES
 from utank_hil.cli import app
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import Vessel, load_config
+from utank_hil.console.exit_codes import ExitCode
 
 PAGE = Path("docs/how-to/hardware.md")
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -28,9 +28,9 @@ from firmware_sim.fault_campaign.verdict import Result, judged
 from firmware_sim.fault_campaign.watch import BusLog, Watch, first_difference
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.failures import KILLED
 from utank_hil.configuration import ConfigError, load_config
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.failures import KILLED
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import FAULTS

@@ -28,8 +28,8 @@ from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from utank_hil.base.provenance import describe
 from utank_hil.canbus import Mode
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.control import PassiveDesign
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures import BenchCurve

@@ -15,10 +15,10 @@ from firmware_sim.commands.init import init
 from firmware_sim.report import figures
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.tank_sizing import usable_level_m
-from utank_hil.commands.common import new_app
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.gate import judge
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
+from utank_hil.console.common import new_app
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.gate import judge
 
 # the whole search is in the page on a ship of one's own, whose commands `test_how_to` runs
 pytestmark = pytest.mark.usefixtures("short_search")
@@ -66,7 +66,7 @@ def test_project_is_valid_and_its_law_is_let_on_the_bus(
         assert period_s == pytest.approx(ship["roll-period"])
     assert vessel.ship.displacement_n == pytest.approx(9806.65 * ship["displacement"])
     controller = load_config(folder / "controller.yaml", ControllerConfig)
-    judged = judge(controller, folder / "controller.yaml")
+    judged = judge(controller)
     assert judged.accepted
     # the slow ship's water would be too fast in the duct before it is at the roof
     most_m = usable_level_m(vessel.ship, vessel.tank)

@@ -21,8 +21,8 @@ from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
 from firmware_sim.verdicts import mark_of
 from utank_hil.canbus import Fault, Mode
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.safety.faults import fault_text
 from utank_hil.sea import Spectrum

@@ -19,7 +19,7 @@ from two_processes import (
 )
 
 from utank_hil.canbus import Fault, Mode
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
 

@@ -8,7 +8,7 @@ from busy_machine import first_that_can_be_judged
 from two_processes import Watcher, patient_controller, run_controller, run_ship, watched
 
 from utank_hil.canbus import DriveState, Fault, Mode
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.timeout(900)]
 

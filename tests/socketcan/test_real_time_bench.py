@@ -15,8 +15,8 @@ from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.motion.bare_ship import roll_without_tank
 from utank_hil.canbus import Mode
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.configuration import load_config
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.recording import read_recording

@@ -20,7 +20,7 @@ from two_processes import (
     watched,
 )
 
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.bus_logs import write_bus_log
 from utank_hil.telemetry.bus_records import Kind
 from utank_hil.telemetry.frame_log import FrameLog

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from two_processes import BIN, START_S
 
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 pytestmark = [pytest.mark.socketcan, pytest.mark.evidence, pytest.mark.timeout(900)]
 

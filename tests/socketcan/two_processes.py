@@ -26,7 +26,7 @@ from utank_hil.canbus import (
     SocketCanPort,
     load_catalogue,
 )
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 CHANNEL = "vcan0"
 LOG_BUFFER_BYTES = 8 << 20

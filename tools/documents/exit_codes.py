@@ -1,7 +1,7 @@
-"""The table of docs/exit-codes.md, made from utank_hil/commands/exit_codes.py."""
+"""The table of docs/exit-codes.md, made from utank_hil/console/exit_codes.py."""
 
 from tools.documents.marked import DOCS, written_anew
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 PAGE = DOCS / "exit-codes.md"
 

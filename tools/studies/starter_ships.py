@@ -19,8 +19,8 @@ from firmware_sim.starter import FILES, SCENARIO, make_starter
 from firmware_sim.starter_ship import StarterShip
 from tools.printing import command_line, show
 from utank_hil.analysis.tank_sizing import TankImpossibleError, TankRoom, tank_cost
-from utank_hil.commands.gate import admit
 from utank_hil.configuration import load_config
+from utank_hil.console.admission import admit
 
 PATROL: Final = StarterShip("patrol vessel", 63, 9.5, 1900, 0.9, 9.5)
 CONTAINER: Final = StarterShip("container ship, GM 1.2 m", 200, 32.2, 42000, 1.2, None, 11.5)

@@ -12,8 +12,8 @@ from rich.table import Table
 from tools.thesis.figure import Figure, Verdict, as_json, greatest
 from tools.thesis.registry import ENTRIES, Entry, UnknownFigureError, chosen
 from utank_hil.base.whole_file import write_whole
-from utank_hil.commands.common import OUT, Json, fail, new_app, prepare_out, print_json
-from utank_hil.commands.terminal import Terminal, new_table, notes
+from utank_hil.console.common import OUT, Json, fail, new_app, prepare_out, print_json
+from utank_hil.console.terminal import Terminal, new_table, notes
 
 PAGE: Final = "gallery.html"
 NUMBERS: Final = "figures.json"

@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 from pydantic import BaseModel
 
-from utank_hil.commands.common import Json, fail, load, print_json, warnings_of
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.gate import judge
-from utank_hil.commands.terminal import Terminal, shown
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
+from utank_hil.console.admission import judge_law
+from utank_hil.console.common import Json, fail, load, print_json, warnings_of
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, shown
 
 GROUP = "utank_hil.collections"
 """Entry points of further kinds of file: models with a name, a vessel, a mapping `controllers`, and
@@ -32,7 +32,7 @@ def check(
     **Example:** utank-hil check configs/controllers/gpc.yaml
     """
     from utank_hil.commands import check_report as report
-    from utank_hil.commands.ship_report import print_ship, ship_json
+    from utank_hil.console.ship_report import print_ship, ship_json
 
     loaded: BaseModel
     collections = {point.name: point.load() for point in entry_points(group=GROUP)}
@@ -48,7 +48,7 @@ def check(
     elif kind in collections:
         collection = load(config, collections[kind])
         judged = {
-            name: judge(each, config, f"controllers.{name}")
+            name: judge_law(each, config, f"controllers.{name}")
             for name, each in collection.controllers.items()
         }
         loaded, content = collection, report.collection_json(collection, judged)
@@ -56,7 +56,7 @@ def check(
             report.print_collection(kind, collection, judged)
     else:
         loaded = load(config, ControllerConfig)
-        controller = judge(loaded, config)
+        controller = judge_law(loaded, config)
         content = report.controller_json(controller)
         if not json_:
             report.print_controller(controller)

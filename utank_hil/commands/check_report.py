@@ -8,13 +8,13 @@ from rich.text import Text
 
 from utank_hil.analysis.loop.margins import DELAY_SAMPLES, Margins
 from utank_hil.analysis.loop.robustness import Robustness
-from utank_hil.commands.common import finite
-from utank_hil.commands.gate import JudgedLaw
+from utank_hil.base.finite import finite
 from utank_hil.commands.remedy import remedy
-from utank_hil.commands.ship_report import ship_figures, ship_line
-from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
+from utank_hil.console.ship_report import ship_figures, ship_line
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.control import BuiltLaw
+from utank_hil.gate import JudgedLaw
 
 MARGINS = "Margins, delay and pump lag included"
 NO_LOOP = "The law closes no loop that quiets the roll: it has no margins."

@@ -19,11 +19,11 @@ from utank_hil.commands.commissioning_record import (
     why_not_replaceable,
     write_record,
 )
-from utank_hil.commands.common import Json, fail, load, print_json, why_not_writable
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.lines import Lines, printed_lines
-from utank_hil.commands.terminal import Terminal, notes, shown
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.console.common import Json, fail, load, print_json, why_not_writable
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.nodes.commissioning.node import CommissioningNode, Stage
 from utank_hil.runners import LoopStatistics, RealTimeLoop, real_time_scheduling, stop_on_signals
 from utank_hil.safety.faults import fault_text

@@ -11,9 +11,9 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel
 
+from utank_hil.base.finite import finite
 from utank_hil.base.provenance import PROGRAM, commit, version
 from utank_hil.canbus import load_catalogue
-from utank_hil.commands.common import finite
 from utank_hil.configuration import ControllerConfig
 from utank_hil.nodes.commissioning.checks import Check
 

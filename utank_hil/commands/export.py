@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from utank_hil.commands.common import Json, fail, print_json
-from utank_hil.commands.terminal import notes, say_cut, shown
+from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.terminal import notes, say_cut, shown
 from utank_hil.telemetry.bus_logs import BUS_SUFFIXES, read_bus_log, write_bus_log
 from utank_hil.telemetry.frame_log import SUFFIX, FrameLog
 from utank_hil.telemetry.replay import Entry, entries_of

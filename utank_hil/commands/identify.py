@@ -8,8 +8,6 @@ import typer
 
 from utank_hil.assembly import retuning_task
 from utank_hil.base.provenance import describe
-from utank_hil.commands.common import OUT, Json, fail, load, prepare_out, print_json
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.identified import (
     CONTROLLER,
     VESSEL,
@@ -17,8 +15,10 @@ from utank_hil.commands.identified import (
     write_identified,
 )
 from utank_hil.commands.identify_report import figures, print_report
-from utank_hil.commands.terminal import Terminal, notes, say_cut
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.console.common import OUT, Json, fail, load, prepare_out, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, say_cut
 from utank_hil.identification import IdentificationError
 from utank_hil.identification.logged_samples import logged_samples
 from utank_hil.retuning import Candidate

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from rich.table import Table
 
-from utank_hil.commands.common import finite
-from utank_hil.commands.terminal import Terminal, new_table
+from utank_hil.base.finite import finite
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank

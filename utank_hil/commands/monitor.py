@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from utank_hil.commands.common import fail
-from utank_hil.commands.terminal import notes
+from utank_hil.console.common import fail
+from utank_hil.console.terminal import notes
 
 if TYPE_CHECKING:
     from utank_hil.telemetry.live import LiveRun

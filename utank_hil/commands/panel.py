@@ -11,11 +11,11 @@ import typer
 
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import SocketCanPort, Station, load_catalogue
-from utank_hil.commands.common import Duration, fail, load
-from utank_hil.commands.exit_codes import ExitCode
 from utank_hil.commands.keyboard import HELP, Keyboard
 from utank_hil.commands.lines import printed_lines
 from utank_hil.configuration.vessel import Vessel
+from utank_hil.console.common import Duration, fail, load
+from utank_hil.console.exit_codes import ExitCode
 from utank_hil.nodes.panel import OperatorPanel
 from utank_hil.runners import RealTimeLoop, stop_on_signals
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.commands.common import why_not_writable
-from utank_hil.commands.stamps import claimed_files
+from utank_hil.base.stamps import claimed_files
+from utank_hil.console.common import why_not_writable
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import frame_ring
 from utank_hil.telemetry.frame_log import SUFFIX

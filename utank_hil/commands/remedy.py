@@ -13,11 +13,11 @@ from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.analysis.loop.scaled_law import NoLawError
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.analysis.loop.trade import Design, scaled, varied
-from utank_hil.commands.gate import MOST_STEP_S, JudgedLaw
 from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.design_plant import DesignPlant
 from utank_hil.control.lqg_design import LQGDesign
 from utank_hil.dynamics.linear import state_matrices
+from utank_hil.gate import MOST_STEP_S, JudgedLaw
 
 GENTLER: Final = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)
 """Factors on a weight on outputs or states."""

@@ -13,10 +13,10 @@ import typer
 
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
-from utank_hil.commands.common import Json, fail, load
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.terminal import Terminal
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.console.common import Json, fail, load
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal
 from utank_hil.telemetry.bus_logs import (
     BUS_SUFFIXES,
     begins_with_the_controller,

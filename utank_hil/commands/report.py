@@ -1,22 +1,12 @@
 """``utank-hil report``: a run as one page that can be sent."""
 
-import tempfile
-from collections.abc import Callable
-from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
-from utank_hil.commands.common import Json, fail, print_json
-from utank_hil.commands.terminal import notes, shown
-
-if TYPE_CHECKING:
-    from utank_hil.commands.report_parts import Report, ReportKind
-
-GROUP: Final = "utank_hil.reports"
-"""Entry points of kinds of runs that leave a folder (`ReportKind`)."""
-PAGE: Final = "report.html"
+from utank_hil.console.common import Json, fail, print_json
+from utank_hil.console.terminal import notes, shown
 
 
 def report(
@@ -35,6 +25,8 @@ def report(
 
     **Example:** utank-hil report out
     """
+    from utank_hil.report.page import PAGE, write_page
+
     page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
     try:
         written = write_page(runs, page)
@@ -45,48 +37,3 @@ def report(
         print_json(result)
     else:
         notes.say(f"report: {shown(written)}")
-
-
-def write_page(runs: list[Path], page: Path) -> Path:
-    """Write the page of these runs.
-
-    Raises
-    ------
-    OSError, ValueError
-        If a run can't be read or the page can't be written; says which.
-    """
-    from utank_hil.pictures.report_page import write_report_page
-
-    reports = [_report(run) for run in runs]
-    title, below = reports[0].title, reports[0].below
-    if len(reports) > 1:
-        title = ", ".join(each.title for each in reports)
-        below = " ".join(f"{each.title}: {each.below}" for each in reports)
-    verdicts = [each.verdict for each in reports]
-    sections = [section for each in reports for section in each.sections]
-    return write_report_page(page, title, below, verdicts, sections)
-
-
-def _report(run: Path) -> "Report":
-    from utank_hil.commands.report_recording import recording_report
-
-    if not run.exists():
-        raise ValueError(f"{run}: is not there")
-    file = run
-    make: Callable[[Path, Path], Report] = recording_report
-    if not run.is_file():
-        kinds: list[ReportKind] = [point.load() for point in entry_points(group=GROUP)]
-        kind = next((kind for kind in kinds if (run / kind.file).exists()), None)
-        if kind is None:
-            files = " and no ".join(kind.file for kind in kinds)
-            raise ValueError(
-                f"{run}: holds no {files}: give the folder of a bench or of a campaign, or the "
-                ".rrd file of a run"
-            )
-        file, make = run / kind.file, kind.report
-    try:
-        with tempfile.TemporaryDirectory() as scratch:
-            return make(run, Path(scratch))
-    except KeyError as error:
-        reason = f"has no {error}: it is of another version, make it again"
-        raise ValueError(f"{file}: {reason}") from error

@@ -14,22 +14,22 @@ import typer
 
 from utank_hil.assembly import build_controller_node, retuner_process, works_of
 from utank_hil.base.provenance import describe
+from utank_hil.base.stamps import claimed_files
 from utank_hil.canbus import Fault, Mode, PortError, SocketCanPort
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.commands import event_log
 from utank_hil.commands.announcer import Announcer
 from utank_hil.commands.commissioning_record import why_not_commissioned
-from utank_hil.commands.common import Duration, Json, View, fail, load, print_json
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.gate import admit
 from utank_hil.commands.identified import IdentifiedShips, read_controller
 from utank_hil.commands.lines import printed_lines
 from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
-from utank_hil.commands.stamps import claimed_files
-from utank_hil.commands.terminal import Terminal, notes, shown
-from utank_hil.commands.timing import timing_table
 from utank_hil.configuration.controller import ControllerConfig
+from utank_hil.console.admission import admit
+from utank_hil.console.common import Duration, Json, View, fail, load, print_json
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import Terminal, notes, shown
+from utank_hil.console.timing import timing_table
 from utank_hil.control import BuiltLaw
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.signals import ROW_TICKS

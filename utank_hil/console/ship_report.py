@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from utank_hil.analysis.tank_design import tank_figures
-from utank_hil.commands.terminal import Terminal, new_table
 from utank_hil.configuration import Vessel
 from utank_hil.configuration.plausibility import free_surface_nm_rad, holding
+from utank_hil.console.terminal import Terminal, new_table
 from utank_hil.dynamics.linear import state_matrices
 from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.steady_heel import steady_heel, upright

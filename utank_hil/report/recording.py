@@ -11,7 +11,6 @@ import numpy.typing as npt
 from utank_hil.analysis.motion.statistics import roll_statistics
 from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode
-from utank_hil.commands.report_parts import Report, about_section, roll_figure
 from utank_hil.pictures import BenchCurve, draw_bench
 from utank_hil.pictures.report_page import (
     ReportPicture,
@@ -19,6 +18,7 @@ from utank_hil.pictures.report_page import (
     ReportTable,
     Verdict,
 )
+from utank_hil.report.parts import Report, about_section, roll_figure
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of

@@ -1,21 +1,17 @@
-"""The gate before the bus: a law is designed, its margins are judged, it is let in or refused."""
+"""The gate before the bus: a law is designed, and its margins and its step's time are judged."""
 
 import math
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from utank_hil.analysis.loop.robustness import Robustness, robustness
 from utank_hil.assembly import build_law
-from utank_hil.base.parameters import ParameterError
+from utank_hil.base.parameters import ParameterError, refuse
 from utank_hil.base.tick import TICK_S
-from utank_hil.commands.common import fail, fail_with
-from utank_hil.commands.terminal import notes
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.files import located
 from utank_hil.control import BuiltLaw
 
 MOST_STEP_S: Final = TICK_S / 2
@@ -61,26 +57,22 @@ class JudgedLaw:
         return self.config.accept_low_margins or not self.failures
 
 
-def judge(
-    config: ControllerConfig, path: Path, key: str = "", *, with_delay_margin: bool = True
-) -> JudgedLaw:
-    """Design the law of a configuration and judge its loop, or end the command with exit code 2.
+def judge(config: ControllerConfig, *, with_delay_margin: bool = True) -> JudgedLaw:
+    """Design the law of a configuration and judge its loop.
 
     Parameters
     ----------
     config : ControllerConfig
-    path : Path
-        The file it was read from, to name the place of what is wrong.
-    key : str
-        Where in that file it stands; empty for the file as a whole.
     with_delay_margin : bool
         As in `margins`.
+
+    Raises
+    ------
+    ParameterError
+        If the law can't be designed or its margins can't be computed; the problems are named by
+        their keys in the configuration.
     """
-    try:
-        with notes.busy(f"{config.name}: designing its law"):  # takes seconds at times
-            law = build_law(config)
-    except ParameterError as error:
-        fail_with(located(error, path, key))
+    law = build_law(config)
     step_s = _step_time_s(law)
     if law.linear is None:
         return JudgedLaw(config, law, None, step_s)
@@ -89,10 +81,10 @@ def judge(
             law.linear, config.plant, law.linear_measured, with_delay_margin=with_delay_margin
         )
     except (ValueError, ArithmeticError) as error:
-        fail(f"{config.name}: law: its margins can't be computed: {error}")
+        raise ParameterError("", [("law", f"its margins can't be computed: {error}")]) from error
     figures = (found.nominal.radius, found.nominal.peak_sensitivity, found.worst_radius)
     if not all(map(math.isfinite, figures)):
-        fail(f"{config.name}: law: its margins can't be computed: they are not finite numbers")
+        refuse("", [("law", "its margins can't be computed: they are not finite numbers")])
     return JudgedLaw(config, law, found, step_s)
 
 
@@ -108,18 +100,3 @@ def _step_time_s(law: BuiltLaw) -> float:
             break
         times.append(time.perf_counter() - begin_s)
     return min(times, default=0.0)
-
-
-def admit(config: ControllerConfig, path: Path, key: str = "") -> BuiltLaw:
-    """The law of a configuration, judged; a refused one ends the command with exit code 2."""
-    judged = judge(config, path, key, with_delay_margin=False)
-    for failure in judged.failures:
-        notes.say(failure, yellow=f"{config.name}, margins:")
-    if not judged.accepted:
-        if judged.step_s > MOST_STEP_S:
-            fail(f"{config.name}: the law's step is too slow for the loop: make it faster")
-        fail(
-            f"{config.name}: the law misses its margins; redesign it (utank-hil check may name a "
-            "weight that passes), or set accept_low_margins: true"
-        )
-    return judged.law

@@ -2,7 +2,7 @@
 
 from rich.table import Table
 
-from utank_hil.commands.terminal import new_table
+from utank_hil.console.terminal import new_table
 from utank_hil.runners import LoopStatistics
 
 

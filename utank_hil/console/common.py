@@ -1,7 +1,6 @@
-"""What the commands share: loading, failing, telling."""
+"""What the commands share: their options, reading of files, errors."""
 
 import json
-import math
 import os
 import sys
 import tempfile
@@ -13,10 +12,9 @@ import typer
 from pydantic import BaseModel
 from typer.core import TyperGroup
 
+from utank_hil.base.finite import finite
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.provenance import headline
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.terminal import notes
 from utank_hil.configuration.files import (
     ConfigError,
     ConfigProblem,
@@ -24,14 +22,11 @@ from utank_hil.configuration.files import (
     load_config,
     located,
 )
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import notes
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-_CHECKOUT: Final = Path(__file__).resolve().parents[2] / "configs"
-CONFIGS: Final = (
-    _CHECKOUT if _CHECKOUT.is_dir() else Path(sys.prefix) / "share" / "utank-hil" / "configs"
-)
-"""The shipped configurations: of the checkout, or installed with the package."""
 OUT: Final = Path("out")
 
 
@@ -56,15 +51,6 @@ Duration = Annotated[
     # a float without a limit may be infinite
     typer.Option("--duration", min=0.1, max=1e9, metavar="SECONDS", help="Length of a run."),
 ]
-
-
-def finite(value: Any) -> Any:
-    """The same for JSON, which has no infinity: a number that is none is null."""
-    if isinstance(value, Mapping):
-        return {str(key): finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_json(content: Mapping[str, Any]) -> None:

@@ -11,7 +11,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from utank_hil.commands.exit_codes import ExitCode
+from utank_hil.console.exit_codes import ExitCode
 
 UNLIMITED: Final = 10_000
 

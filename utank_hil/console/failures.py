@@ -9,9 +9,9 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from typing import Final
 
-from utank_hil.commands.common import why
-from utank_hil.commands.exit_codes import ExitCode
-from utank_hil.commands.terminal import notes
+from utank_hil.console.common import why
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.terminal import notes
 
 EXTRA_OF: Final = {
     "clarabel": "bench",

@@ -1,0 +1,11 @@
+"""Where the shipped configurations are."""
+
+import sys
+from pathlib import Path
+from typing import Final
+
+_CHECKOUT: Final = Path(__file__).resolve().parents[2] / "configs"
+CONFIGS: Final = (
+    _CHECKOUT if _CHECKOUT.is_dir() else Path(sys.prefix) / "share" / "utank-hil" / "configs"
+)
+"""The shipped configurations: of the checkout, or installed with the package."""

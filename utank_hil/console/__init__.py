@@ -1,0 +1,1 @@
+"""What every command line shares: options, terminal, errors and their exit codes."""
