@@ -78,7 +78,7 @@ def firmware_sim(
 
     **Example:** firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
-    loaded = load(scenario, Scenario)
+    loaded = load(scenario, Scenario, allow_code=True)  # its laws are not built
     if loaded.faults:
         fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration

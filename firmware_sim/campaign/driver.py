@@ -185,5 +185,6 @@ def batch_of(loaded: LoadedStudy, cases: Iterable[Case]) -> Batch:
         study.simulation,
         as_text(study.scenario),
         code_digest(),
+        loaded.allow_code,
         tuple((case.name, case.seed, as_text(case.values)) for case in cases),
     )

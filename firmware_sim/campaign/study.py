@@ -17,6 +17,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.base.parameters import ParameterError, Positive, Range, refuse
 from utank_hil.configuration import Section
 from utank_hil.configuration.files import (
+    ALLOW_CODE,
     ConfigError,
     ConfigProblem,
     files_named,
@@ -137,18 +138,27 @@ class LoadedStudy:
     ----------
     keys : tuple of str
         Keys that make groups.
+    allow_code : bool
+        Whether a law of a case may be code that the files name.
     """
 
     path: Path
     study: Study
     cases: list[Case]
     keys: tuple[str, ...]
+    allow_code: bool
+
+    def scenario_of(self, case: Case) -> Scenario:
+        """The scenario of a case."""
+        content = changed(self.study.scenario, case.values)
+        return Scenario.model_validate(content, context={ALLOW_CODE: self.allow_code})
 
 
-def load_study(path: Path) -> LoadedStudy:
+def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
     """Read a study and lay out its cases.
 
     The first case with each set of keys is checked whole; a later one that is wrong fails alone.
+    `allow_code` as in `load_config`.
 
     Raises
     ------
@@ -191,8 +201,8 @@ def load_study(path: Path) -> LoadedStudy:
         kind = (parameters.get(WHOLE), frozenset(values))
         if kind not in checked:
             checked.add(kind)
-            _check(path, study, values, content)
-    return LoadedStudy(path, study, cases, keys)
+            _check(path, study, values, content, allow_code=allow_code)
+    return LoadedStudy(path, study, cases, keys, allow_code)
 
 
 def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[Any, Scalar]]]]:
@@ -221,10 +231,12 @@ def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[
     return [axis for axis in axes if any(axis)]
 
 
-def _check(path: Path, study: Study, values: Content, content: Content) -> None:
+def _check(
+    path: Path, study: Study, values: Content, content: Content, *, allow_code: bool
+) -> None:
     """Refuse a case that is no scenario, at the places where what is wrong was written."""
     try:
-        Scenario.model_validate(content)
+        Scenario.model_validate(content, context={ALLOW_CODE: allow_code})
         return
     except ValidationError as error:
         found = problems_in_words(error, content, Scenario)

@@ -16,7 +16,7 @@ from firmware_sim.scenario import Scenario
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig
-from utank_hil.configuration.files import problems_in_words
+from utank_hil.configuration.files import ALLOW_CODE, problems_in_words
 from utank_hil.control import BuiltLaw
 
 OK: Final = "ok"
@@ -40,6 +40,8 @@ class Batch:
         Content of the study's scenario, as text.
     code : str
         What `code_digest` must be.
+    allow_code : bool
+        Whether a law of a case may be code that the files name.
     cases : tuple of tuple
         Name, seed, and what differs from the scenario, as text.
     """
@@ -47,6 +49,7 @@ class Batch:
     simulation: str
     scenario: str
     code: str
+    allow_code: bool
     cases: tuple[tuple[str, int, str], ...]
 
 
@@ -63,11 +66,7 @@ def run_batch(batch: Batch) -> list[Row]:
             "a worker has other code than the campaign: install the same version of utank-hil, "
             "numpy, scipy and numba there"
         )
-    return [
-        row
-        for name, seed, values in batch.cases
-        for row in _case(batch.simulation, batch.scenario, name, seed, values)
-    ]
+    return [row for name, seed, values in batch.cases for row in _case(batch, name, seed, values)]
 
 
 def failed_row(name: str, status: str, reason: str) -> Row:
@@ -75,17 +74,18 @@ def failed_row(name: str, status: str, reason: str) -> Row:
     return {"case": name, "run": "", "status": status, "reason": reason, "mark": "", "wall_s": 0.0}
 
 
-def _case(simulation: str, base: str, name: str, seed: int, values: str) -> Sequence[Row]:
+def _case(batch: Batch, name: str, seed: int, values: str) -> Sequence[Row]:
     started = time.perf_counter()
     try:
-        content = changed(_content(base), json.loads(values))
+        content = changed(_content(batch.scenario), json.loads(values))
         # the seed is given apart, so that one check serves all
         content = {key: value for key, value in content.items() if key != "seed"}
-        scenario = _scenario(as_text(content))
+        scenario = _scenario(as_text(content), batch.allow_code)
         laws = {
-            each: _law(as_text(content["controllers"][each]), each) for each in scenario.controllers
+            each: _law(as_text(content["controllers"][each]), each, batch.allow_code)
+            for each in scenario.controllers
         }
-        rows = rows_of(simulation, scenario, seed, laws)
+        rows = rows_of(batch.simulation, scenario, seed, laws)
     except MemoryError:
         return [failed_row(name, LOST, "the worker's memory did not suffice")]
     except ValidationError as error:
@@ -109,15 +109,16 @@ def _content(text: str) -> Content:
 
 
 @lru_cache(maxsize=16)
-def _scenario(text: str) -> Scenario:
-    return Scenario.model_validate(json.loads(text))
+def _scenario(text: str, allow_code: bool) -> Scenario:
+    return Scenario.model_validate(json.loads(text), context={ALLOW_CODE: allow_code})
 
 
 @lru_cache(maxsize=64)
-def _law(text: str, name: str) -> BuiltLaw:
+def _law(text: str, name: str, allow_code: bool) -> BuiltLaw:
     """The law of a controller; its controllers are made anew for every run."""
     try:
-        return build_law(ControllerConfig.model_validate(json.loads(text)))
+        content = json.loads(text)
+        return build_law(ControllerConfig.model_validate(content, context={ALLOW_CODE: allow_code}))
     except ParameterError as error:
         problems = [(f"controllers.{name}.{key}", why) for key, why in error.problems]
         raise ParameterError("", problems) from error

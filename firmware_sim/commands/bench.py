@@ -11,7 +11,17 @@ from utank_hil.base.provenance import describe
 from utank_hil.commands.monitor import watch
 from utank_hil.configuration.shipped import CONFIGS
 from utank_hil.console.admission import admit
-from utank_hil.console.common import OUT, Duration, Json, View, fail, load, prepare_out, print_json
+from utank_hil.console.common import (
+    OUT,
+    AllowCode,
+    Duration,
+    Json,
+    View,
+    fail,
+    load,
+    prepare_out,
+    print_json,
+)
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.console.timing import timing_table
@@ -52,6 +62,7 @@ def bench(
     ] = False,
     json_: Json = False,
     view: View = False,
+    allow_code: AllowCode = False,
 ) -> None:
     """Run a scenario: the tank passive, then with each controller, in the same waves.
 
@@ -69,7 +80,7 @@ def bench(
 
     if bus is not None and not real_time:
         fail("--bus is for real time: add --realtime, or leave --bus out")
-    loaded = load(scenario, Scenario)
+    loaded = load(scenario, Scenario, allow_code=allow_code)
     if real_time and loaded.faults:
         fail(f"{scenario}: faults: are for simulated time: leave --realtime out, or the faults")
     for number, fault in enumerate(loaded.faults if frames else ()):

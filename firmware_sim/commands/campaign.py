@@ -8,7 +8,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from utank_hil.base.provenance import describe
 from utank_hil.configuration import ConfigError
-from utank_hil.console.common import OUT, Json, fail, fail_with, prepare_out, print_json
+from utank_hil.console.common import OUT, AllowCode, Json, fail, fail_with, prepare_out, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
 
@@ -35,6 +35,7 @@ def campaign(
         typer.Option(min=1, help="Processes on this machine.", show_default="one a core"),
     ] = None,
     json_: Json = False,
+    allow_code: AllowCode = False,
 ) -> None:
     """Run the cases of a study, keep their figures as Parquet, and compare the laws.
 
@@ -52,7 +53,7 @@ def campaign(
     if scheduler is not None and workers is not None:
         fail("--workers is for this machine: leave it out, or --scheduler")
     try:
-        loaded = load_study(study)
+        loaded = load_study(study, allow_code=allow_code)
     except ConfigError as error:
         fail_with(error)
     folder = OUT / study.stem if out is None else out
@@ -85,10 +86,8 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
     """Where the results come from."""
     from firmware_sim.campaign.case_name import code_digest
     from firmware_sim.campaign.metrics import LEAVES_OUT, METRICS
-    from firmware_sim.campaign.overrides import changed
-    from firmware_sim.scenario import Scenario
 
-    first = Scenario.model_validate(changed(loaded.study.scenario, loaded.cases[0].values))
+    first = loaded.scenario_of(loaded.cases[0])
     return {
         **describe("campaign", loaded.study, folder, options=given, scenario=first),
         "code": code_digest(),

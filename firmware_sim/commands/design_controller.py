@@ -51,7 +51,7 @@ def controller(
     from utank_hil.analysis.loop.trade import Design, trade
     from utank_hil.pictures.trade import draw_trade
 
-    loaded = load(config, ControllerConfig)
+    loaded = load(config, ControllerConfig, allow_code=True)  # code is refused, not run
     law = loaded.law
     if isinstance(law, AutoDesign):
         law = law.tuned(loaded.plant)
@@ -61,7 +61,7 @@ def controller(
     path = scenario or shipped_scenario(vessel)
     if path is None:
         fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
-    sea = load(path, Scenario)
+    sea = load(path, Scenario, allow_code=True)  # its laws are not built
     prepare_out(out, (PICTURE, FIGURES))
     bar = Progress(
         TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal

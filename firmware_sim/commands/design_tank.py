@@ -128,7 +128,7 @@ def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.tank_prediction import SeaState
 
-    scenario = load(path, Scenario)
+    scenario = load(path, Scenario, allow_code=True)  # its laws are not built
     try:
         return scenario, SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     except CalmSeaError as error:

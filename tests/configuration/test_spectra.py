@@ -9,7 +9,7 @@ import yaml
 
 from firmware_sim.scenario_sea import ScenarioSea
 from utank_hil.configuration import ConfigError, ControllerConfig, Section, load_config
-from utank_hil.configuration.laws import ConstrainedFromFile
+from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.sea_model import SeaModel
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -36,7 +36,7 @@ def loaded(folder: Path, sea: dict[str, Any]) -> SeaModel:
     own = folder / "controller.yaml"
     own.write_text(yaml.safe_dump(content))
     law = load_config(own, ControllerConfig).law
-    assert isinstance(law, ConstrainedFromFile)
+    assert isinstance(law, ConstrainedDesign)
     return law.sea
 
 
@@ -57,7 +57,7 @@ def test_the_hour_by_file_and_time_is_the_hour_that_the_shipped_law_writes_out(
     tmp_path: Path,
 ) -> None:
     shipped = load_config(CONFIGS / "controllers" / "constrained_gpc.yaml", ControllerConfig).law
-    assert isinstance(shipped, ConstrainedFromFile)
+    assert isinstance(shipped, ConstrainedDesign)
     assert loaded(tmp_path, MEASURED) == shipped.sea
 
 

@@ -67,7 +67,7 @@ def until_it_ends(
     with (
         watched() as watcher,
         run_ship(folder, STORM),
-        run_controller(folder, config) as controller,
+        run_controller(folder, config, "--allow-code") as controller,
     ):
         watcher.wait(lambda w: w.mode is Mode.ACTIVE)
         watcher.wait(lambda w: w.mode is Mode.FAULT)

@@ -11,7 +11,7 @@ from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.configuration.files import ConfigError, kind_of
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.console.admission import judge_law
-from utank_hil.console.common import Json, fail, load, print_json, warnings_of
+from utank_hil.console.common import AllowCode, Json, fail, load, print_json, warnings_of
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, shown
 
@@ -23,6 +23,7 @@ GROUP = "utank_hil.collections"
 def check(
     config: Annotated[Path, typer.Argument(help="Controller, scenario or ship.")],
     json_: Json = False,
+    allow_code: AllowCode = False,
 ) -> None:
     """Validate a controller, scenario or ship file; design the laws and print their margins.
 
@@ -46,7 +47,7 @@ def check(
         if not json_:
             print_ship(loaded)
     elif kind in collections:
-        collection = load(config, collections[kind])
+        collection = load(config, collections[kind], allow_code=allow_code)
         judged = {
             name: judge_law(each, config, f"controllers.{name}")
             for name, each in collection.controllers.items()
@@ -55,7 +56,7 @@ def check(
         if not json_:
             report.print_collection(kind, collection, judged)
     else:
-        loaded = load(config, ControllerConfig)
+        loaded = load(config, ControllerConfig, allow_code=allow_code)
         controller = judge_law(loaded, config)
         content = report.controller_json(controller)
         if not json_:

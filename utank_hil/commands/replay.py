@@ -3,8 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +13,7 @@ import typer
 from utank_hil.assembly import build_law
 from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration.controller import ControllerConfig
-from utank_hil.console.common import Json, fail, load
+from utank_hil.console.common import AllowCode, Json, fail, load
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal
 from utank_hil.telemetry.bus_logs import (
@@ -40,6 +39,7 @@ def replay(
         typer.Option(help="Controller configuration to replay with, instead of the recorded one."),
     ] = None,
     json_: Json = False,
+    allow_code: AllowCode = False,
 ) -> None:
     """Hand a recorded bus to the controller again and compare every frame that it sends.
 
@@ -53,9 +53,10 @@ def replay(
     **Example:** utank-hil replay out/gpc.frames
     """
     cut = ""
+    named = None if config is None else load(config, ControllerConfig, allow_code=allow_code)
     try:
         if log.suffix.lower() in BUS_SUFFIXES:
-            (result, why), law = _replay_bus_log(log, config), None
+            (result, why), law = _replay_bus_log(log, named), None
         else:
             if log.suffix == ".rrd":
                 fail(f"{log} holds no frames: give the {SUFFIX} file beside it")
@@ -65,9 +66,9 @@ def replay(
                     f"{log} begins in the middle of a run, in which the controller's memory is "
                     "not known: give the run's first part"
                 )
-            with _configuration(config, recording.head) as chosen:
+            with nullcontext(named) if named else recorded_config(recording.head) as chosen:
                 result, why, law = replay_log(
-                    recording, chosen, log.parent, as_recorded=config is None
+                    recording, chosen, log.parent, as_recorded=named is None
                 )
             cut = recording.cut
     except (OSError, ValueError) as error:
@@ -83,11 +84,10 @@ def replay(
     raise typer.Exit(ExitCode.OK if result.exact else ExitCode.REFUSED)
 
 
-def _replay_bus_log(log: Path, config: Path | None) -> tuple[ReplayResult, list[str]]:
+def _replay_bus_log(log: Path, chosen: ControllerConfig | None) -> tuple[ReplayResult, list[str]]:
     """Replay a log that knows of no configuration and no ticks."""
-    if config is None:
+    if chosen is None:
         fail(f"{log} says nothing of the controller: name its configuration by --config")
-    chosen = load(config, ControllerConfig)
     entries = read_bus_log(log)
     if not begins_with_the_controller(entries):
         fail(
@@ -101,15 +101,6 @@ def _replay_bus_log(log: Path, config: Path | None) -> tuple[ReplayResult, list[
         "the log is one of the bus: when the controller was handed each frame is a guess, and "
         "answers of a retuner are not in it"
     ]
-
-
-@contextmanager
-def _configuration(path: Path | None, head: dict[str, Any]) -> Iterator[ControllerConfig]:
-    if path is not None:
-        yield load(path, ControllerConfig)
-        return
-    with recorded_config(head) as config:
-        yield config
 
 
 def _as_json(

@@ -26,7 +26,7 @@ from utank_hil.commands.recording import RecordingSummary, RunRecording
 from utank_hil.commands.service_manager import ServiceManager
 from utank_hil.configuration.controller import ControllerConfig
 from utank_hil.console.admission import admit
-from utank_hil.console.common import Duration, Json, View, fail, load, print_json
+from utank_hil.console.common import AllowCode, Duration, Json, View, fail, load, print_json
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.terminal import Terminal, notes, shown
 from utank_hil.console.timing import timing_table
@@ -82,6 +82,7 @@ def run(
     ] = None,
     json_: Json = False,
     view: View = False,
+    allow_code: AllowCode = False,
 ) -> None:
     """Run the controller on a CAN bus until Ctrl-C; the pump is left at zero.
 
@@ -96,7 +97,7 @@ def run(
 
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """
-    loaded = load(config, ControllerConfig)
+    loaded = load(config, ControllerConfig, allow_code=allow_code)
     law = admit(loaded, config)
     if loaded.safety.overruns_in_ten is None:
         notes.say("safety.overruns_in_ten", yellow="repeated late ticks are not judged:")

@@ -13,7 +13,7 @@ from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.base.parameters import Problem, Range, refuse
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.configuration.files import Section
-from utank_hil.configuration.laws import Law, sample_time
+from utank_hil.configuration.laws import AnyDesign, sample_time
 from utank_hil.configuration.vessel import Vessel
 from utank_hil.control import DesignPlant, PassiveDesign, PredictiveDesign, PumpLimits
 from utank_hil.control.predictive.design import MOST_ORDER, WASHOUT_SHARE
@@ -42,7 +42,7 @@ class ControllerConfig(Section):
 
     name: str
     vessel: Vessel
-    law: Law
+    law: AnyDesign
     delay_s: Annotated[float, Range(least=0, most=1)] = 0.05
     """From the sampling of a measurement to the drive's answer to the command made of it."""
     accept_low_margins: bool = False

@@ -7,7 +7,7 @@ Every error carries the file and key where the wrong value was written.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -17,6 +17,9 @@ from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+
+ALLOW_CODE: Final = "allow_code"
+"""Key of the validation's context: whether the file may name code that is run."""
 
 
 class Section(BaseModel):
@@ -60,7 +63,7 @@ class ConfigError(ValueError):
         self.problems = problems
 
 
-def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
+def load_config(path: Path | str, model: type[ModelT], *, allow_code: bool = False) -> ModelT:
     """Read and validate a configuration file with all the files it names.
 
     Parameters
@@ -69,6 +72,8 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
         The YAML file.
     model : type of pydantic.BaseModel
         What the file must hold.
+    allow_code : bool
+        Whether it may name code that is run (a law of the kind python).
 
     Raises
     ------
@@ -85,7 +90,7 @@ def load_config(path: Path | str, model: type[ModelT]) -> ModelT:
     if () in reader.unread:
         raise ConfigError(problems)
     try:
-        loaded = model.model_validate(content)
+        loaded = model.model_validate(content, context={ALLOW_CODE: allow_code})
     except ValidationError as error:
         for item in error.errors():
             problems += reader.located(item, content, model)

@@ -1,4 +1,4 @@
-"""The section ``law`` of a controller: one of the registered laws, chosen by its kind.
+"""The section ``law`` of a controller: one of the registered designs, chosen by its kind.
 
 With ``tuning: auto`` the kinds `LINEAR_KINDS` take no numbers but a sea.
 
@@ -6,69 +6,45 @@ Laws of installed packages join by entry points of the group ``utank_hil.laws``:
 kind, the value a design as `utank_hil.control.registry` lists them.
 """
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import MISSING, Field, asdict, field, fields, make_dataclass
 from functools import reduce
 from importlib.metadata import entry_points
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_type_hints
 
-from pydantic import BeforeValidator, Discriminator, Tag
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    PlainSerializer,
+    Tag,
+    ValidationInfo,
+    WrapValidator,
+)
 
 from utank_hil.analysis.auto_tuning import AutoDesign
 from utank_hil.analysis.loop.scaled_law import LINEAR_KINDS
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign
 from utank_hil.base.parameters import refuse
+from utank_hil.configuration.files import ALLOW_CODE
 from utank_hil.configuration.matrices import SystemFile
 from utank_hil.configuration.spectra import LawSea
-from utank_hil.control.constrained.design import ConstrainedDesign
 from utank_hil.control.interface import LawDesign
 from utank_hil.control.pump_with_valve import PumpWithValveDesign
+from utank_hil.control.python_law import PythonDesign
 from utank_hil.control.registry import LAWS
+from utank_hil.control.sea_model import SeaModel
 from utank_hil.control.semi_active import ClippedValveDesign, OnOffValveDesign
-from utank_hil.control.state_space import StateSpaceDesign
+from utank_hil.control.state_space import SystemMatrices
 
 GROUP: Final = "utank_hil.laws"
-
-
-@dataclass(frozen=True, slots=True)
-class ConstrainedFromFile(ConstrainedDesign):
-    """A constrained law whose sea a file may name as a scenario does."""
-
-    sea: LawSea
-
-
-@dataclass(frozen=True, slots=True)
-class SelfTunedFromFile(SelfTunedDesign):
-    """A self-tuned law whose sea a file may name as a scenario does."""
-
-    sea: LawSea | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class AutoFromFile(AutoDesign):
-    """With `tuning: auto`: numbers follow from ship, pump and a sea, which a file may name."""
-
-    sea: LawSea | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class StateSpaceFromFile(StateSpaceDesign):
-    """A law in matrices, which may stand in a data file."""
-
-    system: SystemFile
-
-
-_FROM_FILE: Final[dict[type[LawDesign], type[LawDesign]]] = {
-    ConstrainedDesign: ConstrainedFromFile,
-    StateSpaceDesign: StateSpaceFromFile,
-}
 
 _AUTO: Final = "tuning auto"
 _AUTO_KEYS: Final = frozenset(each.name for each in fields(AutoDesign))
 
 
 def _tag(content: Any) -> Any:
-    """Which law is meant: its kind, or `_AUTO`."""
+    """Which design is meant: its kind, or `_AUTO`."""
     given = content if isinstance(content, dict) else {"kind": getattr(content, "kind", None)}
     automatic = "tuning" in given or isinstance(content, AutoDesign)
     return _AUTO if automatic and given.get("kind") in LINEAR_KINDS else given.get("kind")
@@ -83,48 +59,78 @@ def _without_numbers(content: Any) -> Any:
     return content
 
 
-def _one_of(*kinds: type[LawDesign]) -> Any:
-    """Annotation of a law of one of these kinds, its numbers given or not."""
+def _code_allowed(content: Any, info: ValidationInfo) -> Any:
+    """Refuse code unless whoever reads the file allows it."""
+    if isinstance(content, dict) and not (info.context or {}).get(ALLOW_CODE):
+        reason = (
+            f"is python: it runs {content.get('factory', 'code')}, which the file names; allow it "
+            "by --allow-code if you trust the file and that code"
+        )
+        refuse("law", [("kind", reason)])
+    return content
+
+
+def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
+    """Annotation of a design, some of whose sections a file may write in another way.
+
+    Parameters
+    ----------
+    design : type of LawDesign
+    sections : dict of type to any
+        Annotations to read such a section by, by its type.
+    """
+    hints = get_type_hints(design, include_extras=True)
+    own = {
+        name: reduce(or_, (sections.get(each, each) for each in get_args(hint) or (hint,)))
+        for name, hint in hints.items()
+        if sections.keys() & {hint, *get_args(hint)}
+    }
+    if not own:
+        return design
+    written = make_dataclass(
+        design.__name__,
+        [
+            (each.name, own.get(each.name, hints[each.name]), field(**_default(each)))
+            for each in fields(design)
+        ],
+    )
+
+    def read(content: Any, checked: Callable[[Any], Any]) -> Any:
+        if isinstance(content, design):
+            return content
+        found = checked(content)
+        return design(**{each.name: getattr(found, each.name) for each in fields(found)})
+
+    return Annotated[written, WrapValidator(read), PlainSerializer(asdict)]
+
+
+def _default(parameter: Field[Any]) -> dict[str, Any]:
+    given = {name: getattr(parameter, name) for name in ("default", "default_factory")}
+    return {name: value for name, value in given.items() if value is not MISSING}
+
+
+def _one_of(kinds: tuple[type[LawDesign], ...], sections: dict[Any, Any]) -> Any:
+    """Annotation of a design of one of these kinds, its numbers given or not."""
     given = [
-        Annotated[each, Tag(kind)]
+        Annotated[_as_written(each, sections), *marks, Tag(kind)]
         for each in kinds
         for kind in get_args(get_type_hints(each)["kind"])
+        for marks in ([BeforeValidator(_code_allowed)] if each is PythonDesign else [],)
     ]
-    automatic = Annotated[AutoFromFile, BeforeValidator(_without_numbers), Tag(_AUTO)]
-    return Annotated[reduce(or_, (*given, automatic)), Discriminator(_tag)]
+    automatic = _as_written(AutoDesign, sections)
+    given.append(Annotated[automatic, BeforeValidator(_without_numbers), Tag(_AUTO)])
+    return Annotated[reduce(or_, given), Discriminator(_tag)]
 
 
 if TYPE_CHECKING:
-    PumpLaw = LawDesign
+    AnyDesign = LawDesign
 else:
-    _installed = tuple(point.load() for point in entry_points(group=GROUP))
-    _of_a_valve = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
-    _of_a_pump = tuple(
-        _FROM_FILE.get(law, law)
-        for law in (*LAWS, SelfTunedFromFile, *_installed)
-        if law not in _of_a_valve
-    )
-    PumpLaw = _one_of(*_of_a_pump)
-
-
-@dataclass(frozen=True, slots=True)
-class ClippedValveFromFile(ClippedValveDesign):
-    """A valve's law that holds a pump's law."""
-
-    pump: PumpLaw
-
-
-@dataclass(frozen=True, slots=True)
-class PumpWithValveFromFile(PumpWithValveDesign):
-    """A law of pump and valve that holds a pump's law."""
-
-    pump: PumpLaw
-
-
-if TYPE_CHECKING:
-    Law = LawDesign
-else:
-    Law = _one_of(*_of_a_pump, OnOffValveDesign, ClippedValveFromFile, PumpWithValveFromFile)
+    _designs = (*LAWS, SelfTunedDesign, *(point.load() for point in entry_points(group=GROUP)))
+    _valves = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
+    _sections = {SeaModel: LawSea, SystemMatrices: SystemFile}
+    # the design within another one is that of a pump, and never code
+    _of_a_pump = tuple(each for each in _designs if each not in (PythonDesign, *_valves))
+    AnyDesign = _one_of(_designs, {**_sections, LawDesign: _one_of(_of_a_pump, _sections)})
 
 
 def sample_time(law: LawDesign) -> tuple[str, float] | None:

@@ -46,6 +46,9 @@ Version = Annotated[
         "--version", is_eager=True, callback=_print_version, help="Print the version and end."
     ),
 ]
+AllowCode = Annotated[
+    bool, typer.Option("--allow-code", help="Run Python code that the file names as a law.")
+]
 Duration = Annotated[
     float | None,
     # a float without a limit may be infinite
@@ -86,13 +89,13 @@ def fail(message: object, code: ExitCode = ExitCode.USAGE) -> NoReturn:
     raise typer.Exit(code)
 
 
-def load(path: Path, model: type[ModelT]) -> ModelT:
+def load(path: Path, model: type[ModelT], *, allow_code: bool = False) -> ModelT:
     """Read a configuration, or list everything that is wrong with it and end with exit code 2.
 
-    What is unusual in it is a note.
+    What is unusual in it is a note. `allow_code` as in `load_config`.
     """
     try:
-        loaded = load_config(path, model)
+        loaded = load_config(path, model, allow_code=allow_code)
     except ConfigError as error:
         fail_with(error)
     for warning in warnings_of(loaded, path):
