@@ -1,15 +1,16 @@
-"""Ranges of parameters: said once at the field, held in code and in configuration files alike.
+"""Ranges of parameters: each stands at its field and is checked in one place, `range_problems`.
 
-A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands what else must hold to
-`refuse`. A configuration file checks each field by its annotation as it reads it, so that every
-wrong number is found at once and at its own key; everything made in code is checked by
-`range_problems`. A number that is out of its range raises `ParameterError`, a ValueError.
+A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands its `range_problems`, and
+what else must hold, to `refuse`. A number that is out of its range raises `ParameterError`, a
+ValueError. Where a file is read, the annotation only refuses what is no number.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from types import NoneType, UnionType
+from itertools import repeat
+from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class Range:
         return f"{self.least:g} or more and {high}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Let configuration files check the field as they read it."""
+        """Take no number from what is none; the range is checked by `range_problems`."""
         # here: nothing but files needs it
         from pydantic_core import PydanticCustomError, core_schema
 
@@ -110,13 +111,7 @@ class Range:
                 raise PydanticCustomError("number_type", "must be a number")
             return value
 
-        def held(value: float) -> float:
-            if not self.holds(value):
-                raise ValueError(self.demand)
-            return value
-
-        number = core_schema.no_info_before_validator_function(a_number, handler(source))
-        return core_schema.no_info_after_validator_function(held, number)
+        return core_schema.no_info_before_validator_function(a_number, handler(source))
 
 
 Finite = Annotated[float, Range()]
@@ -128,14 +123,36 @@ SampleTime = Annotated[float, Range(least=1e-3, most=10)]
 
 
 def range_problems(instance: "DataclassInstance") -> list[Problem]:
-    """Every parameter of a dataclass that lies outside the `Range` of its annotation."""
-    problems = []
-    for name, hint in _annotations(type(instance)).items():
-        value = getattr(instance, name)
-        demand = _missed(hint, value)
-        if demand is not None:
-            problems.append((name, f"{demand}, got {value}"))
-    return problems
+    """Every number in a dataclass's parameters that lies outside the `Range` of its annotation."""
+    return [
+        problem
+        for name, hint in _annotations(type(instance)).items()
+        for problem in outside(name, hint, getattr(instance, name))
+    ]
+
+
+def outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
+    """The numbers in a value that lie outside the `Range` of its annotation, as problems.
+
+    Parameters
+    ----------
+    name : str
+        Of the value; that of a number within it is followed by its place.
+    """
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        marks = [mark for mark in arguments[1:] if isinstance(mark, Range)]
+        if missed := next((mark for mark in marks if not mark.holds(value)), None):
+            yield name, f"{missed.demand}, got {value}"
+        else:
+            yield from outside(name, arguments[0], value)
+    elif origin is tuple:
+        hints = repeat(arguments[0]) if arguments[1:] == (...,) else arguments
+        for index, (inner, item) in enumerate(zip(hints, value, strict=False)):
+            yield from outside(f"{name}.{index}".lstrip("."), inner, item)
+    elif origin in (Union, UnionType) and value is not None:
+        for inner in arguments:
+            yield from outside(name, inner, value)
 
 
 def refuse(owner: str, problems: list[Problem]) -> None:
@@ -149,21 +166,3 @@ def _annotations(owner: type) -> dict[str, Any]:
     """Of a dataclass's parameters; what it computes itself is left out."""
     hints = get_type_hints(owner, include_extras=True)
     return {field.name: hints[field.name] for field in fields(owner) if field.init}
-
-
-def _missed(hint: Any, value: Any) -> str | None:
-    """Demand of the first `Range` in an annotation that a value does not meet."""
-    origin, arguments = get_origin(hint), get_args(hint)
-    parts: list[tuple[Any, Any]] = []
-    if origin is Annotated:
-        for mark in arguments[1:]:
-            if isinstance(mark, Range) and not mark.holds(value):
-                return mark.demand
-        parts = [(arguments[0], value)]
-    elif origin is tuple and arguments[1:] == (...,):
-        parts = [(arguments[0], item) for item in value]
-    elif origin is tuple:
-        parts = list(zip(arguments, value, strict=False))
-    elif origin in (Union, UnionType) and value is not None:
-        parts = [(inner, value) for inner in arguments if inner is not NoneType]
-    return next((demand for demand in (_missed(*part) for part in parts) if demand), None)

@@ -7,11 +7,11 @@ Every error carries the file and key where the wrong value was written.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
-from utank_hil.base.parameters import ParameterError, Problem
+from utank_hil.base.parameters import ParameterError, Problem, outside, refuse
 from utank_hil.configuration.error_words import words_for
 from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
@@ -26,6 +26,16 @@ class Section(BaseModel):
     """One mapping of a configuration file: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @field_validator("*")
+    @classmethod
+    def _in_range(cls, value: Any, info: ValidationInfo) -> Any:
+        field = cls.model_fields[str(info.field_name)]
+        hint: Any = field.annotation
+        for mark in field.metadata:
+            hint = Annotated[hint, mark]
+        refuse("", list(outside("", hint, value)))
+        return value
 
     def warnings(self) -> list[Problem]:
         """What is unusual in the section, by keys within it; it can be used all the same."""

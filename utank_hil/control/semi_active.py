@@ -141,6 +141,9 @@ class OnOffValveDesign:
     sample_time_s: SampleTime = 0.1
     kind: Literal["valve_on_off"] = "valve_on_off"
 
+    def __post_init__(self) -> None:
+        refuse("on-off valve", range_problems(self))
+
     def build(self, plant: DesignPlant) -> BuiltLaw:
         """Design the law for a plant."""
         make = partial(OnOffValve, valve_range(plant), self.threshold_rad_m_s2, self.sample_time_s)
