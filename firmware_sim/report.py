@@ -24,7 +24,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
 from utank_hil.pictures import BenchBar, BenchCurve, draw_bench
 from utank_hil.pictures.style import COLORS, NO_TANK
-from utank_hil.report.page import PAGE, write_page
+from utank_hil.reports.page import PAGE, write_page
 from utank_hil.telemetry.recording import write_recording
 
 PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"

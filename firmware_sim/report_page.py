@@ -14,7 +14,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import Vessel
 from utank_hil.console.ship_report import power_words, ship_line
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.report.parts import (
+from utank_hil.reports.parts import (
     Report,
     ReportKind,
     about_section,

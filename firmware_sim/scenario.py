@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -78,6 +78,8 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault]) -> list[Problem]:
 
 class Scenario(Section):
     """A ship in a sea, with the controllers to try there."""
+
+    noun: ClassVar = "scenario"
 
     name: str
     vessel: Vessel

@@ -77,7 +77,7 @@ class StarterProject:
 def starter_sea(
     length_m: float, roll_period_s: float, hs_m: float | None = None, tp_s: float | None = None
 ) -> dict[str, Any]:
-    """Sea of a scenario: at the roll period, and as high as her length and the pump allow.
+    """Sea of a scenario: at the roll period, and as high as the ship's length and the pump allow.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ _DEPTH_PER_BEAM: Final = (0.01, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class StarterShip:
-    """A ship as a naval architect knows her, without the tank's water.
+    """A ship as a naval architect knows it, without the tank's water.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ effective_slope: {number(sea["effective_slope"]["coefficient"])}}}
 def scenario_file(name: str, sea: dict[str, Any]) -> str:
     """The scenario: a beam sea near the ship's roll period."""
     return f"""\
-# A beam sea near her roll period, where a ship rolls most.
+# A beam sea near the roll period, where a ship rolls most.
 name: {json.dumps(f"{name} in a beam sea")}
 vessel: ship.yaml
 sea:

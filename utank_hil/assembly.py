@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from utank_hil.analysis.auto_tuning import AutoDesign
 from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
@@ -294,8 +295,14 @@ def retuning_task(
     from utank_hil.retuning.redesign import RetuningTask
 
     design = config.law
+    if isinstance(design, AutoDesign):
+        design = design.tuned(config.plant)
     if not isinstance(design, PredictiveDesign) or "roll_rad" not in design.predictor.measured:
-        raise ValueError("the configuration's law must be predictive and measure roll_rad")
+        raise ValueError(
+            f"law.kind: {design.kind} can't be designed anew for a ship that is found: it must be "
+            "predictive and measure roll_rad; take {kind: gpc, tuning: auto} in its place, in a "
+            "copy of the file"
+        )
     return RetuningTask(design, config.plant, order, ModelLimits(roll_period_range_s))
 
 

@@ -8,7 +8,7 @@ from firmware_sim.campaign.store import PICTURE, SUMMARY
 from firmware_sim.campaign.tables import interval, pairs_table, runs_table
 from firmware_sim.scenario import PASSIVE
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.report.parts import Report, ReportKind, about_section, printed
+from utank_hil.reports.parts import Report, ReportKind, about_section, printed
 
 MOST_LINES: Final = 8
 """Of the verdict."""

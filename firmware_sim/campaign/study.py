@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -60,6 +60,8 @@ class Stop(Section):
 
 class Study(Section):
     """A scenario, and what is varied of it."""
+
+    noun: ClassVar = "study"
 
     name: str
     scenario: Content

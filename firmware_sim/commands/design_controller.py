@@ -56,7 +56,10 @@ def controller(
     if isinstance(law, AutoDesign):
         law = law.tuned(loaded.plant)
     if not isinstance(law, Design):
-        fail(f"{config}: a {law.kind} law has no weight to trade; predictive and LQG laws have")
+        fail(
+            f"{config}: law.kind: a {law.kind} law has no weight to trade: take "
+            "{kind: gpc, tuning: auto} in its place, in a copy of the file"
+        )
     vessel = loaded.vessel
     path = scenario or shipped_scenario(vessel)
     if path is None:

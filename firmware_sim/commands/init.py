@@ -87,7 +87,9 @@ def init(
         float | None,
         typer.Option(help="Peak period of its sea, s.", show_default="near the roll period"),
     ] = None,
-    name: Annotated[str, typer.Option(help="Of the ship.")] = "My ship",
+    name: Annotated[
+        str | None, typer.Option(help="Of the ship.", show_default="the folder's")
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Write a starter project for your ship: tank, pump, law, sea.
@@ -114,7 +116,10 @@ def init(
         "duct_below_cg_m": duct_below_cg,
     }
     try:
-        ship = StarterShip(name, length, beam, displacement, gm, roll_period, draught, roll_damping)
+        ship_name = name or folder.resolve().name.replace("_", " ")
+        ship = StarterShip(
+            ship_name, length, beam, displacement, gm, roll_period, draught, roll_damping
+        )
         usual = TankRoom.in_hull(length, beam)
     except ParameterError as error:
         _fail_at(error)
@@ -128,7 +133,8 @@ def init(
         if value is not None and not 0 < value < math.inf:
             fail(f"--{option}: must be positive and finite, got {value}")
     try:
-        project = make_starter(ship, room, gm_loss, hs, tp)
+        with notes.busy(f"{name}: sizing tank and pump, designing a law"):
+            project = make_starter(ship, room, gm_loss, hs, tp)
     except (TankImpossibleError, NoLawError) as error:
         if json_:
             print_json({"possible": False, "reason": str(error)})
@@ -145,8 +151,9 @@ def init(
     little = _little_help(project)
     if json_:
         figures = {"possible": True, "little_help": little, **_as_json(project)}
-        told = {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
-        print_json(told)
+        print_json(
+            {**figures, "files": {Path(file).stem: str(path) for file, path in files.items()}}
+        )
         return
     console = Terminal()
     console.table(_table(project))

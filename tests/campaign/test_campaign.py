@@ -23,7 +23,7 @@ from firmware_sim.commands.campaign import campaign
 from utank_hil.commands.report import write_page
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.report.page import write_page
+from utank_hil.reports.page import write_page
 
 pytestmark = pytest.mark.slow
 

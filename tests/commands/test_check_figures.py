@@ -63,7 +63,7 @@ def test_heel_that_the_pump_holds_is_one_that_she_can_have(tmp_path: Path) -> No
     for made, said in (
         (lambda: ship(tmp_path), "0.92°"),
         (lambda: ship(tmp_path, tank__headroom_m=1.0), "0.34°, a reservoir full or empty"),
-        (lambda: patti_b, "capsizes her"),
+        (lambda: patti_b, "capsizes the ship"),
     ):
         path = made()
         assert f"holds │ {said} │" in " ".join(invoke("check", path).stdout.split())

@@ -53,7 +53,7 @@ def test_ship_that_no_law_can_mend_is_told_so(tmp_path: Path) -> None:
     """Patti-B with 0.59 of her stiffness loses more to the free surface than she has left."""
     refused = check(tmp_path, "gpc", "patti_b")
     assert not refused["accepted"]
-    assert refused["remedy"].startswith("at 1.3 of her roll period the ship is unstable")
+    assert refused["remedy"].startswith("at 1.3 of the roll period the ship is unstable")
 
 
 def test_law_that_passes_or_was_refused_for_something_else_gets_no_remedy(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from utank_hil.commands import run as run_module
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures.report_page import ReportSection, ReportTable, Verdict, write_report_page
-from utank_hil.report.page import write_page
+from utank_hil.reports.page import write_page
 from utank_hil.telemetry.recording import write_recording
 
 pytestmark = pytest.mark.slow

@@ -305,7 +305,7 @@ def test_a_pump_that_could_capsize_her_is_warned_of(
     assert ("limits.pressure_pa" in warnings) == warned
     if warned:
         assert (
-            f"is {pressure_pa / 1e3:.4g} kPa, and over 4.44 kPa takes her beyond 0.19"
+            f"is {pressure_pa / 1e3:.4g} kPa, and over 4.44 kPa takes the ship beyond 0.19"
             in (warnings["limits.pressure_pa"])
         )
 

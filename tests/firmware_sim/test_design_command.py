@@ -54,7 +54,7 @@ def test_a_law_without_weights_is_refused_by_name(tmp_path: Path):
     path.write_text(f"name: none\nvessel: {vessel}\nlaw: {{kind: passive}}\n")
     result = run("controller", path, "--out", tmp_path)
     assert result.exit_code == 2
-    assert "a passive law has no weight to trade" in result.stderr
+    assert "law.kind: a passive law has no weight to trade: take {kind: gpc, t" in result.stderr
 
 
 @pytest.fixture(scope="module")

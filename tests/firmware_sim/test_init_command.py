@@ -106,6 +106,8 @@ def test_what_to_do_next_can_be_done_under_any_name(tmp_path: Path) -> None:
         assert (tmp_path / file).exists()
         assert file in done.output.partition("Next:")[2]
     assert load_config(tmp_path / "ship.yaml", Vessel).name == name
+    assert run(tmp_path / "north_star", PATROL).exit_code == 0
+    assert load_config(tmp_path / "north_star" / "ship.yaml", Vessel).name == "north star"
 
 
 def test_sea_can_be_given(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def remedy(judged: JudgedLaw) -> str | None:
     softer = replace(plant.ship, stiffness_nm_rad=stiffness)
     if np.linalg.eigvals(state_matrices(softer, plant.tank)[0]).real.max() > 0:
         return (
-            f"at {report.worst_period_scale:g} of her roll period the ship is unstable with the "
+            f"at {report.worst_period_scale:g} of the roll period the ship is unstable with the "
             "tank's water alone, whatever the law asks for: make the tank's reservoirs smaller"
         )
     for factor in LONGER if varied(design) == "control horizon" else GENTLER:

@@ -25,7 +25,7 @@ def report(
 
     **Example:** utank-hil report out
     """
-    from utank_hil.report.page import PAGE, write_page
+    from utank_hil.reports.page import PAGE, write_page
 
     page = out or (runs[0] / PAGE if runs[0].is_dir() else runs[0].with_suffix(".html"))
     try:

@@ -5,7 +5,7 @@ is the parameter of the same name.
 """
 
 import math
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -39,6 +39,8 @@ MOST_PULSES_S: Final = 3600.0
 
 class ControllerConfig(Section):
     """The controller's side, ``configs/controllers``: what ``utank-hil run`` takes."""
+
+    noun: ClassVar = "controller"
 
     name: str
     vessel: Vessel
@@ -102,7 +104,7 @@ class ControllerConfig(Section):
         return found + self._pressure_warnings()
 
     def _pressure_warnings(self) -> list[Problem]:
-        """A pump that could capsize her: no monitor helps against a drive that hangs."""
+        """A pump that could capsize the ship: no monitor helps against a drive that hangs."""
         most_pa, roll_rad = self.limits.pressure_pa, self.safety.roll_limit_rad
         if self.vessel.pump is None:
             return []
@@ -112,8 +114,9 @@ class ControllerConfig(Section):
             return []
         reason = (
             f"is {most_pa / 1e3:.4g} kPa, and over {math.floor(held_pa / 10) / 100:g} kPa takes "
-            f"her beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a drive "
-            "that hangs: lower it here and in the drive, or have a hard-wired stop cut its power"
+            f"the ship beyond {roll_rad:g} rad, safety.roll_limit_rad, if it is held, as by a "
+            "drive that hangs: lower it here and in the drive, or have a hard-wired stop cut its "
+            "power"
         )
         return [("limits.pressure_pa", reason)]
 
@@ -162,9 +165,9 @@ class ControllerConfig(Section):
         if limit_rad < righting.vanishing_rad:
             return []
         reason = (
-            f"is {limit_rad:g}, but with the tank's water her stability vanishes at "
+            f"is {limit_rad:g}, but with the tank's water the stability vanishes at "
             f"{righting.vanishing_rad:.2f} rad: leave it out, or set it to "
-            f"{righting.greatest_rad:.2f} or less, where her righting moment is greatest"
+            f"{righting.greatest_rad:.2f} or less, where the righting moment is greatest"
         )
         return [("safety.roll_limit_rad", reason)]
 

@@ -5,9 +5,10 @@ with ``./`` or ``../`` is the path of a data file; both are relative to the file
 Every error carries the file and key where the wrong value was written.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
@@ -26,6 +27,8 @@ class Section(BaseModel):
     """One mapping of a configuration file: unknown keys are errors, values never change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    noun: ClassVar[str] = ""
+    """What a file of this is, in a word; empty for what is only a part of files."""
 
     @field_validator("*")
     @classmethod
@@ -177,20 +180,35 @@ def kind_of(path: Path | str, models: dict[str, type[BaseModel]]) -> str:
     content = reader.read(Path(path))
     if () in reader.unread:
         raise ConfigError(reader.problems)
-    own = {
-        kind: set(model.model_fields).difference(
-            *(other.model_fields for name, other in models.items() if name != kind)
-        )
-        for kind, model in models.items()
-    }
-    found = {kind: len(keys.intersection(content)) for kind, keys in own.items()}
-    best = max(found.values())
-    kinds = [kind for kind, count in found.items() if count == best]
-    if best == 0 or len(kinds) > 1:
-        known = "; ".join(f"a {kind} has {', '.join(sorted(own[kind]))}" for kind in models)
+    kind = _kind(content, models)
+    if kind is None:
+        known = "; ".join(f"a {kind} has {', '.join(sorted(own))}" for kind, own in _own(models))
         reason = f"has the keys of no {', '.join(models)} alone: {known}"
         raise ConfigError([ConfigProblem(Path(path), "", reason)])
-    return kinds[0]
+    return kind
+
+
+def _own(models: dict[str, type[BaseModel]]) -> Iterator[tuple[str, set[str]]]:
+    """Keys that no other of several models has."""
+    for kind, model in models.items():
+        others = (other.model_fields for name, other in models.items() if name != kind)
+        yield kind, set(model.model_fields).difference(*others)
+
+
+def _kind(content: dict[str, Any], models: dict[str, type[BaseModel]]) -> str | None:
+    """Which of several models has most of its own keys in a content; None if not one alone."""
+    found = {kind: len(own.intersection(content)) for kind, own in _own(models)}
+    best = max(found.values())
+    kinds = [kind for kind, count in found.items() if count == best]
+    return kinds[0] if best and len(kinds) == 1 else None
+
+
+def _nouns(base: type[Section] = Section) -> Iterator[tuple[str, type[Section]]]:
+    """The models of whole files, by what they are."""
+    for model in base.__subclasses__():
+        if model.noun:
+            yield model.noun, model
+        yield from _nouns(model)
 
 
 class _Reader:
@@ -265,6 +283,9 @@ class _Reader:
             if key:
                 self.problems.append(self.problem_at_name(key, f"names {file}, which {why}"))
             else:
+                noun, wanted = _kind(content, dict(_nouns())), getattr(model, "noun", "")
+                if noun and wanted and noun != wanted:
+                    why = f"is a {noun}, and a {wanted} is wanted"
                 self.problems.append(ConfigProblem(file, "", why))
             self.unread.add(key)
 

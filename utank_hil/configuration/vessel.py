@@ -5,7 +5,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, fields
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -32,6 +32,8 @@ _LEVEL_SHARE: Final = 3.85 / 4.88
 
 class Vessel(Section):
     """A ship with its tank and pump: ``configs/ships``."""
+
+    noun: ClassVar = "ship"
 
     name: str
     ship: ShipFromFile
@@ -89,12 +91,12 @@ class Vessel(Section):
 
     @property
     def righting(self) -> RightingRange:
-        """How far she rights herself with the tank's water."""
+        """How far the ship rights itself with the tank's water."""
         return righting_range(RollModel(self.ship, self.tank))
 
     @property
     def default_safety(self) -> dict[str, float]:
-        """Limits of roll and heel, where she rights herself less far than by `SafetyLimits`."""
+        """Limits of roll and heel, where the ship rights itself less far than by `SafetyLimits`."""
         greatest_rad = math.floor(100 * self.righting.greatest_rad) / 100
         most = SafetyLimits()
         return {

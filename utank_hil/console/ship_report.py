@@ -39,7 +39,7 @@ def ship_figures(vessel: Vessel) -> dict[str, Any]:
         `TankFigures`; share of the ship's stiffness that the free surface takes; level at which a
         reservoir is full or empty. Metacentric height and the water's share of the displacement
         are None where that is not given, what is of the pump without one: heel that its greatest
-        pressure holds by her restoring curve, None also where it capsizes her, and whether a
+        pressure holds by the restoring curve, None also where it capsizes the ship, and whether a
         reservoir is full or empty then; head that it holds; power that holds it in still water;
         flow that moves the level from limit to limit at the roll period, and power of pressure and
         flow, without losses. Damping ratios that a valve adds, None without one.
@@ -129,7 +129,7 @@ def _pump_rows(vessel: Vessel, figures: dict[str, Any]) -> list[tuple[str, str]]
 
 def _held(heel_rad: float | None, at_the_end: bool | None) -> str:
     if heel_rad is None:
-        return "capsizes her"
+        return "capsizes the ship"
     return f"{math.degrees(heel_rad):.2f}°" + (", a reservoir full or empty" if at_the_end else "")
 
 
@@ -203,8 +203,8 @@ def ship_line(vessel: Vessel) -> str:
         pump += f"; a valve in the {vessel.valve.kind} opens in {vessel.valve.opening_time_s:g} s"
     periods = " and ".join(f"{mode['period_s']:.3g}" for mode in figures["modes"])
     return (
-        f"She rolls in {figures['roll_period_s']:.3g} s, with the water in {periods} s; "
-        f"{_tonnes(figures['water_kg'])} of water take {figures['stability_taken']:.1%} of her "
+        f"The ship rolls in {figures['roll_period_s']:.3g} s, with the water in {periods} s; "
+        f"{_tonnes(figures['water_kg'])} of water take {figures['stability_taken']:.1%} of its "
         f"stability; {pump}."
     )
 

@@ -18,7 +18,7 @@ from utank_hil.pictures.report_page import (
     ReportTable,
     Verdict,
 )
-from utank_hil.report.parts import Report, about_section, roll_figure
+from utank_hil.reports.parts import Report, about_section, roll_figure
 from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of
