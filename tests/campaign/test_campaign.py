@@ -20,7 +20,6 @@ from firmware_sim.campaign.store import Store, read_results
 from firmware_sim.campaign.tables import pairs_table
 from firmware_sim.campaign.work import run_batch
 from firmware_sim.commands.campaign import campaign
-from utank_hil.commands.report import write_page
 from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.reports.page import write_page
