@@ -21,7 +21,6 @@ from utank_hil.commands.event_log import EventLog
 from utank_hil.commands.identified import IdentifiedShips
 from utank_hil.commands.lines import Lines
 from utank_hil.console.terminal import shown
-from utank_hil.retuning import RetuningEvent
 from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 

@@ -9,8 +9,6 @@ from typing import Final
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.console.common import fail
 from utank_hil.console.exit_codes import ExitCode
-from utank_hil.safety.alarms import AlarmEvent
-from utank_hil.telemetry.event_ring import event_text
 from utank_hil.telemetry.events import event_text
 
 _END_S: Final = 10.0
