@@ -2,8 +2,8 @@
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 READY := $(VENV)/.ready
-# a worker on each core; a file's tests stay together, for their fixtures; the longest files first
-PARALLEL := $(VENV)/bin/pytest -n auto --dist loadfile --no-loadscope-reorder
+# a worker on each core; one that has nothing left takes half of what another still has
+PARALLEL := $(VENV)/bin/pytest -n auto --dist worksteal
 # extras stay in the lock: pip, as Debian has it, would take the newest release for them and refuse it
 COMPILE := $(VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-header --no-annotate --no-emit-index-url --no-strip-extras
@@ -80,6 +80,16 @@ evidence: setup
 thesis: setup
 	$(PYTHON) -m tools.thesis
 
+# of which tests those are, [tool.mutmut] says; `mutmut show NAME` prints a mutant that lives
+mutants: setup
+	$(VENV)/bin/mutmut run >&2
+	$(VENV)/bin/mutmut results
+
+SAFETY := utank_hil/safety utank_hil/nodes utank_hil/control utank_hil/canbus
+coverage: setup
+	$(PARALLEL) -m "not socketcan and not evidence" $(addprefix --cov=,$(SAFETY)) --cov-branch \
+		--cov-report=term-missing:skip-covered tests/safety tests/nodes tests/canbus tests/control
+
 # in `make test` they draw the same examples each time
 search: setup
 	$(PARALLEL) -m "not socketcan and not evidence" --hypothesis-profile search $(shell grep -rl "from hypothesis" tests)
@@ -116,5 +126,5 @@ lock: setup
 	$(COMPILE) --extra dev pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf $(VENV) .cache build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf $(VENV) .cache build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis mutants *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

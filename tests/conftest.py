@@ -32,33 +32,14 @@ settings.register_profile("few", settings.get_profile("same"), max_examples=10) 
 settings.load_profile("same")
 
 
-LONGEST = (
-    *("faults/test_fault_campaign.py", "telemetry/test_recorder.py", "tools/test_week.py"),
-    *("retuning/test_retuner_process.py", "test_cli.py", "test_imports.py"),
-    *("firmware_sim/test_bench.py", "faults/test_lockstep_faults.py", "commands/test_check.py"),
-    *("safety/test_supervisor.py", "commands/test_report.py", "tools/test_vcan.py"),
-    *("firmware_sim/test_design_command.py", "retuning/test_redesign.py"),
-)
-"""Files of 15 s of CPU and more: a worker that begins one at the end is waited for."""
-
-
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give `evidence` with parameters to these alone; put the longest files first.
-
-    The workers then end together.
-    """
+    """Give a marker `evidence` that names parameters to these alone."""
     for item in items:
-        _only_named_parameters_are_evidence(item)
-    place = {Path(__file__).parent / name: number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: place.get(item.path, len(place)))
-
-
-def _only_named_parameters_are_evidence(item: pytest.Item) -> None:
-    own = item.own_markers
-    for mark in [each for each in own if each.name == "evidence" and each.args]:
-        if item.callspec.id not in mark.args:  # type: ignore[attr-defined]  # of a Function
-            own.remove(mark)
+        own = item.own_markers
+        for mark in [each for each in own if each.name == "evidence" and each.args]:
+            if item.callspec.id not in mark.args:  # type: ignore[attr-defined]  # of a Function
+                own.remove(mark)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -72,7 +53,7 @@ def _signals_reach_the_processes_of_tests() -> None:
 @pytest.fixture(autouse=True)
 def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Look at each picture that is drawn, whichever test has it drawn (`legible`)."""
-    save, found = style._save, []
+    save, found = style.save_figure, []
 
     def looked_at(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
         save(figure, path, metadata)
@@ -80,7 +61,7 @@ def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 
         found.extend(f"{path.name}: {flaw}" for flaw in flaws(figure))
 
-    monkeypatch.setattr(style, "_save", looked_at)
+    monkeypatch.setattr(style, "save_figure", looked_at)
     yield
     assert not found, "\n".join(found)
 

@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "docs" / "evidence"
-LAST_LINES: Final = 40
+LAST_LINES: Final = 400
 """Lines that are kept of a command that prints no JSON object."""
 
 

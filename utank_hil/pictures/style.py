@@ -88,10 +88,11 @@ def picture(
         FigureCanvasAgg(figure)  # no pyplot: neither a window system nor global state
         yield figure
         figure.suptitle(title, x=0.01, ha="left", fontsize=13, fontweight="bold")
-        _save(figure, path, {} if about is None else {"Description": json.dumps(about)})
+        save_figure(figure, path, {} if about is None else {"Description": json.dumps(about)})
 
 
-def _save(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
+def save_figure(figure: "Figure", path: Path, metadata: Mapping[str, str]) -> None:
+    """Write a figure as PNG, with the version that drew it and further metadata."""
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=DPI, metadata={"Software": headline(), **metadata})
     write_whole(path, drawn.getvalue())
