@@ -12,8 +12,8 @@ from utank_hil.console.common import why_not_writable
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.telemetry.bus_records import frame_ring
 from utank_hil.telemetry.frame_log import SUFFIX
-from utank_hil.telemetry.recorder import RecordingTask
 from utank_hil.telemetry.recorder_process import NEEDS_RERUN, RecorderError, RecorderProcess
+from utank_hil.telemetry.recorder_state import RecordingTask
 from utank_hil.telemetry.ring import RingWriter
 from utank_hil.telemetry.rotation import Rotation
 from utank_hil.telemetry.rows import RowWriter

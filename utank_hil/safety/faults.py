@@ -7,19 +7,21 @@ The supervisor judges the conditions of these rows, `docs/safety.md` shows them,
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.observations import VALVE_OFF, Observations
-from utank_hil.safety.safety_limits import SafetyLimits
+
+if TYPE_CHECKING:  # who prints the words of a fault needs no ship
+    from utank_hil.safety.safety_limits import SafetyLimits
 
 _NONE: Final = Finding(0)
 ROLL_CALM_S: Final = 10
 """Half the roll period of a ship that rolls slowly: from one greatest roll to the next."""
 
-Judgement: TypeAlias = Callable[[Observations, SafetyLimits], bool]
+Judgement: TypeAlias = "Callable[[Observations, SafetyLimits], bool]"
 
 
 class Reaction(Enum):

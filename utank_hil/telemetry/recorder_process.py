@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 from utank_hil.base.closing import Closing
-from utank_hil.telemetry.recorder import RecorderReport, RecorderState, RecordingTask
+from utank_hil.telemetry.recorder_state import RecorderReport, RecorderState, RecordingTask
 
 NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
 _MODULE: Final = "utank_hil.telemetry.recorder"
