@@ -8,19 +8,19 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 from rerun.encodings import EntityPath
 
-from utank_hil.telemetry.motion_figures import PHASE_AXES, phase_path, spectrum_path
+from utank_hil.telemetry.motion_figures import PHASE_AXES
 from utank_hil.telemetry.rerun_log import (
     ARCHETYPE,
     COMPONENT,
+    LOG,
+    RETUNING,
+    STATE,
     STATE_COLUMNS,
     TIME_COLUMN,
     has_state,
-    log_path,
-    retuning_path,
     run_paths,
-    state_path,
 )
-from utank_hil.telemetry.scene import SceneSize, scene_path, words_path
+from utank_hil.telemetry.scene import SceneSize
 from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
 
@@ -176,10 +176,10 @@ def _watch(
     )
     shown = list(zip(run_paths(runs), runs, strict=True))[:MOST_SHADES]
     scenes = [
-        rrb.Spatial2DView(origin=scene_path(path), name=run, visual_bounds=bounds)
+        rrb.Spatial2DView(origin=f"{path}/scene", name=run, visual_bounds=bounds)
         for path, run in shown
     ]
-    words = [rrb.TextDocumentView(origin=words_path(path), name=run) for path, run in shown]
+    words = [rrb.TextDocumentView(origin=f"{path}/words", name=run) for path, run in shown]
     if len(shown) == 1:
         plots = [
             _plot(title, [field_of(name) for name in names], runs, range(1), axis)
@@ -235,13 +235,13 @@ def _subjects(
     rows: list[rrb.Container | rrb.View] = [rrb.Tabs(*tabs, active_tab=0)] if tabs else []
     if has_state(columns):
         paths = [run_paths(runs)[i] for i in shown]
-        lanes = [lane(path) for path in paths for lane in (state_path, retuning_path)]
+        lanes = [f"{path}/{lane}" for path in paths for lane in (STATE, RETUNING)]
         rows.append(
             rrb.Horizontal(
                 rrb.StateTimelineView(
                     contents=lanes, name="Mode and fault, retuning", time_view=axis
                 ),
-                rrb.TextLogView(contents=[log_path(path) for path in paths], name="Events"),
+                rrb.TextLogView(contents=[f"{path}/{LOG}" for path in paths], name="Events"),
                 column_shares=[2, 1],
             )
         )
@@ -271,7 +271,7 @@ def _phase_plane(paths: Sequence[str]) -> rrb.View:
         end=boundary.cursor_relative(),
     )
     return rrb.Spatial2DView(
-        contents=[phase_path(path) for path in paths] + [f"{PHASE_AXES}/**"],
+        contents=[f"{path}/phase" for path in paths] + [f"{PHASE_AXES}/**"],
         name="Roll rate, °/s, over roll, °: last 30 s",
         time_ranges=[trail],
         visual_bounds=rrb.VisualBounds2D(x_range=[-12, 12], y_range=[-10.5, 10.5]),
@@ -281,7 +281,7 @@ def _phase_plane(paths: Sequence[str]) -> rrb.View:
 def _spectra(paths: Sequence[str]) -> rrb.View:
     """Spectra of the roll in the last minutes before the cursor."""
     return rrb.BarChartView(
-        contents=[spectrum_path(path) for path in paths],
+        contents=[f"{path}/spectrum" for path in paths],
         name="Spectrum of the roll in the last 5 min, °²/Hz over Hz",
         plot_legend=rrb.PlotLegend(visible=False),
     )

@@ -46,9 +46,9 @@ class FrameLogWriter(Closing):
     file : Path
         Overwritten.
     head : mapping
-        Where it comes from, see `utank_hil.telemetry.replay_head`.
+        Where the records come from, see `utank_hil.telemetry.replay_head`.
     small : bool
-        Compress as well as possible, for logs to be kept.
+        Whether to compress as well as possible, for logs to be kept.
 
     Raises
     ------
@@ -93,13 +93,7 @@ class FrameLogWriter(Closing):
 
 
 class BlockSink:
-    """Collects records of a run in simulated time into blocks of `BLOCK_NS`.
-
-    Parameters
-    ----------
-    block_ns : int
-        Longer blocks make smaller files.
-    """
+    """Collects records of a run in simulated time into blocks; longer ones make smaller files."""
 
     def __init__(self, writer: FrameLogWriter, block_ns: int = BLOCK_NS) -> None:
         self._writer = writer

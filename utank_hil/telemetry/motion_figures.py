@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 
 from utank_hil.base.arrays import FloatArray
-from utank_hil.telemetry.scene import due_rows
+from utank_hil.telemetry.scene import Figure, send_at
 from utank_hil.telemetry.viewer import TIMELINE
 
 NEEDED: Final = ("time_s", "roll_rad", "roll_rate_rad_s")
@@ -31,7 +31,7 @@ _WORDS: Final = (0xB0, 0xB0, 0xB0)
 _BAR_HZ: Final = 1 / (SEGMENT * STEP_S)
 
 
-class MotionFigures:
+class MotionFigures(Figure):
     """Writes both figures of one run.
 
     Parameters
@@ -40,12 +40,8 @@ class MotionFigures:
         Entity path of the run.
     columns : sequence of str
         Names of a row's values, `NEEDED` among them.
-    color : tuple of int
-        Of the run.
-    batch_s : float
-        As in `Scene`.
     beside : (int, int)
-        The run's number among so many, whose bars stand beside one another.
+        The run's number, and how many runs there are, whose bars stand beside one another.
     """
 
     def __init__(
@@ -57,37 +53,21 @@ class MotionFigures:
         batch_s: float,
         beside: tuple[int, int] = (0, 1),
     ) -> None:
+        super().__init__(columns, STEP_S, batch_s)
         self._recording, self._path, self._color = recording, path, color
         self._beside = beside
-        self._at = [columns.index(name) for name in NEEDED]
-        self._due_s = self._spectrum_due_s = -np.inf
-        self._held: list[FloatArray] = []
-        self._most_held = batch_s / STEP_S
+        self._spectrum_due_s = -np.inf
         self._record: deque[float] = deque(maxlen=round(RECORD_S / STEP_S))
         dots = rr.Points2D.from_fields(colors=color, radii=rr.Radius.ui_points(2.0))
-        recording.log(phase_path(path), dots, static=True, strict=True)
+        recording.log(f"{path}/phase", dots, static=True, strict=True)
         _draw_axes(recording)
 
-    def write(self, rows: FloatArray) -> None:
-        """Append what is due within these rows."""
-        needed = rows[:, self._at]
-        due, self._due_s = due_rows(needed[:, 0], self._due_s, STEP_S)
-        self._held += list(needed[due])
-        if len(self._held) >= self._most_held:
-            self.close()
-
-    def close(self) -> None:
-        """Send what is held; idempotent."""
-        if not self._held:
-            return
-        rows = np.stack(self._held)
-        self._held.clear()
-        known = rows[np.isfinite(rows).all(axis=1)]
-        self._send(
-            phase_path(self._path),
-            known[:, 0],
-            rr.Points2D.columns(positions=np.rad2deg(known[:, 1:]) * [1.0, -1.0]),
-        )
+    def _draw(self, rows: FloatArray) -> None:
+        needed = rows[:, [self._at[name] for name in NEEDED]]
+        known = needed[np.isfinite(needed).all(axis=1)]
+        if len(known):
+            dots = rr.Points2D.columns(positions=np.rad2deg(known[:, 1:]) * [1.0, -1.0])
+            send_at(self._recording, f"{self._path}/phase", known[:, 0], dots)
         for time_s, roll_rad in known[:, :2]:
             self._record.append(roll_rad)
             if time_s >= self._spectrum_due_s and len(self._record) >= SEGMENT:
@@ -101,13 +81,8 @@ class MotionFigures:
         wide = np.full(len(density), _BAR_HZ / count)
         at_hz = band_hz() + (number - (count - 1) / 2) * wide
         bars = rr.BarChart(density, abscissa=at_hz, widths=wide, color=self._color)
-        self._recording.log(spectrum_path(self._path), bars, strict=True)
+        self._recording.log(f"{self._path}/spectrum", bars, strict=True)
         self._recording.reset_time()
-
-    def _send(self, path: str, time_s: FloatArray, columns: rr.ComponentColumnList) -> None:
-        if len(time_s):
-            time_ns = np.rint(time_s * 1e9).astype("timedelta64[ns]")
-            self._recording.send_columns(path, [rr.TimeColumn(TIMELINE, duration=time_ns)], columns)
 
 
 def spectrum(record: FloatArray) -> FloatArray:
@@ -162,13 +137,3 @@ def _draw_axes(recording: rr.RecordingStream) -> None:
     names = [f"{radius:g}" for radius in _CIRCLES_DEG]
     marks = rr.Points2D(places, labels=names, colors=_WORDS, radii=thin, show_labels=True)
     recording.log(f"{PHASE_AXES}/degrees", marks, static=True, strict=True)
-
-
-def phase_path(path: str) -> str:
-    """Entity path of a run's dots in the phase plane."""
-    return f"{path}/phase"
-
-
-def spectrum_path(path: str) -> str:
-    """Entity path of a run's spectra."""
-    return f"{path}/spectrum"

@@ -8,7 +8,7 @@ text log holds the events of retuning and alarms as well.
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -20,9 +20,8 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.canbus.enumerations import Fault, Mode, RetuningState
 from utank_hil.telemetry.events import Event, event_text, warns
 from utank_hil.telemetry.motion_figures import NEEDED, MotionFigures
-from utank_hil.telemetry.scene import Scene, scene_size
+from utank_hil.telemetry.scene import Figure, Scene, scene_size, send_at
 from utank_hil.telemetry.units import field_of
-from utank_hil.telemetry.viewer import TIMELINE
 
 APPLICATION: Final = "utank-hil"
 TIME_COLUMN: Final = "time_s"
@@ -33,11 +32,13 @@ LIVE_RUN: Final = "live"
 ARCHETYPE: Final = "telemetry"
 COMPONENT: Final = "row"
 
+STATE, RETUNING, LOG = "state", "retuning", "log"
+"""Below a run's entity: lanes of its state and of retuning, and its text log."""
 STATE_COLUMNS: Final = ("mode", "fault")
 """Columns that make up the state lane of a run."""
 
 PICTURES_S: Final = 60.0
-"""Of pictures are written to a file at once: a kill loses as many, the rows are there."""
+"""Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
 ONE_COLOR: Final = (0xE6, 0x9F, 0x00)
 """Of a run that is alone."""
 _ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
@@ -76,8 +77,6 @@ class RunLog:
 
     Parameters
     ----------
-    recording : rerun.RecordingStream
-        Destination.
     path : str
         Entity path of the run, from `run_paths`.
     columns : sequence of str
@@ -85,11 +84,11 @@ class RunLog:
     about : mapping, optional
         Where it comes from (`utank_hil.base.provenance`); with the ship in it there is a scene.
     batch_s : float, optional
-        As in `Scene`; by default pictures are sent at once.
+        As of `Figure`; by default figures are sent at once.
     color : tuple of int
         Of the run, among several.
     beside : (int, int)
-        As in `MotionFigures`.
+        As of `MotionFigures`.
 
     Raises
     ------
@@ -107,106 +106,86 @@ class RunLog:
         color: tuple[int, int, int] = ONE_COLOR,
         beside: tuple[int, int] = (0, 1),
     ) -> None:
-        self._recording = recording
+        self._recording, self._path = recording, path
         size = scene_size(columns, about)
-        self._pictures: list[Scene | MotionFigures] = []
+        self._figures: list[Figure] = []
         if size is not None:
-            self._pictures.append(Scene(recording, path, columns, size, batch_s, beside[1] == 1))
+            self._figures.append(Scene(recording, path, columns, size, batch_s, beside[1] == 1))
         if set(NEEDED) <= set(columns):
-            self._pictures.append(MotionFigures(recording, path, columns, color, batch_s, beside))
-        self._path = path
+            self._figures.append(MotionFigures(recording, path, columns, color, batch_s, beside))
         self._time = time_index(columns)
         self._fields = [(i, field_of(c)) for i, c in enumerate(columns) if c != TIME_COLUMN]
-        self._state: list[int] = []
-        self._last = np.full(2, np.nan)
-        self._retuning = columns.index("retuning") if "retuning" in columns else None
-        self._last_retuning = float(RetuningState.IDLE)
-        if has_state(columns):
-            self._state = [columns.index(c) for c in STATE_COLUMNS]
+        self._state = [columns.index(c) for c in STATE_COLUMNS if has_state(columns)]
+        self._last_state = np.full((1, 2), np.nan)
+        self._retuning = [columns.index("retuning")] if "retuning" in columns else []
+        self._last_retuning = np.full((1, 1), float(RetuningState.IDLE))
+        if self._state:
             colors = {_state_name(m, f): _MODE_COLORS[m] for m in Mode for f in Fault}
             style = rr.StateConfiguration(values=list(colors), colors=list(colors.values()))
-            recording.log(state_path(path), style, static=True, strict=True)
+            recording.log(f"{path}/{STATE}", style, static=True, strict=True)
 
     def write(self, rows: FloatArray) -> None:
         """Append rows, an array (n, width); NaN leaves a gap in the plot."""
-        time_ns = np.rint(rows[:, self._time] * 1e9).astype("timedelta64[ns]")
+        time_s = rows[:, self._time]
         row = pa.StructArray.from_arrays(
             [pa.array(rows[:, i] * field.unit.scale) for i, field in self._fields],
             names=[field.name for _, field in self._fields],
         )
-        self._recording.send_columns(
-            self._path,
-            [rr.TimeColumn(TIMELINE, duration=time_ns)],
-            rr.DynamicArchetype.columns(archetype=ARCHETYPE, components={COMPONENT: row}),
-            strict=True,
-        )
+        columns = rr.DynamicArchetype.columns(archetype=ARCHETYPE, components={COMPONENT: row})
+        send_at(self._recording, self._path, time_s, columns)
         if self._state:
-            self._write_state(time_ns, rows[:, self._state])
-        if self._retuning is not None:
-            self._write_retuning(time_ns, rows[:, self._retuning])
-        for picture in self._pictures:
-            picture.write(rows)
+            states = rows[:, self._state]
+            changed = _changed(states, self._last_state)
+            self._last_state = states[-1:].copy()
+            names = self._write_states(STATE, time_s[changed], states[changed], _state_name)
+            self._write_text(time_s[changed], names, [_level(*each) for each in states[changed]])
+        if self._retuning:
+            states = rows[:, self._retuning]
+            changed = _changed(states, self._last_retuning)
+            self._last_retuning = states[-1:].copy()
+            self._write_states(RETUNING, time_s[changed], states[changed], _retuning_name)
+        for figure in self._figures:
+            figure.write(rows)
 
     def close(self) -> None:
-        """Send the pictures that are held; idempotent."""
-        for picture in self._pictures:
-            picture.close()
-
-    def _write_state(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
-        """Log the state's name wherever mode or fault changes."""
-        before = np.vstack([self._last, states[:-1]])
-        changed = (states != before).any(axis=1)
-        self._last = states[-1].copy()
-        if changed.any():
-            names = [_state_name(*state) for state in states[changed]]
-            self._recording.send_columns(
-                state_path(self._path),
-                [rr.TimeColumn(TIMELINE, duration=time_ns[changed])],
-                rr.StateChange.columns(state=names),
-                strict=True,
-            )
-            self._write_text(time_ns[changed], names, [_level(*state) for state in states[changed]])
-
-    def _write_retuning(self, time_ns: npt.NDArray[np.timedelta64], states: FloatArray) -> None:
-        """Log the name of the state of retuning wherever it changes."""
-        changed = np.diff(states, prepend=self._last_retuning) != 0
-        self._last_retuning = float(states[-1])
-        if changed.any():
-            self._recording.send_columns(
-                retuning_path(self._path),
-                [rr.TimeColumn(TIMELINE, duration=time_ns[changed])],
-                rr.StateChange.columns(state=[_retuning_name(state) for state in states[changed]]),
-                strict=True,
-            )
+        """Send the drawings that are held; idempotent."""
+        for figure in self._figures:
+            figure.close()
 
     def write_events(self, events: Sequence[Event]) -> None:
         """Log events of retuning and alarms; `time_ns` is on the clock of the rows' `time_s`."""
-        if events:
-            self._write_text(
-                np.array([event.time_ns for event in events], dtype="timedelta64[ns]"),
-                [event_text(event) for event in events],
-                [
-                    rr.TextLogLevel.WARN if warns(event) else rr.TextLogLevel.INFO
-                    for event in events
-                ],
-            )
+        self._write_text(
+            np.array([event.time_ns for event in events]) * 1e-9,
+            [event_text(event) for event in events],
+            [rr.TextLogLevel.WARN if warns(event) else rr.TextLogLevel.INFO for event in events],
+        )
 
     def note(self, text: str) -> None:
         """Log a warning about the recording itself."""
-        self._recording.log(log_path(self._path), rr.TextLog(text, level=rr.TextLogLevel.WARN))
+        self._recording.log(f"{self._path}/{LOG}", rr.TextLog(text, level=rr.TextLogLevel.WARN))
+
+    def _write_states(
+        self, lane: str, time_s: FloatArray, states: FloatArray, name: Callable[..., str]
+    ) -> list[str]:
+        """Log states by name to a lane; returns the names."""
+        names = [name(*state) for state in states]
+        if names:
+            columns = rr.StateChange.columns(state=names)
+            send_at(self._recording, f"{self._path}/{lane}", time_s, columns)
+        return names
 
     def _write_text(
-        self,
-        time_ns: npt.NDArray[np.timedelta64],
-        texts: list[str],
-        levels: Sequence[rr.TextLogLevel],
+        self, time_s: FloatArray, texts: list[str], levels: Sequence[rr.TextLogLevel]
     ) -> None:
-        self._recording.send_columns(
-            log_path(self._path),
-            [rr.TimeColumn(TIMELINE, duration=time_ns)],
-            rr.TextLog.columns(text=texts, level=[str(level) for level in levels]),
-            strict=True,
-        )
+        if texts:
+            columns = rr.TextLog.columns(text=texts, level=[str(level) for level in levels])
+            send_at(self._recording, f"{self._path}/{LOG}", time_s, columns)
+
+
+def _changed(states: FloatArray, before: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which rows of states differ from the row before."""
+    changed: npt.NDArray[np.bool_] = (np.diff(states, axis=0, prepend=before) != 0).any(axis=1)
+    return changed
 
 
 def write_about(recording: rr.RecordingStream, about: Mapping[str, Any]) -> None:
@@ -235,18 +214,3 @@ def run_of(path: str) -> str:
     """Return the run's name from its entity path."""
     escaped = path.split("/", 2)[2]
     return _ESCAPE.sub(lambda m: chr(int(m["code"], 16)) if m["code"] else m["mark"], escaped)
-
-
-def state_path(path: str) -> str:
-    """Return the entity path of a run's state lane."""
-    return f"{path}/state"
-
-
-def retuning_path(path: str) -> str:
-    """Return the entity path of a run's lane of retuning."""
-    return f"{path}/retuning"
-
-
-def log_path(path: str) -> str:
-    """Return the entity path of a run's text log."""
-    return f"{path}/log"

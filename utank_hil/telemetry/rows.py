@@ -15,18 +15,11 @@ class RowWriter(RingWriter):
     Parameters
     ----------
     columns : sequence of str
-        Names of a row's values; one or more, all different.
+        One or more, all different.
     slots : int
         Rows in the ring. The default is seven minutes at 20 Hz, some 2 MB.
     about : mapping, optional
-        Where its rows come from (`utank_hil.base.provenance`).
-
-    Raises
-    ------
-    ValueError
-        If there are no columns, a name comes twice, or there are fewer than two slots.
-    RingError
-        As of `RingWriter`.
+        Where the rows come from (`utank_hil.base.provenance`).
     """
 
     def __init__(
@@ -47,8 +40,6 @@ class RowReader(RingReader):
 
     Attributes
     ----------
-    columns : tuple of str
-        Names of a row's values.
     about : mapping or None
         Where the rows come from, if the writer says.
     """

@@ -1,10 +1,11 @@
-"""The ship's section rolling, with the water in her tank: what a watch-keeper sees first.
+"""The ship's section rolling, with the water in its tank: what a watch-keeper sees first.
 
 Seen from aft, starboard to the right, centred in the ship's centre of gravity, to scale. The hull
 around the tank is a sketch; tank, water, and roll are as recorded. A light outline is the passive
 twin.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -24,12 +25,12 @@ NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip
 
-# shares of the tank's width: of a reservoir, of the hull beyond it, of the keel below the duct
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
+"""Of the sketch, in widths of the tank: reservoir, hull beyond it, keel below the duct."""
 _ARROW: Final = 0.6
 """Length of the arrow at the pump's greatest pressure, in widths of the tank."""
 LINES: Final = 8
-"""That the water in a reservoir is drawn with."""
+"""Lines that fill the water of a reservoir."""
 
 HULL, TWIN, WATER = (0xE0, 0xE0, 0xE0), (0x70, 0x70, 0x70), (0x56, 0xB4, 0xE9)
 LIMIT, PUMP, SEA = (0xF0, 0xE4, 0x42), (0xA0, 0x28, 0x00), (0x2A, 0x5C, 0x7A)
@@ -133,27 +134,54 @@ class SceneSize:
         return vectors, [0.0, self.lz_m] - vectors / 2
 
 
-def due_rows(time_s: FloatArray, due_s: float, step_s: float) -> tuple[list[int], float]:
-    """Indices of rows at least a step apart, of rising times, and when the next one is due."""
-    found: list[int] = []
-    while (at := int(np.searchsorted(time_s, due_s - 1e-9))) < len(time_s):
-        found.append(at)
-        due_s = time_s[at] + step_s
-    return found, due_s
+class Figure(ABC):
+    """A figure that is drawn anew in even steps of time.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        Names of a row's values.
+    step_s : float
+        Between two drawings.
+    batch_s : float
+        Drawings are sent when there are as many seconds of them, the last ones by `close`: a chunk
+        of few costs a file more than its content.
+    """
+
+    def __init__(self, columns: Sequence[str], step_s: float, batch_s: float) -> None:
+        self._at = {name: columns.index(name) for name in columns}
+        self._step_s, self._due_s = step_s, -np.inf
+        self._held: list[FloatArray] = []
+        self._most_held = batch_s / step_s
+
+    def write(self, rows: FloatArray) -> None:
+        """Take rows, of rising times, and draw what is due within them."""
+        time_s = rows[:, self._at["time_s"]]
+        while (at := int(np.searchsorted(time_s, self._due_s - 1e-9))) < len(time_s):
+            self._held.append(rows[at])
+            self._due_s = time_s[at] + self._step_s
+        if len(self._held) >= self._most_held:
+            self.close()
+
+    def close(self) -> None:
+        """Send what is held; idempotent."""
+        if self._held:
+            rows = np.stack(self._held)
+            self._held.clear()
+            self._draw(rows)
+
+    @abstractmethod
+    def _draw(self, rows: FloatArray) -> None:
+        """Send the drawings of these rows."""
 
 
-class Scene:
+class Scene(Figure):
     """Writes the scene of one run.
 
     Parameters
     ----------
     path : str
         Entity path of the run.
-    columns : sequence of str
-        Names of a row's values.
-    batch_s : float
-        Pictures are sent when there are so many seconds of them, the last ones by `close`: a chunk
-        of few costs a file more than its content.
     alone : bool
         Whether no other ship is shown beside, so that there is room for larger words.
     """
@@ -167,18 +195,16 @@ class Scene:
         batch_s: float,
         alone: bool,
     ) -> None:
+        super().__init__(columns, PERIOD_S, batch_s)
         self._recording, self._path, self._size = recording, path, size
         self._large = "#### " if alone else ""
-        self._at = {name: columns.index(name) for name in columns}
-        self._held: list[FloatArray] = []
-        self._most_held = batch_s / PERIOD_S
-        self._due_s = self._words_due_s = -np.inf
+        self._words_due_s = -np.inf
         self._said: tuple[float, float] = (np.nan, np.nan)
         self._stand()
 
     def _stand(self) -> None:
         """Log what stays as it is: the ship's parts, upright, and how what moves looks."""
-        size, place = self._size, scene_path(self._path)
+        size, place = self._size, f"{self._path}/scene"
         thin = 0.004 * size.width_m
         column = 0.7 * RESERVOIR * size.width_m / LINES
         strips, sea = rr.LineStrips2D, [[-3 * size.reach_m, 0.0], [3 * size.reach_m, 0.0]]
@@ -197,31 +223,8 @@ class Scene:
         ):
             self._recording.log(f"{place}/{name}", looks, static=True, strict=True)
 
-    def write(self, rows: FloatArray) -> None:
-        """Append the pictures and words that are due within these rows."""
-        due, self._due_s = due_rows(rows[:, self._at["time_s"]], self._due_s, PERIOD_S)
-        self._held += list(rows[due])
-        if len(self._held) >= self._most_held:
-            self.close()
-
-    def close(self) -> None:
-        """Send what is held; idempotent."""
-        if not self._held:
-            return
-        rows = np.stack(self._held)
-        self._held.clear()
-        self._draw(rows)
-        told = rows[[self._is_news(row) for row in rows]]
-        if len(told):
-            words = [self._words(row) for row in told]
-            self._recording.send_columns(
-                words_path(self._path),
-                [self._times(told)],
-                rr.TextDocument.columns(text=words, media_type=["text/markdown"] * len(told)),
-            )
-
     def _draw(self, rows: FloatArray) -> None:
-        """Send what moves: the turn of ship and twin, and in the ship's own axes water and pump."""
+        """Send what moves: the turn of ship and twin, in the ship's axes water and pump; words."""
         size = self._size
         roll, twin, port, starboard, pressure = (rows[:, self._at[name]] for name in NEEDED)
         roll = np.nan_to_num(roll)
@@ -229,24 +232,24 @@ class Scene:
         self._turn("twin", rows, np.where(np.isfinite(twin), twin, roll))
         water = size.water(np.nan_to_num(port), np.nan_to_num(starboard))
         strips = rr.LineStrips2D.columns(strips=list(water.reshape(-1, 2, 2)))
-        self._send("ship/water", rows, strips.partition([water.shape[1]] * len(rows)))
+        self._send("scene/ship/water", rows, strips.partition([water.shape[1]] * len(rows)))
         if size.pressure_pa:
             vectors, origins = size.arrow(np.nan_to_num(pressure))
-            self._send("ship/pump", rows, rr.Arrows2D.columns(vectors=vectors, origins=origins))
+            arrows = rr.Arrows2D.columns(vectors=vectors, origins=origins)
+            self._send("scene/ship/pump", rows, arrows)
+        news = rows[[self._is_news(row) for row in rows]]
+        if len(news):
+            words = [self._words(row) for row in news]
+            markdown = ["text/markdown"] * len(news)
+            self._send("words", news, rr.TextDocument.columns(text=words, media_type=markdown))
 
     def _turn(self, name: str, rows: FloatArray, roll_rad: FloatArray) -> None:
         """Turn a part of the scene, and what lies below it, to starboard."""
         turns = [rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=angle) for angle in roll_rad]
-        self._send(name, rows, rr.Transform3D.columns(rotation_axis_angle=turns))
+        self._send(f"scene/{name}", rows, rr.Transform3D.columns(rotation_axis_angle=turns))
 
     def _send(self, name: str, rows: FloatArray, columns: rr.ComponentColumnList) -> None:
-        self._recording.send_columns(
-            f"{scene_path(self._path)}/{name}", [self._times(rows)], columns
-        )
-
-    def _times(self, rows: FloatArray) -> rr.TimeColumn:
-        time_ns = np.rint(rows[:, self._at["time_s"]] * 1e9).astype("timedelta64[ns]")
-        return rr.TimeColumn(TIMELINE, duration=time_ns)
+        send_at(self._recording, f"{self._path}/{name}", rows[:, self._at["time_s"]], columns)
 
     def _is_news(self, row: FloatArray) -> bool:
         """Whether words are due, or say another mode or fault than before."""
@@ -279,17 +282,16 @@ class Scene:
         return "\n\n".join(lines)
 
 
-def scene_path(path: str) -> str:
-    """Entity path of a run's scene."""
-    return f"{path}/scene"
-
-
-def words_path(path: str) -> str:
-    """Entity path of a run's words."""
-    return f"{path}/words"
+def send_at(
+    recording: rr.RecordingStream, path: str, time_s: FloatArray, columns: rr.ComponentColumnList
+) -> None:
+    """Send rows of components to an entity, at times since the run's start."""
+    time_ns = np.rint(time_s * 1e9).astype("timedelta64[ns]")
+    index = rr.TimeColumn(TIMELINE, duration=time_ns)
+    recording.send_columns(path, [index], columns, strict=True)
 
 
 def scene_size(columns: Sequence[str], about: Mapping[str, Any] | None) -> SceneSize | None:
-    """What these columns show of the ship that they come from; None where it is not known."""
+    """The size of the ship that these columns show; None where it is not known."""
     shown = {*NEEDED, "time_s", "mode", "fault"} <= set(columns)
     return SceneSize.of(about) if shown else None

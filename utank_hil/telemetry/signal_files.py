@@ -35,12 +35,14 @@ _OTHER_UNITS: Final = {
     "_mbar": ("_pa", 1e2),
     "_mpa": ("_pa", 1e6),
 }
-"""Units of tables beside those in which the project shows values: column and SI value per unit."""
+"""Units of tables beside those that are shown: ending of the column, SI value of the unit."""
 _LEVEL_OF_GAUGES: Final = ("port_level_m", "starboard_level_m")
 _JITTER: Final = 0.25
-"""A row may be so much of a step away from where even steps put it."""
+"""Distance of a row from where even steps put it, in steps, up to which they are even."""
 _GAP: Final = 1.5
+"""Steps from which on rows are missing between two."""
 _RATE: Final = 1e-3
+"""Relative error of a logger's clock that is passed over: ten times a poor quartz's."""
 
 
 class SignalFileError(ValueError):
@@ -55,7 +57,7 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
     path : Path
         One of `SUFFIXES`.
     note : callable, optional
-        Is told where a frame log is cut or damaged; what follows in that file is left out.
+        Called with the place where a frame log is cut or damaged; what follows is left out.
 
     Raises
     ------
@@ -71,23 +73,22 @@ def read_signals(path: Path, note: Callable[[str], None] | None = None) -> dict[
 
         return read_recording(path)
     if suffix == SUFFIX:
-        return {path.stem: signal_table(entries_of(FrameLog(path).blocks(note)))}
-    if suffix in BUS_SUFFIXES:
-        return {path.stem: signal_table(read_bus_log(path))}
-    if suffix == ".csv":
-        return {path.stem: _read_csv(path)}
-    if suffix == ".parquet":
-        return {path.stem: _read_parquet(path)}
-    raise SignalFileError(f"{path}: holds no signals that can be read: give {_listed(SUFFIXES)}")
+        columns = signal_table(entries_of(FrameLog(path).blocks(note)))
+    elif suffix in BUS_SUFFIXES:
+        columns = signal_table(read_bus_log(path))
+    elif suffix in TABLE_SUFFIXES:
+        columns = _read_csv(path) if suffix == ".csv" else _read_parquet(path)
+    else:
+        raise SignalFileError(
+            f"{path}: holds no signals that can be read: give {_listed(SUFFIXES)}"
+        )
+    return {path.stem: columns}
 
 
 def write_signals(path: Path, columns: Mapping[str, FloatArray]) -> None:
     """Write columns as a table, exactly; NaN is an empty field of a CSV and a null of Parquet.
 
-    Parameters
-    ----------
-    path : Path
-        Overwritten; ``.csv`` or ``.parquet``.
+    The suffix says which; an existing file is overwritten.
     """
     if path.suffix.lower() == ".parquet":
         import pyarrow
@@ -116,7 +117,7 @@ def even_rows(
     Parameters
     ----------
     path : Path
-        Where it comes from, for errors.
+        Source of the table, for errors.
     sample_time_s : float
         Of the law that is to be identified for.
     from_s, to_s : float, optional
@@ -141,57 +142,49 @@ def even_rows(
     if len(kept) < 3:
         raise SignalFileError(f"{path}: {len(kept)} rows between {low:g} and {high:g} s: too few")
     part_s = time_s[kept]
+
+    def refused(row: int, reason: str) -> SignalFileError:
+        return SignalFileError(f"{path}: {_line(path, kept, row)}{reason}")
+
     if not np.isfinite(part_s).all():
-        where = _line(path, kept, int(np.flatnonzero(~np.isfinite(part_s))[0]))
-        raise SignalFileError(f"{path}: {where} has no time: fill in time_s, or remove the line")
+        row = int(np.flatnonzero(~np.isfinite(part_s))[0])
+        raise refused(row, " has no time: fill in time_s, or remove the line")
     steps_s = np.diff(part_s)
-    if (steps_s <= 0).any():
-        at = int(np.flatnonzero(steps_s <= 0)[0]) + 1
-        raise SignalFileError(
-            f"{path}: {_line(path, kept, at)}: time_s goes from {part_s[at - 1]:g} to "
-            f"{part_s[at]:g}: times must rise; sort the rows, and keep one of each time"
-        )
     usual_s = float(np.median(steps_s))
-    if (steps_s > _GAP * usual_s).any():
-        at = int(np.flatnonzero(steps_s > _GAP * usual_s)[0]) + 1
-        raise SignalFileError(
-            f"{path}: {_line(path, kept, at)}: time_s goes from {part_s[at - 1]:g} to "
-            f"{part_s[at]:g}, a gap where rows are {usual_s:g} s apart: fill it, or leave it out "
-            f"by --from {part_s[at]:g} or --to {part_s[at - 1]:g}"
-        )
+    for wrong, reason in (
+        (steps_s <= 0, ": times must rise; sort the rows, and keep one of each time"),
+        (
+            steps_s > _GAP * usual_s,
+            f", a gap where rows are {usual_s:g} s apart: fill it, or leave it out by --from "
+            "{after:g} or --to {before:g}",
+        ),
+    ):
+        if wrong.any():
+            row = int(np.flatnonzero(wrong)[0]) + 1
+            before, after = part_s[row - 1], part_s[row]
+            reason = reason.format(before=before, after=after)
+            raise refused(row, f": time_s goes from {before:g} to {after:g}{reason}")
     number = np.arange(len(part_s))
-    per_sample = max(1, round(sample_time_s / usual_s))
-    step_s = sample_time_s / per_sample
-    kept_columns: Columns = {name: values[kept] for name, values in columns.items()}
+    step_s = sample_time_s / max(1, round(sample_time_s / usual_s))
     off_s = part_s - step_s * number
-    if np.abs(off_s - off_s.mean()).max() > _JITTER * step_s:
-        _refuse_steps(path, kept, part_s, sample_time_s)
+    if np.abs(off_s - off_s.mean()).max() > _JITTER * step_s:  # or their clock is a bit off
+        own_step_s, begin_s = np.polyfit(number, part_s, 1)
+        off_s = np.abs(part_s - begin_s - own_step_s * number)
+        if off_s.max() > _JITTER * own_step_s:
+            reason = f"even steps of {own_step_s:.4g} s: resample the table to even steps"
+            raise refused(
+                int(off_s.argmax()), f": time_s is {off_s.max():.2g} s away from {reason}"
+            )
+        if abs(round(sample_time_s / own_step_s) * own_step_s / sample_time_s - 1) > _RATE:
+            raise refused(
+                0,
+                f" and on: rows are {own_step_s:.4g} s apart, and the law's sample time, "
+                f"{sample_time_s:g} s, is no whole number of such steps: resample to a part of it, "
+                "or give a configuration whose law has another sample time",
+            )
+    kept_columns: Columns = {name: values[kept] for name, values in columns.items()}
     kept_columns["time_s"] = np.multiply(number, step_s, dtype=np.float64)
     return kept_columns
-
-
-def _refuse_steps(path: Path, rows: Any, time_s: FloatArray, sample_time_s: float) -> None:
-    """Refuse times that are not on the grid of the samples, unless only their clock is a bit off.
-
-    Raises
-    ------
-    SignalFileError
-        If they are uneven, or even with a step that the sample time is no multiple of.
-    """
-    number = np.arange(len(time_s))
-    step_s, begin_s = np.polyfit(number, time_s, 1)
-    off_s = np.abs(time_s - begin_s - step_s * number)
-    if off_s.max() > _JITTER * step_s:
-        raise SignalFileError(
-            f"{path}: {_line(path, rows, int(off_s.argmax()))}: time_s is {off_s.max():.2g} s away "
-            f"from even steps of {step_s:.4g} s: resample the table to even steps"
-        )
-    if abs(round(sample_time_s / step_s) * step_s / sample_time_s - 1) > _RATE:
-        raise SignalFileError(
-            f"{path}: {_line(path, rows, 0)} and on: rows are {step_s:.4g} s apart, and the law's "
-            f"sample time, {sample_time_s:g} s, is no whole number of such steps: resample to a "
-            "part of it, or give a configuration whose law has another sample time"
-        )
 
 
 def require(path: Path, columns: Mapping[str, FloatArray], *names: str) -> None:
@@ -258,31 +251,21 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 
 def _numbers(path: Path, names: list[str], lines: Any) -> Iterator[list[float]]:
-    for row in lines:
-        if not row:
-            continue
+    for row in filter(None, lines):
         if len(row) != len(names):
             raise SignalFileError(
                 f"{path}: line {lines.line_num} has {len(row)} fields, line 1 names {len(names)}"
             )
-        try:
-            yield [float(field) if field.strip() else math.nan for field in row]
-        except ValueError:
-            name, field = next(
-                (n, f) for n, f in zip(names, row, strict=True) if f.strip() and not _is_number(f)
-            )
-            comma = "; write decimals with a point" if "," in field else ""
-            raise SignalFileError(
-                f"{path}: line {lines.line_num}, {name}: {field!r} is no number{comma}"
-            ) from None
-
-
-def _is_number(field: str) -> bool:
-    try:
-        float(field)
-    except ValueError:
-        return False
-    return True
+        numbers = []
+        for name, field in zip(names, row, strict=True):
+            try:
+                numbers.append(float(field) if field.strip() else math.nan)
+            except ValueError:
+                comma = "; write decimals with a point" if "," in field else ""
+                raise SignalFileError(
+                    f"{path}: line {lines.line_num}, {name}: {field!r} is no number{comma}"
+                ) from None
+        yield numbers
 
 
 def _read_parquet(path: Path) -> Columns:

@@ -13,21 +13,22 @@ from urllib.parse import quote, urlsplit
 from utank_hil.base.closing import Closing
 
 TIMELINE: Final = "time"
-"""Of all recordings."""
-_TRIES: Final = 20
-_PAUSE_S: Final = 0.5
-LOOPBACK: Final = "127.0.0.1"  # Rerun's own default is every interface
+"""Name of the time line of all recordings."""
+_TRIES, _PAUSE_S = 20, 0.5
+"""How long a viewer that starts is asked to move its cursor: ten seconds."""
+LOOPBACK: Final = "127.0.0.1"
+"""Where viewers listen; Rerun's own default is every interface."""
 
 
 class Viewer(Closing):
-    """A running viewer; `open_viewer` makes one.
+    """A running viewer, made by `open_viewer`.
 
     Attributes
     ----------
     url : str or None
         Address for a browser; None if the viewer has its own window.
     ports : tuple of int
-        That such a browser needs, all on loopback.
+        Ports on loopback that such a browser needs.
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class Viewer(Closing):
         self.ports = ports
 
     def wait(self, longest_s: float) -> bool:
-        """Wait for its end; returns whether it has ended: the user closed the window, or it failed.
+        """Wait for the end of the viewer; returns whether it ended, closed or failed.
 
         One in a browser goes on until `close`.
         """
