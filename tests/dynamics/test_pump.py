@@ -236,6 +236,13 @@ def test_small_pump_at_its_torque_limit_stays_steady_at_the_longest_step():
     assert torque == pytest.approx(weak.max_torque_nm, rel=1e-3)
 
 
+def test_power_of_a_long_first_step_is_the_energy_of_the_rotor():
+    """From rest without flow all work goes into the rotor; the end speed would give twice it."""
+    state = pump_step(AT_REST, 20e3, 0.0, 0.02, C)
+    kinetic = PUMP.inertia_kg_m2 * state.speed_rad_s**2 / 2
+    assert state.power_w * 0.02 == pytest.approx(kinetic, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_work_of_the_shaft_goes_into_water_losses_and_the_rotor():
     step_s = 1e-4

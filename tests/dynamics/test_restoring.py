@@ -37,6 +37,14 @@ def test_energy_is_the_work_of_the_moment(ship):
     np.testing.assert_allclose(slope, table.moment_nm(roll), rtol=1e-4, atol=1.0)
 
 
+def test_levers_of_a_ship_with_other_figures_scale_with_its_stiffness():
+    stiffer = LEVERS.with_figures(LEVERS.inertia_kg_m2, 1.2 * LEVERS.stiffness_nm_rad, 0.0)
+    roll = np.linspace(-1.5, 1.5, 61)
+    np.testing.assert_allclose(
+        restoring(stiffer).moment_nm(roll), 1.2 * restoring(LEVERS).moment_nm(roll), atol=1e-6
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

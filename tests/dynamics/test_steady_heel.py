@@ -9,7 +9,7 @@ import pytest
 
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.dynamics import RollModel, simulate
-from utank_hil.dynamics.steady_heel import greatest_held_pa, righting_range, steady_heel
+from utank_hil.dynamics.steady_heel import _at_rest, greatest_held_pa, righting_range, steady_heel
 
 SHIPS = Path("configs/ships")
 RISE_S, HOLD_S = 1000.0, 200.0
@@ -37,6 +37,19 @@ def test_pressure_that_rises_slowly_ends_there(name: str, share: float) -> None:
     state, _ = left_alone(model, pressure_pa)
     assert heel.roll_rad == pytest.approx(state[0], rel=2e-3)
     assert heel.at_the_end == (abs(state[2]) > 0.999 * given.tank.level_limit_m)
+
+
+def test_water_of_a_held_heel_is_at_rest_at_its_level() -> None:
+    given = vessel("thesis_first")
+    model, pressure_pa = RollModel(given.ship, given.tank), 5e3
+    heels = np.radians([0.0, 10.0, 30.0, 50.0])
+    _, level_m = _at_rest(model, heels, pressure_pa)
+    still = np.zeros_like(heels)
+    states = np.stack([heels, still, level_m, still], axis=-1)
+    _, roll, _, level = model.derivative(states, pressure_pa).T
+    c = model.coefficients
+    force_n = c.level_inertia * level + c.coupling * roll  # what is left of weight and pressure
+    np.testing.assert_allclose(force_n, 0.0, atol=1e-6 * c.area * pressure_pa)
 
 
 def test_water_at_the_roof_holds_less_than_the_pump_could() -> None:

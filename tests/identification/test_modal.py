@@ -6,6 +6,8 @@ import control
 import numpy as np
 import pytest
 from cramer_rao import cramer_rao
+from hypothesis import given
+from hypothesis import strategies as st
 from roll_plant import FAST_PUMP, SLOW_PUMP, Plant, noisy, plant, pulses
 
 from utank_hil.base.arrays import FloatArray
@@ -20,6 +22,7 @@ from utank_hil.identification import (
     modal_parameters,
     okid,
 )
+from utank_hil.identification.modal import _frequency_and_damping_std
 
 pytestmark = pytest.mark.slow
 
@@ -66,6 +69,19 @@ def test_confidence_is_refused_where_poles_do_not_move_to_first_order() -> None:
     markov[2] = 1.0  # a delay: two poles at zero
     with pytest.raises(IdentificationError, match="order 2 has poles that coincide"):
         modal_confidence(replace(result, markov=markov), 2)
+
+
+@given(st.floats(-2.0, -0.01), st.floats(0.1, 2.0), st.floats(-1, 1), st.floats(-1, 1))
+def test_deviations_of_frequency_and_damping_follow_a_pole_that_moves(
+    real: float, imaginary: float, to_real: float, to_imaginary: float
+) -> None:
+    pole, move = complex(real, imaginary), np.array([to_real, to_imaginary])
+    found = _frequency_and_damping_std(pole, np.outer(move, move))
+    step = 1e-6
+    ahead, behind = (pole + sign * step * complex(*move) for sign in (1, -1))
+    of_frequency = (abs(ahead) - abs(behind)) / (2 * step)
+    of_damping = (behind.real / abs(behind) - ahead.real / abs(ahead)) / (2 * step)
+    assert found == pytest.approx((abs(of_frequency), abs(of_damping)), abs=1e-6)
 
 
 def test_orthogonal_shapes_have_no_assurance() -> None:

@@ -43,6 +43,8 @@ def test_loading_and_waves_are_found_while_the_pump_works(period_s, inertia):
     )
     assert found.deviation[0] < 0.02
     assert found.period_deviation < 0.02
+    # stiffness and inertia err together, so that the period is known better than either
+    assert found.period_deviation < 0.5 * np.hypot(*found.deviation[:2])
     assert found.waves.rms_rad * found.ship.stiffness_nm_rad == pytest.approx(true_nm, rel=0.1)
     assert found.clear > 0.9
 
@@ -80,6 +82,13 @@ def test_noise_alone_is_not_clear():
     rng = np.random.default_rng(1)
     noise = rng.standard_normal((6000, 3)) * [2e-4, 5e-4, 3.5e-3]
     assert fit_motion(noise, PLANT, SAMPLE_TIME_S, KNOWN_SPREAD).clear < 0.5
+
+
+def test_noise_of_the_level_gauge_is_not_taken_for_waves():
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((6000, 3)) * [2e-8, 5e-8, 3.5e-2]
+    # through the water's weight it looks like a moment of 1e-4 rad; most of it is taken off
+    assert fit_motion(noise, PLANT, SAMPLE_TIME_S, KNOWN_SPREAD).waves.rms_rad < 5e-5
 
 
 def test_the_configured_ship_is_only_where_the_search_begins():

@@ -22,6 +22,14 @@ def write(file: Path, omega: np.ndarray, heading_deg: np.ndarray) -> Path:
     return file
 
 
+def test_a_wave_from_starboard_heels_the_other_way(tmp_path: Path) -> None:
+    file = write(tmp_path / "table.csv", np.array([0.5, 1.0]), np.array([0.0, 90.0, 180.0]))
+    table, omega = MomentTable.read(file), np.array([0.7])
+    from_port, from_starboard = (table.moment(omega, np.array([side])) for side in (1.1, -1.1))
+    assert abs(from_port[0]) > 0
+    assert from_starboard == pytest.approx(-from_port, rel=1e-12)
+
+
 @pytest.mark.evidence
 def test_table_of_the_effective_slope_gives_its_moment_from_either_side(tmp_path: Path) -> None:
     omega, heading = np.linspace(0.1, 9.0, 900), np.linspace(0, 180, 181)
