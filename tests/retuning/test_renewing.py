@@ -270,7 +270,7 @@ def test_a_law_that_rolls_her_away_is_dropped_at_once() -> None:
         begin = rig.samples
         rig.wave = lambda k, times=times: times  # type: ignore[misc]
         rig.run_until(REFUSED)
-        assert ("from her heel on trial" in rig.reasons) is at_once
+        assert ("from the heel before" in rig.reasons) is at_once
         assert (rig.samples - begin < 15) is at_once  # three seconds
 
 
@@ -347,7 +347,7 @@ def test_the_pump_rests_when_the_law_loses_and_for_ten_minutes() -> None:
     assert rig.controller.excused
     begin = rig.samples - int(np.argmax(np.array(rig.commands[::-1]) != 0))
     assert 251 <= begin <= 256
-    assert "times what she would with the pump at rest" in rig.reasons
+    assert "times what it would with the pump at rest" in rig.reasons
     assert rig.states == [IDLE]
     rig.run_until_it_acts()
     assert rig.samples - begin == pytest.approx(RETRY_NS / SAMPLE_NS, abs=2)

@@ -1,4 +1,4 @@
-"""The heel at which a ship comes to rest under steady moments and pressure; how far she rights."""
+"""The heel at which a ship comes to rest under steady moments and pressure; its righting range."""
 
 import math
 from dataclasses import replace
@@ -27,14 +27,14 @@ class SteadyHeel(NamedTuple):
 
 
 class RightingRange(NamedTuple):
-    """How far a ship rights herself with the water at rest in her tank.
+    """How far a ship rights itself with the water at rest in its tank.
 
     Attributes
     ----------
     greatest_rad : float
         Heel of the greatest righting moment.
     vanishing_rad : float
-        Heel from which she capsizes; infinite where there is none up to 90 degrees.
+        Heel from which it capsizes; infinite where there is none up to 90 degrees.
     """
 
     greatest_rad: float
@@ -42,7 +42,7 @@ class RightingRange(NamedTuple):
 
 
 def righting_range(model: RollModel) -> RightingRange:
-    """The righting range of a ship, without her steady moments."""
+    """The righting range of a ship, without its steady moments."""
     push, _ = _at_rest(upright(model), _HEELS_RAD, 0.0)
     over = np.flatnonzero(push[1:] > 0)
     vanishing_rad = float(_HEELS_RAD[1 + over[0]]) if over.size else math.inf
@@ -51,9 +51,9 @@ def righting_range(model: RollModel) -> RightingRange:
 
 
 def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> float:
-    """The greatest pressure up to `most_pa` that heels a ship by so much at most if it is held.
+    """The greatest pressure up to `most_pa` that, held, heels a ship by `within_rad` at most.
 
-    Without her steady moments; it may be raised slowly only.
+    Without its steady moments; it may be raised slowly only.
     """
     model = upright(model)
 
@@ -74,7 +74,7 @@ def greatest_held_pa(model: RollModel, most_pa: float, within_rad: float) -> flo
 
 
 def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None:
-    """Where a ship comes to rest to the side to which she is pushed; None if she capsizes.
+    """Where a ship comes to rest to the side to which it is pushed; None if it capsizes.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def steady_heel(model: RollModel, pressure_pa: float = 0.0) -> SteadyHeel | None
 
 
 def upright(model: RollModel) -> RollModel:
-    """A ship without her steady moments."""
+    """A ship without its steady moments."""
     ship = replace(model.ship, offset_moment_nm=0.0, wind_moment_nm=0.0)
     return RollModel(ship, model.tank)
 

@@ -1,4 +1,4 @@
-"""Ship and wave moment from the motion alone, with the tank at work and nobody stimulating.
+"""Ship and wave moment from the motion alone, with the tank at work and no excitation.
 
 The roll equation of the linear model holds with any pump and any law, because the water's level is
 measured. With the coefficients of roll and level at a frequency it gives the wave moment::
@@ -45,9 +45,9 @@ from utank_hil.sea import SlopeSpectrum
 SPREAD: Final = (0.7, 0.1, 0.5)
 """Prior deviations of the logarithms of stiffness, inertia and damping, for any loading."""
 KNOWN_SPREAD: Final = (0.02, 0.02, 0.3)
-"""The same of a ship that is known."""
+"""Prior deviations of a ship that is known: consumption and trim of a voyage."""
 BAND: Final = (0.25, 3.2)
-"""Frequencies that tell of the ship, over the given ship's natural frequency."""
+"""Band of the frequencies used for the ship, over the given ship's natural frequency."""
 TOP_RAD_S: Final = 2.4
 """The spectrum reaches to here, or to the end of `BAND`; beyond it waves have no height."""
 RESOLUTION: Final = 0.03

@@ -118,7 +118,10 @@ def okid(
     Parameters
     ----------
     u : array_like, shape (N, r) or (N,)
-        Applied inputs (after limits).
+        Applied inputs (after limits). Row k is what acted between the measurements of rows k - 1
+        and k of `y`, as a controller's record has it: a law designed on the model then answers row
+        k of `y` with row k + 1 of `u`, at once. If row k of `u` acted after row k of `y`, as in
+        simulations with a held input, the law's command has to be applied one sample later.
     y : array_like, shape (N, m) or (N,)
         Outputs. A row with a value that is not finite is a gap; gaps must keep their rows, since
         the row index is time. Join separate records with one such row between them.

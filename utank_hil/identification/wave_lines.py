@@ -30,7 +30,7 @@ def find_disturbance_frequencies(
     u: FloatArray,
     y: FloatArray,
     sample_time_s: float,
-    most: int = 1,
+    most: int = 3,
     band_rad_s: tuple[float, float] = (0.2, 2.0),
 ) -> tuple[float, ...]:
     """Frequencies of sinusoidal disturbances, an argument of `okid`.
@@ -41,7 +41,7 @@ def find_disturbance_frequencies(
     y : array_like, shape (N, m) or (N,)
         NaN rows are gaps, as in `okid`.
     most : int
-        Largest number of lines.
+        Largest number of lines; the search ends where no further one is significant.
     band_rad_s : tuple of float
         Search band.
 

@@ -1,4 +1,4 @@
-"""A controller that retunes itself: it identifies the ship by pulses and asks for a law for her.
+"""A controller that retunes itself: it identifies the ship by pulses and asks for a law for it.
 
 `LawExchange` has the states. There is one more:
 
@@ -36,7 +36,7 @@ _IDENTIFY: Final = RetuningState.IDENTIFY
 
 
 class AdaptiveController(LawExchange):
-    """A controller that identifies its ship and has its law designed for her.
+    """A controller that identifies its ship and has its law designed for it.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class AdaptiveController(LawExchange):
         return self.state is _IDENTIFY
 
     def note(self, estimate: MotionEstimate) -> None:
-        """Take what the motion tells of the ship."""
+        """Take an estimate of the ship."""
         for law in self.laws.stepped:
             law.monitor.watch(estimate)
 
@@ -121,7 +121,7 @@ class AdaptiveController(LawExchange):
             self._tries = 0  # back to normal: the next change is a new one
         else:
             change = self.laws.accepted.monitor.change
-            return f"the ship has changed: her roll is another by a factor of {change:.2f}"
+            return f"the ship has changed: its roll is another by a factor of {change:.2f}"
         return ""
 
     @property

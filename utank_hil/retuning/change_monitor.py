@@ -1,6 +1,6 @@
 """Whether the ship is still the one that a law was made for.
 
-Compares the ship that the motion tells (`MotionEstimate`) with the law's, whatever the sea is. A
+Compares the estimated ship (`MotionEstimate`) with the law's, whatever the sea is. A
 difference counts where it exceeds three standard deviations, and in either direction, and where the
 estimate before it was of the same ship.
 """
@@ -36,7 +36,7 @@ class ChangeMonitor:
         self.change = 1.0
 
     def watch(self, estimate: MotionEstimate) -> None:
-        """Take a new estimate; one that does not tell the ship changes nothing.
+        """Take a new estimate; one without a good ship changes nothing.
 
         When estimates are outdated, no change is known any more.
         """

@@ -78,7 +78,7 @@ class MotionEstimate:
         Whether the estimate of waves and ship is good, and if not, why.
     ship : ShipFigures or None
         The ship found; where `of_ship` is not good, the known one that the waves rest on. None if
-        there is nothing to tell.
+        nothing was found.
     waves : SlopeSpectrum or None
         Wave moment per stiffness of that ship.
     rms_deviation : float

@@ -56,11 +56,11 @@ class EstimateTask:
 
 
 def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
-    """Tell waves and ship from a record.
+    """Estimate waves and ship from a record.
 
     The ship is fitted to the whole record and to its last half. Where they contradict each other
-    she was loaded meanwhile, and the half counts. Where the motion does not tell the ship, the
-    waves are those of the known one, and uncertain if another would explain the motion far better.
+    the ship was loaded meanwhile, and the half counts. Where the motion does not identify the ship,
+    the waves are those of the known one, and uncertain if another explains the motion far better.
     """
     known, record = request.ship, request.record
     period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
@@ -74,9 +74,9 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     half = motion[len(motion) // 2 :]
     if len(half) >= least:
         late = fit_motion(half, task.plant, task.sample_time_s)
-        if _told(late, task) and (_apart(late, fit) or not _told(fit, task)):
+        if _identified(late, task) and (_apart(late, fit) or not _identified(fit, task)):
             fit, motion = late, half
-    of_ship = Verdict.GOOD if _told(fit, task) else Verdict.UNCERTAIN
+    of_ship = Verdict.GOOD if _identified(fit, task) else Verdict.UNCERTAIN
     contradicted = False
     if of_ship is not Verdict.GOOD:
         likeliest = fit.log_likelihood
@@ -92,9 +92,9 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     if fit.clear < LEAST_CLEAR:
         return MotionEstimate(Verdict.MOTION_SMALL, Verdict.MOTION_SMALL)
     ship, waves = fit.ship, fit.waves
-    sea_told = fit.rms_deviation <= SEA_DEVIATION and not contradicted
+    sea_known = fit.rms_deviation <= SEA_DEVIATION and not contradicted
     return MotionEstimate(
-        Verdict.GOOD if sea_told else Verdict.UNCERTAIN,
+        Verdict.GOOD if sea_known else Verdict.UNCERTAIN,
         of_ship,
         ShipFigures(
             ship.stiffness_nm_rad,
@@ -114,7 +114,7 @@ def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
 _MOTION: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
-def _told(fit: MotionFit, task: EstimateTask) -> bool:
+def _identified(fit: MotionFit, task: EstimateTask) -> bool:
     factor = fit.ship.natural_frequency_rad_s / task.plant.ship.natural_frequency_rad_s
     return bool(
         fit.deviation[0] <= STIFFNESS_DEVIATION

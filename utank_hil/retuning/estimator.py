@@ -1,4 +1,4 @@
-"""The estimator's end in the loop: keeps the motion's record and asks what it tells.
+"""The estimator's end in the loop: keeps the motion's record and asks for estimates from it.
 
 Every `every_s` the record goes to the retuner's process (`estimating`). Nothing is stimulated and
 nothing waits.
@@ -27,9 +27,10 @@ COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
 SAMPLE_TIME_S: Final = 0.2
 LONGEST_RECORD_S: Final = 3600.0
 OUTDATED: Final = 3.0
-"""An estimate is outdated after so many intervals without another."""
+"""Intervals without another estimate after which the last one is outdated: two may fail."""
 SHIP_OUTDATED_S: Final = 3600.0
-"""What a ship was identified as is shown for so long, or for three intervals if that is longer."""
+"""Time for which an identified ship is shown, or three intervals if that is longer: within an hour
+loading and tanks hardly change a ship at sea."""
 GM_DEVIATIONS: Final = 2.0
 """Standard deviations below the metacentric height at which its interval ends."""
 
@@ -72,7 +73,7 @@ class EstimateSettings:
 
 @dataclass(slots=True)
 class EstimateFigures:
-    """What panels and telemetry show of the estimates; NaN while there is nothing to tell.
+    """What panels and telemetry show of the estimates; NaN while nothing is known.
 
     Attributes
     ----------
@@ -87,10 +88,10 @@ class EstimateFigures:
     roll_period_s, roll_period_deviation_s : float
         Of the last ship that was identified, without tank water; NaN when that is too long ago.
     gm_m, gm_deviation_m : float
-        Her metacentric height with the tank's water free to move; NaN also where the displacement
-        is not known.
+        Metacentric height of the ship with the tank's water free to move; NaN also where the
+        displacement is not known.
     ship_age_s : float
-        Time since the end of the record that identified her.
+        Time since the end of the record that identified the ship.
     gm_low : bool
         There is a limit of the stability booklet, and the interval of the last `gm_m` reaches below
         it, or there are no estimates any more.
@@ -344,5 +345,5 @@ class Estimator:
             figures.forget_ship()
             self._news.append(
                 "roll period and GM are not known any more: "
-                f"she was last identified {figures.ship_age_s / 60:.0f} minutes ago"
+                f"the ship was last identified {figures.ship_age_s / 60:.0f} minutes ago"
             )

@@ -46,13 +46,13 @@ from utank_hil.retuning.trial import MovingWindow, WindowStatistics, worsening
 EARLY_FACTOR: Final = 1.5
 """A law this much worse than the trial allows is dropped before the end of the trial."""
 TRIAL_PATIENCE: Final = 1.5
-"""A trial that lasts so many times its length, for want of measurements, is given up."""
+"""Times its length at which a trial without enough measurements is given up."""
 MOST_EVENTS: Final = 1000
-"""That are kept: two days of a retuning every three minutes."""
+"""Events that are kept: two days of a retuning every three minutes."""
 RETRY_NS: Final = 600_000_000_000
 """Least time to the next exchange without an order after one that failed, or was undone."""
 BUSY_NS: Final = 30_000_000_000
-"""A retuner without a sign of life may be busy with an estimate for so long."""
+"""Time without a sign of life for which a retuner may be busy with an estimate."""
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (
@@ -126,7 +126,7 @@ class LawExchange(ABC):
 
     @abstractmethod
     def note(self, estimate: MotionEstimate) -> None:
-        """Take what the motion tells of waves and ship."""
+        """Take an estimate of waves and ship."""
 
     @abstractmethod
     def _automatic_reason(self) -> str:

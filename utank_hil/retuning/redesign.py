@@ -175,7 +175,7 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
             "needed: record longer, or with fewer gaps"
         )
     u, y = record[:split, :1], record[:split, 1:]
-    waves = find_disturbance_frequencies(u, y, predictor.sample_time_s)
+    waves = find_disturbance_frequencies(u, y, predictor.sample_time_s, most=1)
     result = okid(
         u,
         y,

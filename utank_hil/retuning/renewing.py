@@ -4,7 +4,7 @@
 estimate (`Estimator`). It is asked when the waves, or the ship, differ from those that the law in
 charge was designed for.
 
-A law may be wrong for waves that are not known yet. When the ship rolls more with it than she would
+A law may be wrong for waves that are not known yet. When the ship rolls more with it than it would
 with the pump at rest, the pump rests until another law is tried, or for `RETRY_NS`. This is before
 the monitor of the same comparison ends active control (ROLL_AMPLIFIED).
 """
@@ -46,8 +46,8 @@ LOSING: Final = 1.2
 LOSING_PERIODS: Final = 4.0
 """Roll periods that this is judged by: half as many condemned sound laws by their first waves."""
 RECORD_PERIODS: Final = 12.0
-"""Roll periods over which she must have rolled more than the passive ship, too. In the lull after a
-group of waves, a law that halves her roll lost by 1.23 over four periods.
+"""Roll periods over which the ship must have rolled more than the passive one, too. In the lull
+after a group of waves, a law that halves the roll lost by 1.23 over four periods.
 """
 LEAST_SHARE: Final = 1e-3
 """Of the pump's limits: a law for less does nothing, and its arithmetic fails at numbers near 0."""
@@ -56,7 +56,7 @@ LEAST_ROLL_RAD: Final = math.radians(0.25)
 AWAY: Final = 5.0
 """Times the roll before, or the passive ship's if that is more, at which a trial ends at once.
 
-A law that is unstable on the ship doubles her roll in a second or two. A great heel that comes on
+A law that is unstable on the ship doubles the roll in a second or two. A great heel that comes on
 trial ends it, too; the law is tried again later.
 """
 _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
@@ -68,7 +68,7 @@ class RenewingController(LawExchange):
     Parameters
     ----------
     law : ConstrainedLaw
-        First law, of a sea that nobody knew.
+        First law, for a sea that is not known.
     controller : Controller
         Of that law, at rest.
     ship : ShipFigures
@@ -149,7 +149,7 @@ class RenewingController(LawExchange):
             self._forget()
             self._log_event(
                 (
-                    f"she rolls {now.roll_rad / now.passive_roll_rad:.2f} times what she would "
+                    f"the ship rolls {now.roll_rad / now.passive_roll_rad:.2f} times what it would "
                     "with the pump at rest: it rests until another law is tried, "
                     f"{RETRY_NS // 60_000_000_000} minutes at most",
                 )
@@ -170,7 +170,7 @@ class RenewingController(LawExchange):
         return self._now_ns < self._rests_until_ns
 
     def note(self, estimate: MotionEstimate) -> None:
-        """Take what the motion tells of waves and ship."""
+        """Take an estimate of waves and ship."""
         for law in self.laws.stepped:
             law.monitor.watch(estimate)
         if estimate.waves is None or estimate.ship is None:
@@ -234,15 +234,17 @@ class RenewingController(LawExchange):
         usual_rad = max(LEAST_ROLL_RAD, before.roll_rad, passive_rad)
         away_rad = abs(self._roll_rad - self._heel_rad)
         if away_rad > AWAY * usual_rad:
-            away = f"{math.degrees(away_rad):.1f} degrees from her heel on trial"
-            self._refuse((f"she is {away}, {away_rad / usual_rad:.1f} times the roll before, RMS",))
+            away = f"{math.degrees(away_rad):.1f} degrees from the heel before"
+            self._refuse(
+                (f"the ship is {away}, {away_rad / usual_rad:.1f} times the roll before, RMS",)
+            )
             return
         super()._check_trial()
 
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
         """What the law before would have had in the waves of the trial.
 
-        Its roll follows that of the passive ship, and is never taken as more than hers. The
+        Its roll follows that of the passive ship, and is never taken as more than that. The
         pressure may be what is predicted of the new law.
         """
         before, renewed = self._baseline, self.renewed

@@ -90,7 +90,7 @@ class RetuningSettings:
         Time from the end of a retuning to the next scheduled one, in a controller's file 600 s or
         more; None: no schedule.
     change_factor : float or None
-        Retune when the ship that the motion tells differs from the law's by this factor in roll
+        Retune when the ship estimated from the motion differs from the law's by this factor in roll
         period, or in the root of the stiffness (`ChangeMonitor`); None: not monitored.
     trial_s : float
         Length of a trial and of the old law's window that it is compared with: from

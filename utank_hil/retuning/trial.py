@@ -18,7 +18,7 @@ class WindowStatistics(NamedTuple):
     pressure_rms_pa : float
         Root mean square, with the steady part, which costs power and may heel the ship.
     passive_roll_rad : float
-        Standard deviation of what she would have rolled with the tank passive; 0 if not known.
+        Standard deviation of the roll that a passive tank would have left; 0 if not known.
     """
 
     roll_rad: float
