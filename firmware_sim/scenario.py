@@ -60,8 +60,8 @@ _DRIVE_RATE_PER_PRESSURE: Final = 5.0
 _HIGH_LEVEL_SHARE: Final = 4.6 / 4.88
 
 
-def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault]) -> list[Problem]:
-    """Faults of nodes that a ship does not have."""
+def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault], key: str = "faults") -> list[Problem]:
+    """Faults, listed at a key, of nodes that a ship does not have."""
     missing = {
         "drive": vessel.pump is None,
         "valve": vessel.valve is None,
@@ -69,7 +69,7 @@ def missing_nodes(vessel: Vessel, faults: Sequence[AnyFault]) -> list[Problem]:
         "hardwired": not vessel.redundancy.hardwired_inputs,
     }
     return [
-        (f"faults.{place}", f"can't be: the vessel has no {name}")
+        (f"{key}.{place}", f"can't be: the vessel has no {name}")
         for place, fault in enumerate(faults)
         for name in fault.node_names()
         if missing.get(name)

@@ -19,6 +19,17 @@ TRUTH: Final = (
 )
 
 
+def true_values(plant: Plant) -> tuple[float, ...]:
+    """The plant's state, columns `TRUTH` without the time."""
+    return (
+        plant.roll_rad,
+        plant.level_m,
+        plant.pressure_pa,
+        plant.pump_power_w,
+        plant.wave_moment_nm,
+    )
+
+
 class TruthRecorder:
     """Looks at the plant on a fixed grid; a node without frames.
 
@@ -57,14 +68,7 @@ class TruthRecorder:
             self.start_ns = now_ns
         plant = self._plant
         plant.advance(now_ns)
-        self._row[:] = (
-            (now_ns - self.start_ns) * 1e-9,
-            plant.roll_rad,
-            plant.level_m,
-            plant.pressure_pa,
-            plant.pump_power_w,
-            plant.wave_moment_nm,
-        )
+        self._row[:] = ((now_ns - self.start_ns) * 1e-9, *true_values(plant))
         self._log.write(self._row)
         self.pump_speed_rad_s = max(self.pump_speed_rad_s, abs(plant.pump_speed_rad_s))
         return ()

@@ -37,7 +37,6 @@ def faults(
     out: Annotated[
         Path | None, typer.Option(help="Folder for a recording of each row, of the first seed.")
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Results as JUnit XML.")] = None,
     full: Annotated[
         bool,
         typer.Option(help="Compare the roll over 600 s, as is asked for: ten times the work."),
@@ -58,7 +57,7 @@ def faults(
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
-    from firmware_sim.fault_campaign.report import as_json, requirement_text, write_junit
+    from firmware_sim.fault_campaign.report import as_json
     from firmware_sim.fault_campaign.runner import run_rows
     from firmware_sim.fault_campaign.trial import Window, write_recordings
     from firmware_sim.fault_campaign.verdict import judged
@@ -101,11 +100,7 @@ def faults(
         interrupted = stopped()
     partly = [row.id for row in chosen if len(outcomes[row.id]) < seeds]
     killed = bool(partly) and not interrupted
-    results = [
-        judged(row, loaded.setups[row.setup], requirement_text(loaded, row.meets), outcomes[row.id])
-        for row in chosen
-        if row.id not in partly
-    ]
+    results = [judged(loaded, row, outcomes[row.id]) for row in chosen if row.id not in partly]
     not_run = {
         each.id: f"{each.fault}: shown by {each.elsewhere}"
         for each in loaded.shown_elsewhere(names)
@@ -121,8 +116,6 @@ def faults(
     if out is not None:
         files = write_recordings(out, outcomes, about)
         results = [replace(each, recording=shown(files[each.row.id])) for each in results]
-    if junit is not None:
-        write_junit(junit, results, on_bus, not_run, time.monotonic() - began)
     if json_:
         sys.stdout.write(json.dumps(as_json(results, on_bus, not_run, about)) + "\n")
     else:
@@ -149,7 +142,6 @@ def _on_bus(
 ) -> tuple[list[dict[str, Any]], list[str], str]:
     """Results of the live rows, those that were not run, and why if it is the bus's fault."""
     from firmware_sim.fault_campaign.live import run_live
-    from firmware_sim.fault_campaign.report import requirement_text
 
     waiting = [row for row in live if row.does]
     results: list[dict[str, Any]] = []
@@ -158,7 +150,7 @@ def _on_bus(
         while bus is not None and waiting:
             row = waiting[0]
             notes.say(f"{row.id} on {bus}")
-            results.append(run_live(row, bus, requirement_text(campaign, row.meets)))
+            results.append(run_live(row, bus, campaign.asked_by(row)))
             del waiting[0]
     except OSError as why_not:
         error = why(why_not)

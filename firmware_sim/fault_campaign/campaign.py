@@ -17,8 +17,12 @@ from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.retuning import EstimateSettings
 
+LONG_S: Final = 300.0
+"""A row that is followed for longer takes more than a minute of CPU time in one sea."""
 _PHASES: Final = 100
+"""Ticks in a second, the slowest cycle of a message."""
 _PHASE_STRIDE: Final = 37
+"""Ticks from one seed's fault to the next one's: prime to 100 and to 5."""
 
 
 def _fault_name(name: str) -> str:
@@ -125,85 +129,118 @@ class Setup(Section):
         return self
 
 
-class Row(Section):
-    """A fault, and what is to come of it.
+class Trial(Section):
+    """What is done to a ship under way.
 
     Attributes
     ----------
-    faults : tuple
-        Their times count from `Campaign.fault_at_s`.
+    setup : str
+        One of `Campaign.setups`.
+    inject : tuple
+        Faults; their times count from `Campaign.fault_at_s`.
     operator : tuple of TimedAction
         What the operator does besides; times after the fault began.
-    within_ms, halved_within_ms, zero_within_ms : float, optional
-        Limits from the fault on. Without the last, the pressure is to be zero within 250 ms of a
-        stop and within 1,040 ms of the beginning of a ramp.
-    codes : tuple of str
-        Faults that it may be called.
-    alarms : tuple of str
-        Faults that have to be alarms as well.
-    flags : tuple of str
-        Of CTRL_STATUS that have to be set.
-    unheard : bool
-        The fault keeps the controller's frames from the bus: what they say is not judged.
-    may_end : tuple of str
-        Faults in which a run may end later than `followed_s`, in the minutes of the roll.
-    hardwired_stop : bool
-        No command can take the pressure away: that needs the hard-wired stop, and is not judged.
-    counts_from : dict of str to float
-        Times count from when what the controller received of this is first so far from the truth:
-        before, nobody can know. Or from when the pump's pressure is so far from its set-point and
-        stays so, or from when the ship first rolls so far (`over_roll_rad`).
-    roll_window_s : float, optional
-        Over which the roll is compared, instead of what all rows have.
-    roll_limit : float
-        Variance of the roll over the passive ship's.
     from_start : bool
-        The fault is there from the start, before anybody arms. Times count from when the controller
-        is in charge.
+        The faults are there before anybody arms. Times count from when the controller is in charge.
     followed_s : float
         How long the bus is followed after the fault.
-    long : bool
-        It takes so long that it is run in many seas, or by its name, only.
     """
 
-    id: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
-    meets: Annotated[tuple[str, ...], Field(min_length=1)]
     setup: str = "pump"
-    faults: tuple[AnyFault, ...] = ()
+    inject: tuple[AnyFault, ...] = ()
     operator: tuple[TimedAction, ...] = ()
-    reaction: Reaction
-    within_ms: Positive | None = None
-    halved_within_ms: Positive | None = None
-    zero_within_ms: Positive | None = None
-    codes: tuple[FaultName, ...] = ()
-    alarms: tuple[FaultName, ...] = ()
-    flags: tuple[StatusFlag, ...] = ()
-    unheard: bool = False
-    may_end: tuple[FaultName, ...] = ()
-    hardwired_stop: bool = False
-    counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
-    roll_window_s: FaultSpan | None = None
-    roll_limit: Positive = 1.05
     from_start: bool = False
     followed_s: FaultSpan = 4.0
-    long: bool = False
-
-    @model_validator(mode="after")
-    def _judged_by_something(self) -> "Row":
-        problems = [
-            (f"faults.{place}.at_s", f"must be below followed_s, {self.followed_s:g}")
-            for place, fault in enumerate(self.faults)
-            if fault.at_s >= self.followed_s
-        ]
-        if self.reaction == "alarm" and not self.codes:
-            problems.append(("codes", "are needed: which alarm is it?"))
-        refuse("", problems)
-        return self
 
     @property
     def on_bus(self) -> bool:
         """Whether what it does is seen on the bus at once."""
-        return bool(self.faults or self.operator)
+        return bool(self.inject or self.operator)
+
+    @property
+    def hardwired_stop(self) -> bool:
+        """Whether the pressure can only be taken away by the hard-wired stop."""
+        return any(fault.beyond_commands for fault in self.inject)
+
+
+class Expectation(Section):
+    """What is to come of a trial.
+
+    Attributes
+    ----------
+    codes : tuple of str
+        Faults that it may be called.
+    also : tuple of str
+        Faults that have to be alarms as well, and flags that CTRL_STATUS has to set.
+    may_end : tuple of str
+        Faults in which a run may end later than `Trial.followed_s`, in the minutes of the roll.
+    unheard : bool
+        The fault keeps the controller's frames from the bus: what they say is not judged.
+    """
+
+    reaction: Reaction
+    codes: tuple[FaultName, ...] = ()
+    also: tuple[FaultName | StatusFlag, ...] = ()
+    may_end: tuple[FaultName, ...] = ()
+    unheard: bool = False
+
+    @property
+    def latched(self) -> bool:
+        """Whether the fault has to end control for good."""
+        return self.reaction in ("stop", "ramp")
+
+
+class Limit(Section):
+    """When the expectation has to be met at the latest, and how much the ship may roll.
+
+    Attributes
+    ----------
+    found_ms, halved_ms, zero_ms : float, optional
+        From the fault on. `firmware_sim.fault_campaign.verdict` has what holds without the last.
+    counts_from : dict of str to float
+        Times count from when what the controller received of this is first so far from the truth:
+        before, nobody can know. Or from when the pump's pressure is so far from its set-point and
+        stays so, or from when the ship first rolls so far (`over_roll_rad`).
+    roll : float
+        Variance of the roll over the passive ship's.
+    roll_window_s : float, optional
+        Over which the roll is compared, instead of what all rows have.
+    """
+
+    found_ms: Positive | None = None
+    halved_ms: Positive | None = None
+    zero_ms: Positive | None = None
+    counts_from: Annotated[dict[CountsFrom, Positive], Field(default_factory=dict, max_length=1)]
+    roll: Positive = 1.05
+    roll_window_s: FaultSpan | None = None
+
+
+class Row(Section):
+    """A fault, what is to come of it, and within which limits."""
+
+    id: Annotated[str, Field(pattern=r"^[a-z0-9-]+$")]
+    meets: Annotated[tuple[str, ...], Field(min_length=1)]
+    fault: Annotated[Trial, Field(default_factory=Trial)]
+    expect: Expectation
+    limit: Annotated[Limit, Field(default_factory=lambda: Limit(counts_from={}))]
+
+    @model_validator(mode="after")
+    def _judged_by_something(self) -> "Row":
+        followed_s = self.fault.followed_s
+        problems = [
+            (f"fault.inject.{place}.at_s", f"must be below followed_s, {followed_s:g}")
+            for place, fault in enumerate(self.fault.inject)
+            if fault.at_s >= followed_s
+        ]
+        if self.expect.reaction == "alarm" and not self.expect.codes:
+            problems.append(("expect.codes", "are needed: which alarm is it?"))
+        refuse("", problems)
+        return self
+
+    @property
+    def long(self) -> bool:
+        """Whether it takes so long that it is run in many seas, or by its name, only."""
+        return self.fault.followed_s > LONG_S
 
 
 class LiveRow(Section):
@@ -270,14 +307,14 @@ class Campaign(Section):
             for name in row.meets
             if name not in known
         ]
+        vessels = {name: setup.equipped.vessel for name, setup in self.setups.items()}
         for place, row in enumerate(self.rows):
-            if row.setup not in self.setups:
-                problems.append((f"rows.{place}.setup", f"must be one of {', '.join(self.setups)}"))
+            if row.fault.setup not in vessels:
+                known_setups = ", ".join(vessels)
+                problems.append((f"rows.{place}.fault.setup", f"must be one of {known_setups}"))
                 continue
-            vessel = self.setups[row.setup].equipped.vessel
-            problems += [
-                (f"rows.{place}.{key}", reason) for key, reason in missing_nodes(vessel, row.faults)
-            ]
+            key = f"rows.{place}.fault.inject"
+            problems += missing_nodes(vessels[row.fault.setup], row.fault.inject, key)
         met = {name for _, rows in every for row in rows for name in row.meets}
         problems += [
             (f"requirements.{place}", "is shown by no row: add one, or say `elsewhere`")
@@ -304,6 +341,15 @@ class Campaign(Section):
         return [row for row in self.rows if matches(row)], [
             row for row in self.live if matches(row)
         ]
+
+    def asked_by(self, row: Row | LiveRow) -> str:
+        """What a row meets, in words."""
+        texts = []
+        for each in self.requirements:
+            if each.id in row.meets:
+                parts = [each.fault, each.found_by, each.within, each.reaction]
+                texts.append(f"{each.id}: " + "; ".join(part for part in parts if part))
+        return " | ".join(texts)
 
     def shown_elsewhere(self, names: Sequence[str]) -> list[Requirement]:
         """Requirements of these names, or all, that tests show and no row does."""

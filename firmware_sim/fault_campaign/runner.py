@@ -97,7 +97,7 @@ def run_rows(
     done, stop = context.Value("i", 0), context.Value("b", 0, lock=False)
     by_setup: dict[str, list[Row]] = defaultdict(list)
     for row in rows:
-        by_setup[row.setup].append(row)
+        by_setup[row.fault.setup].append(row)
     workers = workers or len(os.sched_getaffinity(0))
     futures: list[Future[list[Outcome]]] = []
     outcomes: list[Outcome] = []

@@ -11,7 +11,7 @@ import select
 import signal
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast, get_args
 
@@ -21,7 +21,7 @@ from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup, StatusFla
 from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_difference
 from firmware_sim.faulty_bench import FaultyBench
 from firmware_sim.ship_side import build_ship_side
-from firmware_sim.truth import TRUTH
+from firmware_sim.truth import TRUTH, true_values
 from firmware_sim.worker_pool import end_with
 from utank_hil.assembly import estimator_work
 from utank_hil.base.arrays import FloatArray
@@ -65,30 +65,84 @@ class Window:
     running_s: float = 600.0
 
 
-@dataclass(slots=True)
-class Outcome:
-    """What came of a row in one sea; times in ms after the fault.
+@dataclass(frozen=True, slots=True)
+class Times:
+    """When something first happened, in ms from when the row counts; None where it did not.
 
     Attributes
     ----------
-    mode, code : str
-        In the end, and the fault that was latched or shown.
-    shown : str
-        Mode and fault in the last CTRL_STATUS of the controller.
-    told : tuple of str
-        Faults that it sent in ALARM since the fault.
+    found, halved, noted, alarm : float or None
+        As in `Watch.first_ns`.
+    zero : float or None
+        When drive or valve stopped for good.
+    commanded : float
+        When the controller last sent a pressure other than zero, at the latest when the bus was
+        followed last.
+    """
+
+    found: float | None = None
+    halved: float | None = None
+    noted: float | None = None
+    alarm: float | None = None
+    zero: float | None = None
+    commanded: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What others on the bus could know of the controller since the fault.
+
+    Attributes
+    ----------
+    status : str
+        Mode and fault in the last CTRL_STATUS.
+    alarms : tuple of str
+        Faults in ALARM.
     flags : tuple of str
-        Of CTRL_STATUS that were set since.
-    commanded_ms : float
-        When it last sent a pressure other than zero, at the latest when the bus was followed last.
+        Of CTRL_STATUS that were set.
+    """
+
+    status: str = ""
+    alarms: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Excess:
+    """Commands beyond what is allowed.
+
+    Attributes
+    ----------
     beyond_share_pa : float
         How far the drive's set-point went beyond half the pressure while the pressure was halved.
     refused : int
         Commands that the drive refused.
     steepest_pa_s : float
-        Of the commands, but those that cut.
-    roll_variance, passive_variance : float
-        In rad^2, over the same `window_s`.
+        Greatest rate of the commands, but those that cut.
+    """
+
+    beyond_share_pa: float = 0.0
+    refused: int = 0
+    steepest_pa_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rolls:
+    """Variances of the roll in rad^2, of the ship and of the passive one, over `window_s`."""
+
+    variance: float = math.nan
+    passive_variance: float = math.nan
+    window_s: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a row in one sea.
+
+    Attributes
+    ----------
+    mode, code : str
+        In the end, and the fault that was latched or shown.
     wire : str
         The first frame that the fault changed; empty if none differs.
     error : str
@@ -99,25 +153,14 @@ class Outcome:
 
     row: str
     seed: int
-    found_ms: float | None = None
-    halved_ms: float | None = None
-    noted_ms: float | None = None
-    alarm_ms: float | None = None
-    zero_ms: float | None = None
+    times: Times = Times()
     mode: str = ""
     code: str = ""
     was_active: bool = False
     armed_again: bool = False
-    shown: str = ""
-    told: tuple[str, ...] = ()
-    flags: tuple[str, ...] = ()
-    commanded_ms: float = 0.0
-    beyond_share_pa: float = 0.0
-    refused: int = 0
-    steepest_pa_s: float = 0.0
-    roll_variance: float = math.nan
-    passive_variance: float = math.nan
-    window_s: float = math.nan
+    said: Said = Said()
+    excess: Excess = Excess()
+    rolls: Rolls = Rolls()
     wire: str = ""
     error: str = ""
     rows: FloatArray | None = None
@@ -133,15 +176,7 @@ class Recorder:
     def __call__(self, row: FloatArray) -> None:
         """Take a row of the controller's."""
         if self.bench is not None:
-            plant = self.bench.ship.plant
-            true = (
-                plant.roll_rad,
-                plant.level_m,
-                plant.pressure_pa,
-                plant.pump_power_w,
-                plant.wave_moment_nm,
-            )
-            self.rows.append(np.array([*row, *true]))
+            self.rows.append(np.array([*row, *true_values(self.bench.ship.plant)]))
 
 
 @dataclass(slots=True)
@@ -213,7 +248,7 @@ class Sea:
 
     def prepare(self, rows: list[Row]) -> None:
         """Make what the rows are compared with: the bus without a fault, the passive ship."""
-        followed_s = max((row.followed_s for row in rows if row.on_bus), default=0.0)
+        followed_s = max((row.fault.followed_s for row in rows if row.fault.on_bus), default=0.0)
         end_ns = self._fault_ns + round(followed_s * SECOND_NS)
         log = self._underway.log
         log.frames += in_a_copy(lambda: self._frames_until(end_ns), self._stopped)
@@ -225,7 +260,7 @@ class Sea:
             self._window.stopped_s,
             self._window.running_s,
             REARMED_S if self._patient else 0.0,
-            *(max(row.followed_s, row.roll_window_s or 0.0) for row in rows),
+            *(max(row.fault.followed_s, row.limit.roll_window_s or 0.0) for row in rows),
         )
         for enabled in (False, True):
             self._passive[enabled] = in_a_copy(
@@ -261,73 +296,80 @@ class Sea:
     def outcome(self, row: Row) -> Outcome:
         """Do a row, in a copy of this process."""
         reference = self._underway.reference
-        if row.operator and row.faults and row.on_bus:
+        if row.fault.operator and row.fault.inject:
             reference = in_a_copy(lambda: self._operated(row), self._stopped)
         return in_a_copy(lambda: self._outcome(row, reference), self._stopped)
 
     def _operated(self, row: Row) -> list[Heard]:
         """The bus without the row's faults, but with what the operator does."""
-        underway = self._start() if row.from_start else self._underway
+        underway = self._start() if row.fault.from_start else self._underway
         bench = underway.bench
-        bench.join([Watch(bench, row.operator)])
-        bench.run(bench.lockstep.now_ns + round(row.followed_s * SECOND_NS))
+        bench.join([Watch(bench, row)])
+        bench.run(bench.lockstep.now_ns + round(row.fault.followed_s * SECOND_NS))
         return underway.log.frames
 
     def _outcome(self, row: Row, reference: list[Heard]) -> Outcome:
-        underway = self._start() if row.from_start else self._underway
+        underway = self._start() if row.fault.from_start else self._underway
         bench, log = underway.bench, underway.log
-        start_ns = bench.lockstep.now_ns
-        refused = bench.ship.refused_commands
-        watch = Watch(
-            bench,
-            row.operator,
-            row.counts_from,
-            row.codes,
-            row.within_ms,
-            self._degraded_most(bench),
-        )
-        bench.place(row.faults)
+        start_ns, refused = bench.lockstep.now_ns, bench.ship.refused_commands
+        watch = Watch(bench, row, self._degraded_most(bench))
+        bench.place(row.fault.inject)
         bench.join([watch])
-        watched_ns = start_ns + round(row.followed_s * SECOND_NS)
+        watched_ns = alone_ns = start_ns + round(row.fault.followed_s * SECOND_NS)
         bench.run(watched_ns)
-        alone_ns = watched_ns
         if self._patient and self._stopped_at(bench):
             alone_ns = max(watched_ns, start_ns + round(REARMED_S * SECOND_NS))
             bench.run(alone_ns)
         stopped = self._stopped_at(bench)
-        outcome = self._measured(row, watch, log, start_ns)
-        outcome.refused = bench.ship.refused_commands - refused
+        outcome = Outcome(
+            row.id,
+            self._seed,
+            times_of(row, watch, log, start_ns),
+            was_active="active" in watch.first_ns,
+        )
+        refused = bench.ship.refused_commands - refused
+        steepest_pa_s = log.steepest_pa_s(start_ns)
         window_s = self._window.stopped_s if stopped else self._window.running_s
-        window_s = max(row.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
+        window_s = max(row.limit.roll_window_s or window_s, (alone_ns - start_ns) / SECOND_NS)
         end_ns = start_ns + round(window_s * SECOND_NS)
-        rolls = _Moments(watch)
-        if stopped:
-            rolls.add_ship_alone(bench, alone_ns, end_ns)
-        elif end_ns > alone_ns:
+        if stopped:  # nothing is left to act on the ship: it is integrated alone
+            for time_ns in range(alone_ns, end_ns, TICK_NS):
+                bench.ship.plant.advance(time_ns)
+                watch.rolls.add(bench.ship.plant.roll_rad)
+        else:
             bench.run(end_ns)
-            rolls = _Moments(watch)
-            outcome.armed_again |= watch.armed_again
-            outcome.code = watch.code.name
-        outcome.mode = bench.node.mode.name
-        outcome.beyond_share_pa = watch.beyond_share_pa
-        _note_what_was_said(outcome, log, start_ns)
-        outcome.roll_variance, outcome.window_s = rolls.variance, window_s
-        passive = self._passive[self._pump_enabled(bench)]
-        valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
-        if valve is not None and own is not None and valve.opening != own.fail_opening and stopped:
-            passive = self._passive_roll(
-                (end_ns - self._fault_ns) / SECOND_NS,
-                enabled=self._pump_enabled(bench),
-                opening=valve.opening,
-            )
-        outcome.passive_variance = float(passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS].var())
-        if row.on_bus:
+        passive = self._passive_beside(bench, (end_ns - self._fault_ns) / SECOND_NS, stopped)
+        passive = passive[start_ns // SAMPLE_NS : end_ns // SAMPLE_NS]
+        wire = ""
+        if row.fault.on_bus:
             difference = first_difference(reference, log.frames, watched_ns)
-            outcome.wire = "" if difference is None else _words(*difference, start_ns)
-        if self._recorded:
-            first_s = (start_ns / SECOND_NS) - RECORDED_S
-            outcome.rows = np.array([each for each in underway.recorder.rows if each[0] >= first_s])
-        return outcome
+            wire = "" if difference is None else _words(*difference, start_ns)
+        return replace(
+            outcome,
+            mode=bench.node.mode.name,
+            code=watch.code.name,
+            armed_again=watch.armed_again,
+            said=_said(log, start_ns),
+            excess=Excess(watch.beyond_share_pa, refused, steepest_pa_s),
+            rolls=Rolls(watch.rolls.variance, float(passive.var()), window_s),
+            wire=wire,
+            rows=self._recorded_rows(underway, start_ns),
+        )
+
+    def _recorded_rows(self, underway: Underway, start_ns: int) -> FloatArray | None:
+        """Rows from `RECORDED_S` before the fault on, if they were asked for."""
+        if not self._recorded:
+            return None
+        first_s = start_ns / SECOND_NS - RECORDED_S
+        return np.array([each for each in underway.recorder.rows if each[0] >= first_s])
+
+    def _passive_beside(self, bench: FaultyBench, seconds: float, stopped: bool) -> FloatArray:
+        """Roll of the passive ship, whose pump and valve are as those of a bench in the end."""
+        enabled = self._pump_enabled(bench)
+        valve, own = bench.ship.valve, self._setup.equipped.vessel.valve
+        if stopped and valve is not None and own is not None and valve.opening != own.fail_opening:
+            return self._passive_roll(seconds, enabled=enabled, opening=valve.opening)
+        return self._passive[enabled]
 
     def _degraded_most(self, bench: FaultyBench) -> tuple[float, int]:
         """What is allowed while the pressure is halved, and the time to come down to it."""
@@ -343,66 +385,38 @@ class Sea:
     def _pump_enabled(self, bench: FaultyBench) -> bool:
         return bench.ship.drive is not None and bench.ship.drive.enabled
 
-    def _measured(self, row: Row, watch: Watch, log: BusLog, start_ns: int) -> Outcome:
-        zero_ns = watch.pressed_ns + TICK_NS
-        begin_ns = start_ns
-        if row.from_start and watch.active_ns is not None:
-            begin_ns = watch.active_ns
-        if row.counts_from:  # what was found before is in time
-            known = [each for each in (watch.over_ns, watch.found_ns) if each is not None]
-            begin_ns = max([begin_ns, min(known, default=begin_ns)])
 
-        def after(time_ns: int | None) -> float | None:
-            return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)
+def times_of(row: Row, watch: Watch, log: BusLog, start_ns: int) -> Times:
+    """Times of a row whose fault began at `start_ns`; what is found before it counts is in time."""
+    begin_ns = start_ns
+    if row.fault.from_start:
+        begin_ns = watch.first_ns.get("active", start_ns)
+    if row.limit.counts_from:
+        known = [each for each in (watch.over_ns, watch.first_ns.get("found")) if each is not None]
+        begin_ns = max([begin_ns, min(known, default=begin_ns)])
 
-        return Outcome(
-            row.id,
-            self._seed,
-            after(watch.found_ns),
-            after(watch.halved_ns),
-            after(watch.noted_ns),
-            after(watch.alarm_ns),
-            after(zero_ns),
-            "",
-            watch.code.name,
-            watch.active_ns is not None,
-            watch.armed_again,
-            commanded_ms=after(log.commanded_until(start_ns)) or 0.0,
-            steepest_pa_s=log.steepest_pa_s(start_ns),
-        )
+    def after(time_ns: int | None) -> float | None:
+        return None if time_ns is None else max((time_ns - begin_ns) / 1e6, 0.0)
+
+    first = {name: after(time_ns) for name, time_ns in watch.first_ns.items()}
+    return Times(
+        first.get("found"),
+        first.get("halved"),
+        first.get("noted"),
+        first.get("alarm"),
+        zero=after(watch.pressed_ns + TICK_NS),
+        commanded=after(log.commanded_until(start_ns)) or 0.0,
+    )
 
 
-def _note_what_was_said(outcome: Outcome, log: BusLog, start_ns: int) -> None:
-    """What others on the bus could know of the controller since the fault."""
+def _said(log: BusLog, start_ns: int) -> Said:
     shown = [status for time_ns, status in log.shown if time_ns >= start_ns]
+    status = ""
     if shown and shown[-1].mode is not None and shown[-1].fault is not None:
-        outcome.shown = f"{shown[-1].mode.name} {shown[-1].fault.name}"
-    told = {fault.name for time_ns, fault in log.told if time_ns >= start_ns}
-    outcome.told = tuple(sorted(told))
-    outcome.flags = tuple(flag for flag in FLAGS if any(getattr(s, flag) for s in shown))
-
-
-class _Moments:
-    """Mean and variance of the roll, from a watch's samples on."""
-
-    def __init__(self, watch: Watch) -> None:
-        self._sum, self._square, self._count = watch.roll_sum, watch.roll_square, watch.samples
-
-    def add_ship_alone(self, bench: FaultyBench, start_ns: int, end_ns: int) -> None:
-        """Integrate the ship on her own, as she is: nothing is left to act on her."""
-        plant = bench.ship.plant
-        for time_ns in range(start_ns, end_ns, TICK_NS):
-            plant.advance(time_ns)
-            roll = plant.roll_rad
-            self._sum += roll
-            self._square += roll * roll
-            self._count += 1
-
-    @property
-    def variance(self) -> float:
-        """In rad^2."""
-        mean = self._sum / self._count
-        return self._square / self._count - mean * mean
+        status = f"{shown[-1].mode.name} {shown[-1].fault.name}"
+    alarms = {fault.name for time_ns, fault in log.told if time_ns >= start_ns}
+    flags = tuple(flag for flag in FLAGS if any(getattr(each, flag) for each in shown))
+    return Said(status, tuple(sorted(alarms)), flags)
 
 
 def write_recordings(

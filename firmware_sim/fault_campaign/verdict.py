@@ -5,8 +5,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from firmware_sim.fault_campaign.campaign import Row, Setup
-from firmware_sim.fault_campaign.trial import Outcome
+from firmware_sim.fault_campaign.campaign import Campaign, Row, Setup
+from firmware_sim.fault_campaign.campaign import Reaction as Asked
+from firmware_sim.fault_campaign.trial import FLAGS, Outcome
+from utank_hil.canbus import PumpCommand, load_catalogue
 from utank_hil.safety.faults import FAULTS, Reaction
 
 STOP_ZERO_MS: Final = 250.0
@@ -26,10 +28,23 @@ ONLY_STOPS: Final = {
     if all(condition.reaction is Reaction.STOP for condition in row.conditions)
 }
 RATE_SHARE: Final = 1.001
+"""Of the rate limit: what rounding in the limiter may add."""
 STATUS_MS: Final = 200.0
 """Two cycles of CTRL_STATUS: what is so for less need not be in one."""
 ALARM_MS: Final = 100.0
 """The list of alarms is renewed, and looked at, ten times a second."""
+COMMAND: Final = load_catalogue().codec(PumpCommand).name
+_TIME_OF: Final[dict[Asked, str]] = {
+    "stop": "found",
+    "ramp": "found",
+    "halve": "halved",
+    "alarm": "alarm",
+    "note": "noted",
+    "drive": "zero",
+}
+"""Field of `Times` that says when a reaction began."""
+_GO_ON: Final = ("halve", "alarm", "note", "none")
+"""Reactions after which control goes on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,56 +93,57 @@ class Result:
 
     def as_json(self) -> dict[str, Any]:
         """For `json.dumps`: None where a time does not apply."""
+        limit = self.row.limit
         return {
             "id": self.row.id,
             "meets": list(self.row.meets),
             "requirement": self.requirement,
-            "reaction": self.row.reaction,
+            "reaction": self.row.expect.reaction,
             "found_ms": self.found_ms,
             "zero_ms": self.zero_ms,
-            "limit_ms": self.row.within_ms,
-            "counted_from": self.row.counts_from or None,
+            "limit_ms": limit.found_ms,
+            "counted_from": limit.counts_from or None,
             "zero_limit_ms": self.zero_limit_ms,
             "verdict": "pass" if self.passed else "fail",
             "problems": list(self.problems),
             "codes": list(self.codes),
             "wire": self.wire,
             "roll_ratio": None if math.isnan(self.roll_ratio) else round(self.roll_ratio, 6),
-            "roll_limit": self.row.roll_limit,
+            "roll_limit": limit.roll,
             "roll_window_s": None if math.isnan(self.window_s) else self.window_s,
             "seeds": len(self.outcomes),
             "recording": self.recording or None,
         }
 
 
-def judged(row: Row, setup: Setup, requirement: str, outcomes: Sequence[Outcome]) -> Result:
+def judged(campaign: Campaign, row: Row, outcomes: Sequence[Outcome]) -> Result:
     """Judge a row by its outcomes, one a seed."""
+    setup = campaign.setups[row.fault.setup]
     sound = [each for each in outcomes if not each.error]
     found = [_reaction_ms(row, each) for each in sound]
-    ends = row.reaction in ("stop", "ramp", "drive") and not row.hardwired_stop
-    zero = [each.zero_ms for each in sound] if ends else []
-    zero_limit_ms = row.zero_within_ms
-    if zero_limit_ms is None and ends and row.reaction != "drive":
+    ends = row.expect.latched or row.expect.reaction == "drive"
+    zero = [each.times.zero for each in sound] if ends and not row.fault.hardwired_stop else []
+    zero_limit_ms = row.limit.zero_ms
+    if zero_limit_ms is None and zero and row.expect.latched:
         limits = (_zero_limit_ms(row, each) for each in sound)
         zero_limit_ms = max((limit for limit in limits if limit is not None), default=None)
-    roll = sum(each.roll_variance for each in sound)
-    passive = sum(each.passive_variance for each in sound)
     problems = [f"seed {each.seed}: {each.error}" for each in outcomes if each.error]
     for each in sound:
         problems += [f"seed {each.seed}: {why}" for why in _problems(row, setup, each)]
-    ratio = roll / passive if sound and passive else math.nan
-    if not ratio <= row.roll_limit:
+    passive = sum(each.rolls.passive_variance for each in sound)
+    ratio = sum(each.rolls.variance for each in sound) / passive if passive else math.nan
+    if not ratio <= row.limit.roll:
         problems.append(f"rolls {ratio:.2f} times the passive ship's variance")
     return Result(
         row,
-        requirement,
+        campaign.asked_by(row),
         _worst(found),
         _worst(zero),
         zero_limit_ms,
         tuple(sorted({each.code for each in sound if each.code != "NONE"})),
         next((each.wire for each in sound), ""),
         ratio,
-        max((each.window_s for each in sound), default=math.nan),
+        max((each.rolls.window_s for each in sound), default=math.nan),
         tuple(problems),
         tuple(outcomes),
     )
@@ -140,18 +156,10 @@ def _worst(times_ms: Sequence[float | None]) -> float | None:
 
 def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
     """When the reaction began that the row asks for; at once where nobody could arm."""
-    if row.from_start and row.reaction in ("stop", "ramp") and not outcome.was_active:
+    if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
-    return {
-        "stop": outcome.found_ms,
-        "ramp": outcome.found_ms,
-        "halve": outcome.halved_ms,
-        "alarm": outcome.alarm_ms,
-        "note": outcome.noted_ms,
-        "drive": outcome.zero_ms,
-        "none": None,
-        "refuse": None,
-    }[row.reaction]
+    time = _TIME_OF.get(row.expect.reaction)
+    return None if time is None else getattr(outcome.times, time)
 
 
 def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
@@ -160,98 +168,104 @@ def _zero_limit_ms(row: Row, outcome: Outcome) -> float | None:
     A stop that another fault's ramp comes before has the time that it would have had.
     """
     found_ms = _reaction_ms(row, outcome)
-    if row.zero_within_ms is not None or found_ms is None:
-        return row.zero_within_ms
-    if row.reaction != "stop":
+    if row.limit.zero_ms is not None or found_ms is None:
+        return row.limit.zero_ms
+    if row.expect.reaction != "stop":
         return found_ms + RAMP_ZERO_MS
     if outcome.code in ONLY_STOPS:
         return found_ms + CUT_MS
     if outcome.code not in STOPS:
-        found_ms = max(found_ms, row.within_ms or 0.0)
+        found_ms = max(found_ms, row.limit.found_ms or 0.0)
     return found_ms + STOP_ZERO_MS
-
-
-def _named_in_time(row: Row, outcome: Outcome) -> bool:
-    """Whether an alarm had one of the row's names by the time that it was, or had to be, found."""
-    if outcome.alarm_ms is None:
-        return False
-    latest_ms = max(row.within_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
-    return row.reaction == "refuse" or outcome.alarm_ms <= latest_ms
 
 
 def _problems(row: Row, setup: Setup, outcome: Outcome) -> Iterator[str]:
     """What was not as it should be in one sea."""
-    found_ms = _reaction_ms(row, outcome)
-    latched = row.reaction in ("stop", "ramp")
-    if row.reaction not in ("none", "refuse"):
-        if found_ms is None:
-            yield "was not found"
-        elif row.within_ms is not None and found_ms > row.within_ms:
-            yield f"found after {found_ms:.0f} ms, {row.within_ms:.0f} allowed"
-    if row.halved_within_ms is not None:
-        halved = [each for each in (outcome.halved_ms, outcome.found_ms) if each is not None]
-        if not halved or min(halved) > row.halved_within_ms:
-            yield f"pressure not halved within {row.halved_within_ms:.0f} ms"
-    if latched and outcome.found_ms is not None and outcome.mode != "FAULT":
-        yield f"not latched: ended in {outcome.mode}"
+    yield from _late(row, outcome)
     yield from _unsaid(row, outcome)
-    limit_ms = _zero_limit_ms(row, outcome) if latched else None
-    if limit_ms is not None:
-        zero_ms = math.inf if outcome.zero_ms is None else outcome.zero_ms
-        if not row.hardwired_stop and zero_ms > limit_ms:
-            yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
-        if not row.unheard and outcome.commanded_ms > limit_ms:
-            yield f"pressure commanded until {outcome.commanded_ms:.0f} ms, {limit_ms:.0f} allowed"
-    ended_late = outcome.found_ms is None and outcome.code in row.may_end
-    in_charge = outcome.mode == "ACTIVE" or ended_late
-    if row.reaction in ("halve", "alarm", "note", "none") and not in_charge:
-        yield f"ended in {outcome.mode}, {outcome.code}"
-    if row.reaction in ("alarm", "note", "none") and outcome.halved_ms is not None:
-        yield "halved the pressure"
-    if row.reaction == "refuse" and outcome.was_active:
-        yield "was armed"
-    if row.reaction != "refuse" and not outcome.was_active and not row.from_start:
-        yield "was not in charge before"
-    if outcome.armed_again:
-        yield "armed again by itself"
-    beside = not latched and _named_in_time(row, outcome)
-    if row.codes and outcome.code not in row.codes and not beside:
-        yield f"called {outcome.code}"
-    limits = setup.config.limits
-    if row.reaction != "stop" and outcome.steepest_pa_s > RATE_SHARE * limits.rate_pa_s:
-        yield f"commands changed at {outcome.steepest_pa_s:.3g} Pa/s"
-    if outcome.refused and "PUMP_CMD" not in str(row.faults):
-        yield f"the drive refused {outcome.refused} commands"
-    if not outcome.wire and row.faults:
+    yield from _ended_wrongly(row, outcome)
+    reaction, excess = row.expect.reaction, outcome.excess
+    if reaction != "stop" and excess.steepest_pa_s > RATE_SHARE * setup.config.limits.rate_pa_s:
+        yield f"commands changed at {excess.steepest_pa_s:.3g} Pa/s"
+    spoiled = [fault.spoiled_message for fault in row.fault.inject]
+    if excess.refused and COMMAND not in spoiled:
+        yield f"the drive refused {excess.refused} commands"
+    if excess.beyond_share_pa > 0:
+        yield f"commanded {excess.beyond_share_pa:.0f} Pa more than it may while degraded"
+    if not outcome.wire and row.fault.inject:
         yield "the fault did not reach the bus"
 
 
-def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
-    """What the bus was not told, or told wrongly."""
-    latched = row.reaction in ("stop", "ramp")
-    if outcome.beyond_share_pa > 0:
-        yield f"commanded {outcome.beyond_share_pa:.0f} Pa more than it may while degraded"
-    if row.unheard:
-        return
-    if latched and outcome.found_ms is not None:
-        if outcome.shown != f"FAULT {outcome.code}":
-            yield f"CTRL_STATUS shows {outcome.shown or 'nothing'} in the end"
-        if outcome.code not in outcome.told:
-            yield f"no alarm {outcome.code} was sent"
-    named = {*row.codes, *row.alarms} & set(outcome.told)
-    if row.reaction in ("alarm", "halve") and row.codes and not named:
-        yield "no alarm with its name was sent"
-    for name in row.alarms:
-        if name not in outcome.told:
-            yield f"no alarm {name} was sent"
-    halves = row.reaction == "halve" or (row.halved_within_ms is not None and _halved_long(outcome))
-    for flag in (*row.flags, *(["degraded"] if halves else [])):
-        if flag not in outcome.flags:
-            yield f"CTRL_STATUS never said {flag}"
+def _late(row: Row, outcome: Outcome) -> Iterator[str]:
+    """What came too late, or not at all."""
+    times, limit = outcome.times, row.limit
+    found_ms = _reaction_ms(row, outcome)
+    if row.expect.reaction not in ("none", "refuse"):
+        if found_ms is None:
+            yield "was not found"
+        elif limit.found_ms is not None and found_ms > limit.found_ms:
+            yield f"found after {found_ms:.0f} ms, {limit.found_ms:.0f} allowed"
+    if limit.halved_ms is not None:
+        halved = [each for each in (times.halved, times.found) if each is not None]
+        if min(halved, default=math.inf) > limit.halved_ms:
+            yield f"pressure not halved within {limit.halved_ms:.0f} ms"
+    limit_ms = _zero_limit_ms(row, outcome) if row.expect.latched else None
+    if limit_ms is not None:
+        zero_ms = math.inf if times.zero is None else times.zero
+        if not row.fault.hardwired_stop and zero_ms > limit_ms:
+            yield f"pressure at zero after {zero_ms:.0f} ms, {limit_ms:.0f} allowed"
+        if not row.expect.unheard and times.commanded > limit_ms:
+            yield f"pressure commanded until {times.commanded:.0f} ms, {limit_ms:.0f} allowed"
 
 
-def _halved_long(outcome: Outcome) -> bool:
-    """Whether the pressure was halved for long enough, before the fault was latched, to be said."""
-    if outcome.halved_ms is None:
+def _ended_wrongly(row: Row, outcome: Outcome) -> Iterator[str]:
+    """What the controller was, did or called the fault in the end, and should not have."""
+    expect, times = row.expect, outcome.times
+    if expect.latched and times.found is not None and outcome.mode != "FAULT":
+        yield f"not latched: ended in {outcome.mode}"
+    ended_late = times.found is None and outcome.code in expect.may_end
+    if expect.reaction in _GO_ON and outcome.mode != "ACTIVE" and not ended_late:
+        yield f"ended in {outcome.mode}, {outcome.code}"
+    if expect.reaction in _GO_ON and expect.reaction != "halve" and times.halved is not None:
+        yield "halved the pressure"
+    if expect.reaction == "refuse" and outcome.was_active:
+        yield "was armed"
+    if expect.reaction != "refuse" and not outcome.was_active and not row.fault.from_start:
+        yield "was not in charge before"
+    if outcome.armed_again:
+        yield "armed again by itself"
+    named = outcome.code in expect.codes or (not expect.latched and _named_in_time(row, outcome))
+    if expect.codes and not named:
+        yield f"called {outcome.code}"
+
+
+def _named_in_time(row: Row, outcome: Outcome) -> bool:
+    """Whether an alarm had one of the row's names by the time that it was, or had to be, found."""
+    if outcome.times.alarm is None:
         return False
-    return outcome.found_ms is None or outcome.found_ms - outcome.halved_ms > STATUS_MS
+    latest_ms = max(row.limit.found_ms or 0.0, _reaction_ms(row, outcome) or 0.0) + ALARM_MS
+    return row.expect.reaction == "refuse" or outcome.times.alarm <= latest_ms
+
+
+def _unsaid(row: Row, outcome: Outcome) -> Iterator[str]:
+    """What was not said on the bus, or wrongly."""
+    expect, said, times = row.expect, outcome.said, outcome.times
+    if expect.unheard:
+        return
+    if expect.latched and times.found is not None:
+        if said.status != f"FAULT {outcome.code}":
+            yield f"CTRL_STATUS shows {said.status or 'nothing'} in the end"
+        if outcome.code not in said.alarms:
+            yield f"no alarm {outcome.code} was sent"
+    named = {*expect.codes, *expect.also} & set(said.alarms)
+    if expect.reaction in ("alarm", "halve") and expect.codes and not named:
+        yield "no alarm with its name was sent"
+    halved = row.limit.halved_ms is not None and times.halved is not None
+    if halved and times.found is not None:  # long enough before the latch to be in a status
+        halved = times.found - (times.halved or 0.0) > STATUS_MS
+    degraded = ["degraded"] if halved or expect.reaction == "halve" else []
+    for name in (*expect.also, *degraded):
+        if name in FLAGS and name not in said.flags:
+            yield f"CTRL_STATUS never said {name}"
+        elif name not in FLAGS and name not in said.alarms:
+            yield f"no alarm {name} was sent"

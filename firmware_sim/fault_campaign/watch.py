@@ -1,10 +1,10 @@
 """What happens on the bench after a fault: a node that looks on, and a log of the bus."""
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable
 from itertools import pairwise, zip_longest
-from typing import Any
 
+from firmware_sim.fault_campaign.campaign import Row
 from firmware_sim.faulty_bench import FaultyBench
 from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import (
@@ -18,7 +18,6 @@ from utank_hil.canbus import (
 )
 from utank_hil.canbus.codec import FRAME_BYTES
 from utank_hil.nodes.controller import ControllerNode
-from utank_hil.nodes.panel import TimedAction
 from utank_hil.safety.supervisor import Demand
 
 Heard = tuple[int, int, bytes]
@@ -28,7 +27,9 @@ _COMMANDS = load_catalogue().codec(PumpCommand)
 _STATUS = load_catalogue().codec(ControllerStatus)
 _ALARMS = load_catalogue().codec(Alarm)
 ROUNDING_PA = 8.0
+"""Resolution of the pressure in PUMP_CMD: each of two commands is rounded by half of it."""
 JITTER_S = 0.002
+"""How much later than its neighbour a command may reach a loaded bus of 250 kbit/s: four frames."""
 
 
 class BusLog:
@@ -103,30 +104,45 @@ def first_difference(
     return None
 
 
+class Moments:
+    """Variance of a roll, sample by sample."""
+
+    def __init__(self) -> None:
+        self._sum = self._square = 0.0
+        self._count = 0
+
+    def add(self, roll_rad: float) -> None:
+        """Take a sample."""
+        self._sum += roll_rad
+        self._square += roll_rad * roll_rad
+        self._count += 1
+
+    @property
+    def variance(self) -> float:
+        """In rad^2."""
+        mean = self._sum / self._count
+        return self._square / self._count - mean * mean
+
+
 class Watch:
     """Looks at controller, drive and ship in each tick, after all of them.
 
     Parameters
     ----------
-    operator : iterable of TimedAction
-        Buttons to press, at times after the first tick.
-    counts_from : mapping of str to float
-        As in `Row`.
-    codes : collection of str
-        As in `Row`.
-    within_ms : float, optional
-        As in `Row`.
+    row : Row
+        Whose operator presses buttons, at times after the first tick.
     degraded_most : tuple of (float, int)
         Pressure that is allowed while the pressure is halved, and in how many ns it is reached.
 
     Attributes
     ----------
-    active_ns, found_ns, halved_ns, noted_ns, alarm_ns : int or None
-        When the controller was first in charge; latched a fault; halved the pressure; rejected,
-        missed or discarded anything; raised an alarm of `codes`.
+    first_ns : dict of str to int
+        When the controller first was in charge ("active"); latched a fault ("found"); halved the
+        pressure ("halved"); rejected, missed or discarded anything ("noted"); raised an alarm that
+        the row names ("alarm").
     over_ns : int or None
-        When what `counts_from` asks for was first so; for the pressure, when it first became so and
-        stayed so until found, or for as long as the row gives time.
+        When what `Limit.counts_from` asks for was first so; for the pressure, when it first became
+        so and stayed so until found, or for as long as the row gives time.
     pressed_ns : int
         When the drive's set-point last was not zero, or the valve last followed.
     code : Fault
@@ -135,7 +151,7 @@ class Watch:
         In charge once more after a fault.
     beyond_share_pa : float
         How far the drive's set-point went beyond `degraded_most`.
-    roll_sum, roll_square, samples : float
+    rolls : Moments
         Of the true roll, every tick.
     """
 
@@ -144,36 +160,28 @@ class Watch:
     hears: frozenset[int] = frozenset()
 
     def __init__(
-        self,
-        bench: FaultyBench,
-        operator: Iterable[TimedAction] = (),
-        counts_from: Mapping[Any, float] | None = None,
-        codes: Collection[str] = (),
-        within_ms: float | None = None,
-        degraded_most: tuple[float, int] = (math.inf, 0),
+        self, bench: FaultyBench, row: Row, degraded_most: tuple[float, int] = (math.inf, 0)
     ) -> None:
         self._bench = bench
-        self._within_ns = math.inf if within_ms is None else within_ms * 1e6
-        self._script = sorted(operator, key=lambda timed: timed.time_s)
+        limit = row.limit
+        self._within_ns = math.inf if limit.found_ms is None else limit.found_ms * 1e6
+        self._counts_from = limit.counts_from
+        self._codes = {Fault[name] for name in row.expect.codes}
+        self._script = sorted(row.fault.operator, key=lambda timed: timed.time_s)
+        self._degraded_most = degraded_most
+        self._degraded_ns: int | None = None
         self._start_ns: int | None = None
-        self._counts_from = dict(counts_from or {})
-        self.over_ns: int | None = None
         self._noted = self._count()
         now_ns = bench.lockstep.now_ns
-        self.active_ns = now_ns if bench.node.mode is Mode.ACTIVE else None
-        self.found_ns: int | None = None
-        self.halved_ns: int | None = None
-        self.noted_ns: int | None = None
-        self.alarm_ns: int | None = None
-        self._codes = {Fault[name] for name in codes}
+        self.first_ns: dict[str, int] = {}
+        if bench.node.mode is Mode.ACTIVE:
+            self.first_ns["active"] = now_ns
+        self.over_ns: int | None = None
         self.pressed_ns = now_ns - TICK_NS
         self.code = Fault.NONE
         self.armed_again = self._waited = False
-        self._degraded_most = degraded_most
-        self._degraded_ns: int | None = None
         self.beyond_share_pa = 0.0
-        self.roll_sum = self.roll_square = 0.0
-        self.samples = 0
+        self.rolls = Moments()
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Hear nothing."""
@@ -199,50 +207,44 @@ class Watch:
         """Look."""
         if self._start_ns is None:
             self._start_ns = now_ns
+        ship, node, first_ns = self._bench.ship, self._bench.node, self.first_ns
         while self._script and now_ns - self._start_ns >= self._script[0].time_s * 1e9:
-            self._bench.ship.panel.press(self._script.pop(0).action)
-        node = self._bench.node
+            ship.panel.press(self._script.pop(0).action)
         supervisor = node.supervisor
         mode = supervisor.mode
-        if mode is Mode.FAULT:
-            if self.found_ns is None:
-                self.found_ns, self.code = now_ns, supervisor.fault
+        if mode is Mode.FAULT and "found" not in first_ns:
+            first_ns["found"], self.code = now_ns, supervisor.fault
         elif mode is Mode.ACTIVE:
-            self.armed_again |= self.found_ns is not None
-            if self.active_ns is None:
-                self.active_ns = now_ns
-            if self.halved_ns is None and supervisor.degraded:
-                self.halved_ns = now_ns
+            self.armed_again |= "found" in first_ns
+            first_ns.setdefault("active", now_ns)
+            if supervisor.degraded:
+                first_ns.setdefault("halved", now_ns)
         self._look_at_share(now_ns, degraded=mode is Mode.ACTIVE and supervisor.degraded)
-        if self.found_ns is None and (node.fault is not Fault.NONE or self._waited):
+        if "found" not in first_ns and (node.fault is not Fault.NONE or self._waited):
             self.code = node.fault
         self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
-        if self.noted_ns is None and self._count() > self._noted:
-            self.noted_ns = now_ns
-        if (
-            self.alarm_ns is None
-            and now_ns % (10 * TICK_NS) == 0
-            and node.alarms.codes & self._codes
-        ):
-            self.alarm_ns = now_ns
-        ship = self._bench.ship
+        if "noted" not in first_ns and self._count() > self._noted:
+            first_ns["noted"] = now_ns
+        if now_ns % (10 * TICK_NS) == 0 and node.alarms.codes & self._codes:
+            first_ns.setdefault("alarm", now_ns)
         if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
             ship.valve is not None and ship.valve.following
         ):
             self.pressed_ns = now_ns
-        roll = ship.plant.roll_rad
+        self._look_at_difference(now_ns)
+        self.rolls.add(ship.plant.roll_rad)
+        return ()
+
+    def _look_at_difference(self, now_ns: int) -> None:
+        """Note since when the difference that the row counts from is there."""
         for name, limit in self._counts_from.items():
             if self._apart(name) <= limit:
                 # a pump may cross its set-point; what was there for long was to be found
                 long = self.over_ns is not None and now_ns - self.over_ns > self._within_ns
-                if name == "pressure_pa" and self.found_ns is None and not long:
+                if name == "pressure_pa" and "found" not in self.first_ns and not long:
                     self.over_ns = None
             elif self.over_ns is None:
                 self.over_ns = now_ns
-        self.roll_sum += roll
-        self.roll_square += roll * roll
-        self.samples += 1
-        return ()
 
     def _look_at_share(self, now_ns: int, *, degraded: bool) -> None:
         """Note by how much the drive was asked for more than half the pressure allows."""

@@ -83,6 +83,16 @@ class Fault(Section, ABC):
         """Nodes that must be emulated for it."""
         return self.needs
 
+    @property
+    def beyond_commands(self) -> bool:
+        """Whether the pump presses on whatever it is commanded."""
+        return False
+
+    @property
+    def spoiled_message(self) -> str | None:
+        """The message that it alone alters; None of one that alters none, or all."""
+        return getattr(self, "message", None)
+
     @abstractmethod
     def place(self, bench: Bench, span: Span, seed: int) -> None:
         """Place it; `seed` is of what it draws."""

@@ -28,6 +28,11 @@ class Hangs(NodeFault):
 
     kind: Literal["hangs"]
 
+    @property
+    def beyond_commands(self) -> bool:
+        """A drive that hangs keeps its last pressure."""
+        return self.node == "drive"
+
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Hold the node."""
         bench.nodes[self.node].hangs.append(span)
@@ -115,6 +120,11 @@ class Pump(Fault):
     """Time constant with which it does."""
     off_too: bool = False
     """It presses while it is off, too."""
+
+    @property
+    def beyond_commands(self) -> bool:
+        """As `off_too` says."""
+        return self.off_too
 
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Break the pump, and mend it in the end."""

@@ -1,10 +1,11 @@
 """The campaign's rows, an outcome that passes, and its verdict."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 from firmware_sim.fault_campaign.campaign import Campaign
-from firmware_sim.fault_campaign.trial import Outcome
+from firmware_sim.fault_campaign.trial import FLAGS, Outcome, Rolls, Said, Times
 from firmware_sim.fault_campaign.verdict import Result, judged
 from utank_hil.configuration import load_config
 
@@ -12,27 +13,34 @@ CAMPAIGN = load_config(Path("configs/faults/campaign.yaml"), Campaign)
 ROWS = {row.id: row for row in CAMPAIGN.rows}
 
 GOOD = Outcome(
-    "roll-sign-flipped", 1, found_ms=500.0, zero_ms=520.0, mode="FAULT", code="MOTION_SIGN_FLIP",
-    was_active=True, roll_variance=1.0, passive_variance=1.0, window_s=60.0, wire="differs",
-    shown="FAULT MOTION_SIGN_FLIP", told=("MOTION_SIGN_FLIP",),
+    "roll-sign-flipped", 1, Times(found=500.0, zero=520.0), mode="FAULT", code="MOTION_SIGN_FLIP",
+    was_active=True, said=Said("FAULT MOTION_SIGN_FLIP", ("MOTION_SIGN_FLIP",)),
+    rolls=Rolls(1.0, 1.0, 60.0), wire="differs",
 )  # fmt: skip
 
 
+def changed(outcome: Outcome, **values: Any) -> Outcome:
+    """An outcome with other values of its fields, or of the fields of its parts."""
+    for part in ("times", "said", "excess", "rolls"):
+        whole = getattr(outcome, part)
+        inner = {each.name: values.pop(each.name) for each in fields(whole) if each.name in values}
+        outcome = replace(outcome, **{part: replace(whole, **inner)})
+    return replace(outcome, **values)
+
+
 def verdict(row: str, *outcomes: Outcome) -> Result:
-    return judged(ROWS[row], CAMPAIGN.setups[ROWS[row].setup], "", outcomes)
+    return judged(CAMPAIGN, ROWS[row], outcomes)
 
 
 def said(row: str, outcome: Outcome) -> Outcome:
     """What a controller with this outcome says on the bus."""
-    told = [outcome.code] if outcome.found_ms is not None else []
-    if outcome.alarm_ms is not None:
-        told += ROWS[row].codes
-    return replace(
-        outcome,
-        shown=f"{outcome.mode} {outcome.code}",
-        told=(*told, *ROWS[row].alarms),
-        flags=("alarm", "degraded") if outcome.halved_ms is not None else (),
-    )
+    expect = ROWS[row].expect
+    alarms = [outcome.code] if outcome.times.found is not None else []
+    if outcome.times.alarm is not None:
+        alarms += expect.codes
+    flags = ("alarm", "degraded") if outcome.times.halved is not None else ()
+    also = [name for name in expect.also if name not in FLAGS]
+    return replace(outcome, said=Said(f"{outcome.mode} {outcome.code}", (*alarms, *also), flags))
 
 
 def spoken(row: str, *outcomes: Outcome) -> Result:
