@@ -26,9 +26,11 @@ from utank_hil.telemetry.frame_log import SUFFIX
 
 LOCKSTEP: Final = "lockstep"
 POLL_S: Final = 0.1
+"""How often the progress is shown and Ctrl-C noticed, where no deadline depends on it."""
 BEGIN_AFTER_NS: Final = 200_000_000
-"""From the moment when both sides are ready to the first tick of both: they look every 10 ms."""
+"""Time from when both sides are ready to the first tick of both: twenty looks of each."""
 READY_POLL_S: Final = 0.01
+"""How often each side looks: once a tick."""
 
 LEAST_REACH: Final = 0.5
 """A run that came less far than this share of the longest does not shorten what is compared."""
@@ -36,7 +38,7 @@ LEAST_ROWS: Final = 0.9
 """A run with less than this share of its rows in the time compared is not compared."""
 
 Progress = Callable[[str, float], None]
-"""Told a run's name and the seconds of it that are done."""
+"""Takes a run's name and the seconds of it that are done."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

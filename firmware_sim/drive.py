@@ -34,7 +34,7 @@ STOPPED_SHARE = 0.02
 LONGEST_STOP_NS = 500_000_000
 """A motor that can't take the pressure away in this time is switched off all the same."""
 WARNED_MESSAGES = 2
-"""So many DRIVE_STATUS_2 tell of one command that was not taken."""
+"""Number of DRIVE_STATUS_2 that report one command that was not taken."""
 _STOP_WORDS = (ControlWord.QUICK_STOP, ControlWord.DISABLE_VOLTAGE, ControlWord.SHUTDOWN, None)
 """None: an unknown word disables the voltage."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here

@@ -39,7 +39,7 @@ class FaultyBench:
     trace : callable, optional
         As `Lockstep` takes it.
     sink : callable, optional
-        Takes the controller's telemetry, one row of so many ticks.
+        Takes the controller's telemetry, a row every `sink_every` ticks.
     retuner : Retuner, optional
         Of a controller that retunes itself; its law can't be made to fail.
     estimating : Retuner, optional

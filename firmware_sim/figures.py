@@ -1,100 +1,391 @@
-"""The runs of a bench in figures, over its window."""
+"""A bench in figures: computed once; tables, JSON, picture and page show the same ones."""
 
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import TypeAdapter
 
 from firmware_sim.bench import BenchResult
+from firmware_sim.model_limits import passed_limits
+from firmware_sim.on_board import LEVELS_RAD, OnBoard, on_board
+from firmware_sim.place import Place
+from firmware_sim.retuning_figures import RetuningFigures, retuning_figures
 from firmware_sim.run import RECORD_S, Run
 from firmware_sim.scenario import PASSIVE
-from firmware_sim.verdicts import active_share, mark_of
+from firmware_sim.ship_side import PASSIVE_SCRIPT
+from utank_hil.analysis.motion.comfort import EXPOSURE_S
 from utank_hil.analysis.motion.statistics import (
     PumpStatistics,
     RollStatistics,
     pump_statistics,
     roll_statistics,
 )
+from utank_hil.base.arrays import FloatArray
+from utank_hil.base.finite import finite
 from utank_hil.canbus import Fault, Mode
+from utank_hil.console.exit_codes import ExitCode
+from utank_hil.console.failures import KILLED
+from utank_hil.nodes.panel import Action
+from utank_hil.safety.faults import fault_text
 
+NO_TANK: Final = "no tank"
 LEAST_ROLL_RAD: Final = 1e-6
 """Less roll than this is none: a share of it says nothing."""
+LEAST_IN_CHARGE: Final = 0.9
+"""Least share of the time ordered by the operator in which the controller must be in charge."""
+
+_ORDERS: Final = {
+    Action.ARM: Mode.ACTIVE,
+    Action.PASSIVE: Mode.PASSIVE,
+    Action.DISARM: Mode.PASSIVE,
+    Action.STANDBY: Mode.STANDBY,
+    Action.STOP: Mode.STANDBY,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Why a run is not ranked: a word for a cell of a table, and a sentence without its name."""
+
+    word: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class BareShip(RollStatistics):
+    """Roll of the ship without a tank; `capsized_s` is None if it did not capsize."""
+
+    capsized_s: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class RunFigures:
-    """One run in figures, over the window of the bench.
+    """One run in figures. Those of a run that is not compared are None, up to `active_share`.
 
     Attributes
     ----------
-    ranked : bool
-        Whether the run counts, see `firmware_sim.verdicts`.
+    mark : Mark or None
+        Why the run is not ranked.
+    rows, expected_rows : int
+        Rows in the window, and how many there are if none is left out.
+    end_s : float
+        The ship's time at the end of the run.
+    capsized_s : float or None
+        None if the ship did not capsize.
+    strikes, max_strike_impulse_nms, pump_speed_rad_s, energy_j, bus_load, refused_commands
+        As in `Run`, of the whole run; so are `fallbacks` and `law_error`.
     rank : int or None
         Place by roll RMS among the runs that count, from 1.
     roll_below_no_tank, roll_below_passive : float or None
         Share by which the roll RMS is less than without a tank, and than with the passive tank;
         None where the run or the one it is compared with does not count, and on still water.
-    strikes : int
-        How often the water hit a reservoir's roof or bottom, over the whole run.
-    mode, fault : str
+    mode, fault : str or None
         Of the controller at the end of the run.
-    active_share : float
+    active_share : float or None
         Share of the window in which the controller was in charge.
+    loop : dict or None
+        How the loop kept its time; None in simulated time.
     """
 
     name: str
+    compared: bool
     ranked: bool
-    rank: int | None
-    roll: RollStatistics
-    roll_below_no_tank: float | None
-    roll_below_passive: float | None
-    pump: PumpStatistics
+    mark: Mark | None
+    rows: int
+    expected_rows: int
+    end_s: float
+    capsized_s: float | None
     strikes: int
+    max_strike_impulse_nms: float
+    pump_speed_rad_s: float
+    energy_j: float
     bus_load: float
     refused_commands: int
+    fallbacks: int | None
+    law_error: str
+    loop: dict[str, Any] | None
+    retuning: RetuningFigures | None
+    rank: int | None = None
+    roll: RollStatistics | None = None
+    roll_below_no_tank: float | None = None
+    roll_below_passive: float | None = None
+    pump: PumpStatistics | None = None
+    mode: str | None = None
+    fault: str | None = None
+    active_share: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OnBoardFigures:
+    """What the roll means for people at a place, by run.
+
+    Attributes
+    ----------
+    exposure_s : float
+        For which the sickness is predicted.
+    levels_rad : tuple of float
+        Single amplitudes of roll whose exceedance is stated.
+    runs : dict of str to OnBoard
+        The bare ship, and the runs that can be compared with it and did not capsize.
+    """
+
+    place: Place
+    exposure_s: float
+    levels_rad: tuple[float, ...]
+    runs: dict[str, OnBoard]
+
+
+@dataclass(frozen=True, slots=True)
+class BenchFigures:
+    """A bench in figures, over its window, in SI units.
+
+    Attributes
+    ----------
+    scenario : str
+        Its name.
+    exit_code : int
+        How the bench ended, for scripts.
+    endings : tuple of str
+        What is to be said of how runs ended; nothing where all went as the operator wanted.
+    limits_passed : tuple of str
+        Limits of the model that were passed.
+    runs : tuple of RunFigures
+        All that have a row; the passive tank first.
+    """
+
+    scenario: str
     mode: str
-    fault: str
-    active_share: float
+    seed: int
+    duration_s: float
+    settle_s: float
+    end_s: float
+    interrupted: bool
+    not_run: tuple[str, ...]
+    wall_s: float
+    exit_code: int
+    endings: tuple[str, ...]
+    limits_passed: tuple[str, ...]
+    no_tank: BareShip
+    on_board: OnBoardFigures
+    runs: tuple[RunFigures, ...]
+
+    @property
+    def compared(self) -> tuple[RunFigures, ...]:
+        """The runs that have rows enough in the window."""
+        return tuple(run for run in self.runs if run.compared)
+
+    @property
+    def wrong(self) -> tuple[str, ...]:
+        """All that was not as it should be."""
+        return (*self.endings, *self.limits_passed)
+
+    def as_json(self, files: Mapping[str, Path], about: Mapping[str, Any]) -> dict[str, Any]:
+        """The figures, ready for `json.dumps`, with where they come from and the files beside."""
+        return {**about, **asdict(self), "files": {name: str(each) for name, each in files.items()}}
 
 
-def figures(result: BenchResult) -> tuple[RollStatistics, tuple[RunFigures, ...]]:
-    """Figures of the bare ship, and of each run that has rows enough in the window."""
-    bare = roll_statistics(result.without_tank_rad[round(result.settle_s / RECORD_S) :])
+def read_figures(content: Mapping[str, Any]) -> BenchFigures:
+    """The figures in the JSON of a bench.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If there are none, or those of another version.
+    """
+    return TypeAdapter(BenchFigures).validate_python(content)
+
+
+def figures(result: BenchResult) -> BenchFigures:
+    """Compute what a bench comes to."""
+    marks = {run.name: mark_of(result, run) for run in result.runs}
+    return BenchFigures(
+        scenario=result.scenario.name,
+        mode=result.mode,
+        seed=result.seed,
+        duration_s=result.duration_s,
+        settle_s=result.settle_s,
+        end_s=result.end_s,
+        interrupted=result.interrupted,
+        not_run=result.not_run,
+        wall_s=result.wall_s,
+        exit_code=int(_exit_code(result, marks)),
+        endings=tuple(_endings(result, marks)),
+        limits_passed=tuple(passed_limits(result)),
+        no_tank=bare_figures(result),
+        on_board=_on_board(result),
+        runs=run_figures(result),
+    )
+
+
+def bare_figures(result: BenchResult) -> BareShip:
+    """Roll of the bare ship in the window."""
+    return BareShip(
+        **asdict(roll_statistics(_bare_roll(result))),
+        capsized_s=finite(result.without_tank_capsized_s),
+    )
+
+
+def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
+    """Figures of each run, ranked."""
     compared = [run for run in result.runs if result.compares(run)]
-    rolls = {run.name: _roll(result, run) for run in compared}
-    ranked = [run.name for run in compared if mark_of(result, run) is None]
-    order = sorted(ranked, key=lambda name: rolls[name].rms_rad)
-    passive = rolls[PASSIVE] if PASSIVE in ranked else None
-    afloat = bare if result.without_tank_capsized_s >= result.end_s else None
+    marks = {run.name: mark_of(result, run) for run in result.runs}
+    rolls = {run.name: roll_statistics(_roll(result, run)) for run in compared}
+    order = sorted((name for name in rolls if marks[name] is None), key=lambda n: rolls[n].rms_rad)
+    passive = rolls[PASSIVE] if PASSIVE in order else None
+    afloat = result.without_tank_capsized_s >= result.end_s
+    bare = roll_statistics(_bare_roll(result)) if afloat else None
     found = []
-    for run in compared:
-        counts = run.name in ranked
-        window = run.between(result.settle_s, result.end_s)
-        found.append(
-            RunFigures(
-                name=run.name,
-                ranked=counts,
-                rank=order.index(run.name) + 1 if counts else None,
-                roll=rolls[run.name],
-                roll_below_no_tank=_share_below(rolls[run.name], afloat) if counts else None,
-                roll_below_passive=_share_below(rolls[run.name], passive) if counts else None,
-                pump=pump_statistics(
+    for run in result.runs:
+        counts, window = run.name in order, _window(result, run)
+        retuning = retuning_figures(run, result.scenario, result.settle_s)
+        judged: dict[str, Any] = {}
+        if run.name in rolls:
+            roll = rolls[run.name]
+            judged = {
+                "rank": order.index(run.name) + 1 if counts else None,
+                "roll": roll,
+                "roll_below_no_tank": _share_below(roll, bare) if counts else None,
+                "roll_below_passive": _share_below(roll, passive) if counts else None,
+                "pump": pump_statistics(
                     run.column("true_pressure_pa")[window],
                     run.column("true_shaft_power_w")[window],
                     run.column("true_level_m")[window],
                 ),
+                "mode": Mode(int(run.column("mode")[-1])).name,
+                "fault": Fault(int(run.column("fault")[-1])).name,
+                "active_share": float((run.column("mode")[window] == Mode.ACTIVE).mean()),
+            }
+        found.append(
+            RunFigures(
+                name=run.name,
+                compared=run.name in rolls,
+                ranked=counts,
+                mark=marks[run.name],
+                rows=result.rows_compared(run),
+                expected_rows=result.expected_rows,
+                end_s=run.end_s,
+                capsized_s=finite(run.capsized_s),
                 strikes=run.strikes,
+                max_strike_impulse_nms=run.max_strike_impulse_nms,
+                pump_speed_rad_s=run.pump_speed_rad_s,
+                energy_j=run.energy_j,
                 bus_load=run.bus_load,
                 refused_commands=run.refused_commands,
-                mode=Mode(int(run.column("mode")[-1])).name,
-                fault=Fault(int(run.column("fault")[-1])).name,
-                active_share=active_share(result, run),
+                fallbacks=run.fallbacks,
+                law_error=run.law_error,
+                loop=None if run.loop is None else run.loop.statistics.summary(),
+                retuning=retuning,
+                **judged,
             )
         )
-    return bare, tuple(found)
+    return tuple(found)
 
 
-def _roll(result: BenchResult, run: Run) -> RollStatistics:
-    window = run.between(result.settle_s, result.end_s)
-    return roll_statistics(run.column("true_roll_rad")[window])
+def mark_of(result: BenchResult, run: Run) -> Mark | None:
+    """Why a run is not ranked; None for one that is.
+
+    A run that capsized, failed or was idle gives no reduction.
+    """
+    if not result.compares(run):
+        return Mark(
+            "not compared",
+            f"not compared, ended at {run.end_s:g} s with {result.rows_compared(run)} of the "
+            f"{result.expected_rows} rows from {result.settle_s:g} s to {result.end_s:g} s",
+        )
+    if run.capsized_s < result.end_s:
+        return Mark("capsized", f"the ship capsized at {run.capsized_s:.1f} s")
+    mode, fault = (int(run.column(name)[-1]) for name in ("mode", "fault"))
+    if fault != Fault.NONE:
+        words = fault_text(Fault(fault))
+        return Mark("fault", f"the controller ended in {Mode(mode).name}, fault {words}")
+    wanted = Mode.PASSIVE if run.name == PASSIVE else Mode.ACTIVE
+    ordered = _window(result, run) & (_orders(result, run) == wanted)
+    if not ordered.any():
+        return Mark("idle", f"no order to go to {wanted.name} before the end of the window")
+    share = float((run.column("mode")[ordered] == wanted).mean())
+    if share < LEAST_IN_CHARGE:
+        return Mark(
+            "idle",
+            f"the controller was in {wanted.name} for {share:.1%} of the time that the operator "
+            f"wanted it there; {LEAST_IN_CHARGE:.0%} are asked for",
+        )
+    return None
+
+
+def rolls_compared(result: BenchResult) -> dict[str, FloatArray]:
+    """Roll of each run that is compared, over the window."""
+    return {run.name: _roll(result, run) for run in result.runs if result.compares(run)}
+
+
+def _orders(result: BenchResult, run: Run) -> npt.NDArray[np.int64]:
+    """The mode that the operator wanted at each row; his clock starts when the controller is ready.
+
+    Of the passive run, the pump at zero: switched off, its rotor would turn with the water.
+    """
+    script = PASSIVE_SCRIPT if run.name == PASSIVE else result.scenario.operator
+    time_s, orders = run.column("time_s"), np.full(len(run.rows), int(Mode.STANDBY))
+    ready = np.flatnonzero(run.column("mode") != Mode.INIT)
+    start_s = time_s[ready[0]] if len(ready) else np.inf
+    for timed in sorted(script, key=lambda timed: timed.time_s):
+        if timed.action in _ORDERS:
+            orders[time_s >= start_s + timed.time_s] = _ORDERS[timed.action]
+    return orders
+
+
+def _endings(result: BenchResult, marks: Mapping[str, Mark | None]) -> list[str]:
+    said = []
+    if result.interrupted:
+        said.append(f"ended at {result.end_s:g} of {result.duration_s:g} s")
+    if result.killed:
+        said.append(KILLED)
+    if result.not_run:
+        said.append(f"not run: {', '.join(result.not_run)}")
+    if result.without_tank_capsized_s < result.end_s:
+        said.append(f"{NO_TANK}: the ship capsized at {result.without_tank_capsized_s:.1f} s")
+    said += [f"{name}: not ranked, {mark.why}" for name, mark in marks.items() if mark]
+    said += [
+        f"{run.name}: {run.fallbacks} plans were not found in time; the one before went on"
+        for run in result.runs
+        if run.fallbacks
+    ]
+    said += [f"{run.name}: the law failed: {run.law_error}" for run in result.runs if run.law_error]
+    return said
+
+
+def _exit_code(result: BenchResult, marks: Mapping[str, Mark | None]) -> ExitCode:
+    if result.interrupted:
+        return ExitCode.INTERRUPTED
+    if result.killed:
+        return ExitCode.SYSTEM
+    return ExitCode.NOT_RANKED if any(marks.values()) or result.not_run else ExitCode.OK
+
+
+def _on_board(result: BenchResult) -> OnBoardFigures:
+    """Judge the rolls; a ship that capsized lies still, and nothing on board is to be judged."""
+    place = result.scenario.place_on_board
+    rolls = {}
+    if result.without_tank_capsized_s >= result.end_s:
+        rolls[NO_TANK] = _bare_roll(result)
+    afloat = {run.name for run in result.runs if run.capsized_s >= result.end_s}
+    rolls |= {name: roll for name, roll in rolls_compared(result).items() if name in afloat}
+    runs = {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}
+    return OnBoardFigures(place, EXPOSURE_S, LEVELS_RAD, runs)
+
+
+def _bare_roll(result: BenchResult) -> FloatArray:
+    return result.without_tank_rad[round(result.settle_s / RECORD_S) :]
+
+
+def _roll(result: BenchResult, run: Run) -> FloatArray:
+    return run.column("true_roll_rad")[_window(result, run)]
+
+
+def _window(result: BenchResult, run: Run) -> npt.NDArray[np.bool_]:
+    return run.between(result.settle_s, result.end_s)
 
 
 def _share_below(roll: RollStatistics, reference: RollStatistics | None) -> float | None:

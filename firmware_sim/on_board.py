@@ -4,20 +4,18 @@ Roll is all that the bench knows; sway, heave and pitch add to it on a real ship
 """
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from firmware_sim.bench import BenchResult
 from firmware_sim.place import Place
-from utank_hil.analysis.motion.comfort import EXPOSURE_S, Comfort, comfort
+from utank_hil.analysis.motion.comfort import Comfort, comfort
 from utank_hil.analysis.motion.exceedance import exceedance, rayleigh_exceedance
 from utank_hil.base.arrays import FloatArray
 
 LEVELS_RAD: Final = tuple(math.radians(degrees) for degrees in (2.5, 5.0, 7.5, 10.0, 15.0, 20.0))
 """Single amplitudes of roll whose exceedance is stated."""
-_NO_TANK: Final = "no tank"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +28,7 @@ class OnBoard:
         Shares of the single amplitudes of roll above each of `LEVELS_RAD`; None where the record
         holds no half-cycle.
     rayleigh : tuple of float
-        The same of a narrow-banded Gaussian roll of this standard deviation.
+        Shares that a narrow-banded Gaussian roll of this standard deviation has.
     comfort : Comfort
         At the place.
     """
@@ -54,31 +52,3 @@ def on_board(roll_rad: FloatArray, step_s: float, place: Place) -> OnBoard:
         tuple(rayleigh.tolist()),
         comfort(roll_rad, np.gradient(roll_rad, step_s), step_s, place.height_m, place.starboard_m),
     )
-
-
-def judged_runs(result: BenchResult) -> dict[str, OnBoard]:
-    """The bare ship and the runs that can be compared with it, over the bench's window.
-
-    A ship that capsized lies still, and nothing on board is to be judged.
-    """
-    from firmware_sim.run import RECORD_S
-
-    place = result.scenario.place_on_board
-    rolls = {}
-    if result.without_tank_capsized_s >= result.end_s:
-        rolls[_NO_TANK] = result.without_tank_rad[round(result.settle_s / RECORD_S) :]
-    for run in result.runs:
-        if result.compares(run) and run.capsized_s >= result.end_s:
-            window = run.between(result.settle_s, result.end_s)
-            rolls[run.name] = run.column("true_roll_rad")[window]
-    return {name: on_board(roll, RECORD_S, place) for name, roll in rolls.items() if len(roll) >= 3}
-
-
-def on_board_json(result: BenchResult) -> dict[str, Any]:
-    """The figures in SI units, ready for `json.dumps`."""
-    return {
-        "place": asdict(result.scenario.place_on_board),
-        "exposure_s": EXPOSURE_S,
-        "levels_rad": list(LEVELS_RAD),
-        "runs": {name: asdict(each) for name, each in judged_runs(result).items()},
-    }

@@ -19,7 +19,7 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 SAILING_TICKS = 100
-"""The ship's parameters are asked for once in so many ticks: once a second."""
+"""Ticks between two looks at the ship's parameters: a second."""
 
 
 class Plant:

@@ -1,4 +1,4 @@
-"""What a report says of a bench: read from the files that it left."""
+"""The page of a bench: from its figures, or from the files that it left."""
 
 import json
 import math
@@ -6,26 +6,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
+from pydantic import ValidationError
 
+from firmware_sim.figures import BenchFigures, read_figures
 from firmware_sim.report_tables import tables
+from firmware_sim.run import RECORD_S
 from firmware_sim.scenario import PASSIVE
 from utank_hil.base.arrays import FloatArray
 from utank_hil.configuration import Vessel
 from utank_hil.console.ship_report import power_words, ship_line
 from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportTable, Verdict
-from utank_hil.reports.parts import (
-    Report,
-    ReportKind,
-    about_section,
-    printed,
-    roll_figure,
-)
+from utank_hil.reports.parts import Report, ReportKind, about_section, printed, roll_figure
 from utank_hil.telemetry.recording import read_recording
 
-Recorded = Mapping[str, Mapping[str, FloatArray]]
-"""Columns by run."""
-FIGURES, PICTURE, RECORDING = "bench.json", "bench.png", "bench.rrd"
+PICTURE, RECORDING, FIGURES = "bench.png", "bench.rrd", "bench.json"
 
 _SEAS: Final = {
     "measured": "measured",
@@ -42,79 +36,94 @@ _SEA_KEYS: Final = {
     "amplitude_m": "amplitude {:g} m",
     "period_s": "period {:g} s",
     "spreading": "spread as cos^2s with s = {:g}",
-    "course_deg": "her course {:g}° from true north",
-    "heading_deg": "waves at {:g}° to her course (0° following, 90° from port, 180° head)",
+    "course_deg": "course {:g}° from true north",
+    "heading_deg": "waves at {:g}° to the course (0° following, 90° from port, 180° head)",
 }
 
 
-def bench_report(folder: Path, scratch: Path) -> Report:
-    """The report of a bench.
+def bench_page(
+    found: BenchFigures,
+    about: Mapping[str, Any],
+    picture: bytes | None,
+    rolls: Mapping[str, FloatArray],
+    scratch: Path,
+) -> Report:
+    """The page of a bench.
 
     Parameters
     ----------
-    folder : Path
-        What ``utank-hil bench --out`` wrote.
+    about : mapping
+        Where it comes from.
+    picture : bytes, optional
+        PNG of all runs.
+    rolls : mapping of str to ndarray, shape (n,)
+        Of each run that is compared, every `RECORD_S` in the window.
     scratch : Path
-        Folder for pictures that are made for the report.
+        Folder for pictures that are made for the page.
+    """
+    says = "Roll and power of each run, and roll, level and pressure over time"
+    sections = [
+        ReportSection("What was run", _what_was_run(found, about["configuration"])),
+        ReportSection(
+            "Roll and cost",
+            pictures=[] if picture is None else [ReportPicture(picture, says)],
+            tables=[printed(table) for table in tables(found)],
+        ),
+        *([roll_figure(rolls, RECORD_S, scratch)] if rolls else []),
+        _deadlines(found),
+        about_section(about, about["configuration"]),
+    ]
+    below = (
+        f"{found.mode}, seed {found.seed}, {found.settle_s:g} s to "
+        f"{found.end_s:g} s of the same waves for each run. {about['date']}."
+    )
+    return Report(f"{found.scenario}: bench", below, _verdict(found), sections)
+
+
+def read_bench(folder: Path, scratch: Path) -> Report:
+    """The page of a bench from the files that it left.
 
     Raises
     ------
     OSError, ValueError
-        If a file of the bench is missing or is none.
+        If one is missing or is none.
     """
     content = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
-    says = "Roll and power of each run, and roll, level and pressure over time"
-    sections = [
-        ReportSection("What was run", _what_was_run(content)),
-        ReportSection(
-            "Roll and cost",
-            pictures=[ReportPicture((folder / PICTURE).read_bytes(), says)],
-            tables=[printed(table) for table in tables(content)],
-        ),
-        *_roll_figure(content, read_recording(folder / RECORDING), scratch),
-        _deadlines(content),
-        about_section(content, content["configuration"]),
-    ]
-    below = (
-        f"{content['mode']}, seed {content['seed']}, {content['settle_s']:g} s to "
-        f"{content['end_s']:g} s of the same waves for each run. {content['date']}."
-    )
-    return Report(f"{content['scenario']}: bench", below, _verdict(content), sections)
-
-
-BENCH: Final = ReportKind(FIGURES, bench_report)
-
-
-def _roll_figure(content: dict[str, Any], recorded: Recorded, scratch: Path) -> list[ReportSection]:
-    # a run that is not compared may have ended before the compared time begins
-    compared = [run["name"] for run in content["runs"] if run["compared"]]
+    try:
+        found = read_figures(content)
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        reason = f"has no {key} that can be used: it is of another version, make it again"
+        raise ValueError(f"{folder / FIGURES}: {reason}") from error
+    recorded = read_recording(folder / RECORDING)
     rolls = {}
-    for name in compared:
-        time_s = recorded[name]["time_s"]
-        between = (time_s >= content["settle_s"]) & (time_s <= content["end_s"])
-        rolls[name] = recorded[name]["true_roll_rad"][between]
-    if not rolls:
-        return []
-    step_s = float(np.median(np.diff(recorded[compared[0]]["time_s"])))
-    return [roll_figure(rolls, step_s, scratch)]
+    for run in found.compared:
+        time_s = recorded[run.name]["time_s"]
+        half_s = RECORD_S / 2
+        between = (time_s > found.settle_s - half_s) & (time_s < found.end_s - half_s)
+        rolls[run.name] = recorded[run.name]["true_roll_rad"][between]
+    return bench_page(found, content, (folder / PICTURE).read_bytes(), rolls, scratch)
 
 
-def _verdict(content: dict[str, Any]) -> Verdict:
-    ranked = [run for run in content["runs"] if run["ranked"] and run["name"] != PASSIVE]
+BENCH: Final = ReportKind(FIGURES, read_bench)
+
+
+def _verdict(found: BenchFigures) -> Verdict:
+    ranked = [run for run in found.runs if run.ranked and run.name != PASSIVE]
     lines = []
     if ranked:
-        best = min(ranked, key=lambda run: run["rank"])
-        below, bare = best["roll_below_passive"], best["roll_below_no_tank"]
-        line = f"{best['name']} rolls {math.degrees(best['roll']['rms_rad']):.2f}° RMS"
-        if below is not None:
-            line += f", {_less(below)} than the passive tank"
-        if bare is not None:
-            line += f" and {_less(bare)} than no tank"
-        power = power_words(best["pump"]["power_mean_w"])
+        best = min(ranked, key=lambda run: run.rank or math.inf)
+        assert best.roll is not None
+        assert best.pump is not None
+        line = f"{best.name} rolls {math.degrees(best.roll.rms_rad):.2f}° RMS"
+        if best.roll_below_passive is not None:
+            line += f", {_less(best.roll_below_passive)} than the passive tank"
+        if best.roll_below_no_tank is not None:
+            line += f" and {_less(best.roll_below_no_tank)} than no tank"
+        power = power_words(best.pump.power_mean_w)
         lines.append(f"{line}, for {power} of shaft power on average.")
-    wrong = [*content["endings"], *content["limits_passed"]]
-    lines += wrong or ["No run failed, and no limit of the model was passed."]
-    return Verdict(lines, good=not wrong)
+    lines += found.wrong or ["No run failed, and no limit of the model was passed."]
+    return Verdict(lines, good=not found.wrong)
 
 
 def _less(share: float) -> str:
@@ -129,22 +138,22 @@ def sea_words(sea: Mapping[str, Any]) -> str:
         if value is not None:
             words.append(said.format(value.replace("T", " ") if isinstance(value, str) else value))
     if sea.get("speed_m_s"):
-        words.append(f"her speed {sea['speed_m_s']:g} m/s")
+        words.append(f"speed {sea['speed_m_s']:g} m/s")
     return ", ".join(words)
 
 
-def _what_was_run(content: dict[str, Any]) -> list[str]:
-    vessel = Vessel.model_validate(content["configuration"]["vessel"])
-    names = [run["name"] for run in content["runs"] if run["name"] != PASSIVE]
+def _what_was_run(found: BenchFigures, scenario: Mapping[str, Any]) -> list[str]:
+    vessel = Vessel.model_validate(scenario["vessel"])
+    names = [run.name for run in found.runs if run.name != PASSIVE]
     return [
         f"Ship: {vessel.name}. {ship_line(vessel)}",
-        f"Sea: {sea_words(content['configuration']['sea'])}.",
+        f"Sea: {sea_words(scenario['sea'])}.",
         f"Runs: {', '.join(['without a tank', 'with the passive tank', *names])}.",
     ]
 
 
-def _deadlines(content: dict[str, Any]) -> ReportSection:
-    loops = {run["name"]: run["loop"] for run in content["runs"] if run["loop"]}
+def _deadlines(found: BenchFigures) -> ReportSection:
+    loops = {run.name: run.loop for run in found.runs if run.loop}
     if not loops:
         return ReportSection("Deadlines", ["Simulated time: there are none."])
     keys = [key for key, value in next(iter(loops.values())).items() if not isinstance(value, dict)]

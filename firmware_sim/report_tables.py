@@ -1,40 +1,33 @@
-"""The tables of a bench, made of its JSON: for the terminal and for the report."""
+"""The tables of a bench, for the terminal and for its page."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
 from rich.table import Table as RichTable
 
-from firmware_sim.retuning_figures import SETTLING_S
+from firmware_sim.figures import NO_TANK, BenchFigures, RunFigures
+from firmware_sim.retuning_figures import SETTLING_S, RetuningFigures
 from firmware_sim.scenario import PASSIVE
+from utank_hil.analysis.motion.statistics import RollStatistics
 from utank_hil.console.terminal import new_table
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
-NO_TANK: Final = "no tank"
 _PREFIXES: Final = (("M", 1e6), ("k", 1e3), ("", 1.0))
 _SHOWN: Final = (1, 3)
-"""Of the levels whose exceedance is in the JSON: 5 and 10 degrees."""
-
-Content = Mapping[str, Any]
-"""What `firmware_sim.report.as_json` says of a bench, or a part of it."""
+"""Of the levels whose exceedance is known: 5 and 10 degrees."""
 
 
-def tables(content: Content) -> list[RichTable]:
+def tables(found: BenchFigures) -> list[RichTable]:
     """All tables of a bench, without empty ones."""
-    found = [
-        motion_table(content),
-        pump_table(content),
-        on_board_table(content),
-        retuning_table(content),
-    ]
-    return [table for table in found if table.rows]
+    made = [motion_table(found), pump_table(found), on_board_table(found), retuning_table(found)]
+    return [table for table in made if table.rows]
 
 
-def motion_table(content: Content) -> RichTable:
+def motion_table(found: BenchFigures) -> RichTable:
     """Table of how much the ship rolled; runs that do not count stand at its end."""
     table = new_table(
-        f"{content['scenario']} · {content['mode']} · seed {content['seed']}",
+        f"{found.scenario} · {found.mode} · seed {found.seed}",
         "roll\nRMS °",
         "signif.\n°",
         "max.\n°",
@@ -44,45 +37,40 @@ def motion_table(content: Content) -> RichTable:
         "water\nstrikes",
     )
     table.caption = (
-        f"{content['settle_s']:g} s to {content['end_s']:g} s of the same waves; "
-        "strikes of the whole run"
+        f"{found.settle_s:g} s to {found.end_s:g} s of the same waves; strikes of the whole run"
     )
-    bare, compared = content["no_tank"], _compared(content)
-    counting = [run for run in compared if run["ranked"]]
-    capsized_s = bare["capsized_s"]
-    capsized = capsized_s is not None and capsized_s < content["end_s"]
+    bare = found.no_tank
+    counting = [run for run in found.compared if run.ranked]
+    capsized = bare.capsized_s is not None and bare.capsized_s < found.end_s
     table.add_row(
         NO_TANK, *_roll_cells(bare), "capsized" if capsized else "", end_section=not counting
     )
     for run in counting:
         table.add_row(*_motion_cells(run), end_section=run is counting[-1])
-    for run in compared:
-        if run["mark"] is not None:
+    for run in found.compared:
+        if run.mark is not None:
             table.add_row(*_motion_cells(run), style="red")
     return table
 
 
-def _compared(content: Content) -> list[Content]:
-    return [run for run in content["runs"] if run["compared"]]
-
-
-def _motion_cells(run: Content) -> tuple[str, ...]:
-    passive = run["name"] == PASSIVE
+def _motion_cells(run: RunFigures) -> tuple[str, ...]:
+    passive = run.name == PASSIVE
+    assert run.roll is not None
     return (
-        run["name"],
-        *_roll_cells(run["roll"]),
-        _percent(run["roll_below_no_tank"]) if run["mark"] is None else run["mark"]["word"],
-        "" if passive else _percent(run["roll_below_passive"]),
-        "" if passive else f"{run['active_share']:.0%}",
-        str(run["strikes"]),
+        run.name,
+        *_roll_cells(run.roll),
+        _percent(run.roll_below_no_tank) if run.mark is None else run.mark.word,
+        "" if passive else _percent(run.roll_below_passive),
+        "" if passive else f"{run.active_share:.0%}",
+        str(run.strikes),
     )
 
 
-def pump_table(content: Content) -> RichTable:
+def pump_table(found: BenchFigures) -> RichTable:
     """Table of what pump and bus did for it."""
-    runs = _compared(content)
+    pumps = [(run, run.pump) for run in found.compared if run.pump is not None]
     columns = [
-        (heading, *in_one_unit([run["pump"][name] for run in runs], unit))
+        (heading, *in_one_unit([getattr(pump, name) for _, pump in pumps], unit))
         for heading, name, unit in (
             ("pressure\nRMS", "pressure_rms_pa", "Pa"),
             ("pressure\npeak", "pressure_peak_pa", "Pa"),
@@ -97,12 +85,12 @@ def pump_table(content: Content) -> RichTable:
         "bus\nload",
     )
     table.caption = "peaks of values every 50 ms; power that\nthe shaft draws, not what flows back"
-    for index, run in enumerate(runs):
+    for index, (run, pump) in enumerate(pumps):
         table.add_row(
-            run["name"],
+            run.name,
             *(cells[index] for _, _, cells in columns),
-            f"{run['pump']['level_peak_m']:.2f}",
-            f"{run['bus_load']:.1%}",
+            f"{pump.level_peak_m:.2f}",
+            f"{run.bus_load:.1%}",
         )
     return table
 
@@ -127,10 +115,10 @@ def in_one_unit(values: Sequence[float], unit: str) -> tuple[str, list[str]]:
     return prefix + unit, [f"{value / scale:.{digits}f}" for value in values]
 
 
-def on_board_table(content: Content) -> RichTable:
+def on_board_table(found: BenchFigures) -> RichTable:
     """Table of what the roll is like for people at the scenario's place."""
-    judged = content["on_board"]
-    levels, place = judged["levels_rad"], judged["place"]
+    judged = found.on_board
+    levels, place = judged.levels_rad, judged.place
     table = new_table(
         "On board",
         *(f"above\n{math.degrees(levels[index]):g}°" for index in _SHOWN),
@@ -142,23 +130,23 @@ def on_board_table(content: Content) -> RichTable:
     table.caption = (
         "shares of the roll's amplitudes; interruptions of who stands; motion\n"
         "sickness incidence by McCauley et al. 1976 (ISO 2631-1 gives more,\n"
-        f"from the dose in the JSON); NORDFORSK 1987; at {place['height_m']:.1f} m above and\n"
-        f"{place['starboard_m']:.1f} m to starboard of the centre of gravity, by roll alone"
+        f"from the dose in the JSON); NORDFORSK 1987; at {place.height_m:.1f} m above and\n"
+        f"{place.starboard_m:.1f} m to starboard of the centre of gravity, by roll alone"
     )
-    for name, each in judged["runs"].items():
-        felt, above = each["comfort"], each["exceedance"]
+    for name, each in judged.runs.items():
+        felt, above = each.comfort, each.exceedance
         table.add_row(
             name,
             *("" if above is None else f"{above[index]:.1%}" for index in _SHOWN),
-            f"{felt['lateral_rms_m_s2'] / GRAVITY_M_S2:.3f}",
-            f"{felt['interruptions_per_min']:.2f}",
-            f"{felt['sickness_percent']:.1f}%",
-            felt["allowed_work"][-1] if felt["allowed_work"] else "none",
+            f"{felt.lateral_rms_m_s2 / GRAVITY_M_S2:.3f}",
+            f"{felt.interruptions_per_min:.2f}",
+            f"{felt.sickness_percent:.1f}%",
+            felt.allowed_work[-1] if felt.allowed_work else "none",
         )
     return table
 
 
-def retuning_table(content: Content) -> RichTable:
+def retuning_table(found: BenchFigures) -> RichTable:
     """Table of what retuning found and gained; without rows where nothing retuned."""
     table = new_table(
         "Retuning",
@@ -176,31 +164,31 @@ def retuning_table(content: Content) -> RichTable:
         f"± one standard deviation; before the first retuning, and from {SETTLING_S:g} s "
         "after the new law took charge"
     )
-    for run in content["runs"]:
-        if run["retuning"] is not None:
-            table.add_row(run["name"], *_retuning_cells(run["retuning"]))
+    for run in found.runs:
+        if run.retuning is not None:
+            table.add_row(run.name, *_retuning_cells(run.retuning))
     return table
 
 
-def _retuning_cells(retuning: Content) -> tuple[str, ...]:
-    found, true = retuning["found"], retuning["truth"]
+def _retuning_cells(retuning: RetuningFigures) -> tuple[str, ...]:
+    found, true = retuning.found, retuning.truth
     period = ship = tank = ""
     if found is not None:
-        deviation_s = found["roll_period_s"] * found["period_deviation"]
-        period = f"{found['roll_period_s']:.3f} ± {deviation_s:.3f} / {true['roll_period_s']:.3f}"
-        ship = f"{found['damping_nms_rad'] / 1e6:#.4g} / {true['damping_nms_rad'] / 1e6:#.4g}"
-        tank = f"{found['tank_damping_ratio']:.4f} / {true['tank_damping_ratio']:.4f}"
-    rolls = (retuning["roll_before_rad"], retuning["roll_after_rad"])
-    state, attempts = retuning["state"], retuning["attempts"]
+        deviation_s = found.roll_period_s * found.period_deviation
+        period = f"{found.roll_period_s:.3f} ± {deviation_s:.3f} / {true.roll_period_s:.3f}"
+        ship = f"{found.damping_nms_rad / 1e6:#.4g} / {true.damping_nms_rad / 1e6:#.4g}"
+        tank = f"{found.tank_damping_ratio:.4f} / {true.tank_damping_ratio:.4f}"
+    rolls = (retuning.roll_before_rad, retuning.roll_after_rad)
+    state, attempts = retuning.state, retuning.attempts
     return (
-        "" if retuning["retuned_at_s"] is None else f"{retuning['retuned_at_s']:.0f}",
+        "" if retuning.retuned_at_s is None else f"{retuning.retuned_at_s:.0f}",
         *("" if roll is None else f"{math.degrees(roll):.2f}" for roll in rolls),
-        _percent(retuning["roll_after_below_before"]),
+        _percent(retuning.roll_after_below_before),
         period,
         ship,
         tank,
         state if attempts <= 1 else f"{state}, attempt {attempts}",
-        "; ".join(retuning["reasons"]),
+        "; ".join(retuning.reasons),
     )
 
 
@@ -208,6 +196,6 @@ def _percent(share: float | None) -> str:
     return "" if share is None else f"{share:.1%}"
 
 
-def _roll_cells(roll: Content) -> tuple[str, ...]:
-    keys = ("rms_rad", "significant_rad", "maximum_rad")
-    return tuple("" if roll[key] is None else f"{math.degrees(roll[key]):.2f}" for key in keys)
+def _roll_cells(roll: RollStatistics) -> tuple[str, ...]:
+    values = (roll.rms_rad, roll.significant_rad, roll.maximum_rad)
+    return tuple("" if value is None else f"{math.degrees(value):.2f}" for value in values)

@@ -1,7 +1,7 @@
 """What retuning did for a run, in figures."""
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from utank_hil.canbus import RetuningState
 from utank_hil.retuning import ModelSummary, RetuningEvent
 
 SETTLING_S: Final = 60.0
-"""Left out after a new law came into service."""
+"""Left out after a new law came into service: five roll periods of a slow ship, 12 s."""
 _NEW_LAW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 
 
@@ -59,8 +59,8 @@ class RetuningFigures:
         At the end.
     reasons : tuple of str
         Why the last retuning began, and why it ended as it did; what was found apart.
-    events : tuple of RetuningEvent
-        `time_ns` on the ship's time.
+    events : tuple of dict
+        As `RetuningEvent.as_json` gives them, on the ship's time.
     """
 
     attempts: int
@@ -72,12 +72,7 @@ class RetuningFigures:
     truth: ShipInFigures
     state: str
     reasons: tuple[str, ...]
-    events: tuple[RetuningEvent, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """All of it, ready for `json.dumps`."""
-        events = [event.as_json() for event in self.events]
-        return asdict(replace(self, events=())) | {"events": events}
+    events: tuple[dict[str, Any], ...]
 
 
 def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningFigures | None:
@@ -129,7 +124,7 @@ def retuning_figures(run: Run, scenario: Scenario, settle_s: float) -> RetuningF
             if event.state is not RetuningState.TRIAL  # says what `found` does
             for reason in event.reasons
         ),
-        events=events,
+        events=tuple(event.as_json() for event in events),
     )
 
 

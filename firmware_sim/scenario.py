@@ -92,7 +92,7 @@ class Scenario(Section):
     ]
     """One or more; none are needed where the vessel has no pump."""
     operator: tuple[TimedAction, ...] = ()
-    """What the operator does in the runs with a controller; in the passive run nobody arms."""
+    """What the operator does in the runs with a controller; in the passive run it is not armed."""
     duration_s: Annotated[float, Range(above=0, most=LONGEST_S)]
     settle_s: NotNegative
     """Left out of the statistics at the start."""
@@ -198,7 +198,7 @@ class Scenario(Section):
         return [
             f"{waves} of {figures['hs_m']:.2f} m significant height, met at "
             f"{figures['encounter_rad_s']:.3g} rad/s and {figures['speed_kn']:.3g} knots; standing "
-            f"still they would heel her {math.degrees(figures['static_roll_rms_rad']):.2g}° RMS."
+            f"still they would heel it {math.degrees(figures['static_roll_rms_rad']):.2g}° RMS."
         ]
 
     @property
@@ -301,7 +301,7 @@ class Scenario(Section):
         return [(key, why) for key, ship in ships.items() for why in self._heel_problems(ship)]
 
     def _heel_problems(self, ship: RollShip) -> list[str]:
-        """Why a ship's steady heel is refused: she finds none, or the water is at the roof."""
+        """Why a ship's steady heel is refused: there is none, or the water is at the roof."""
         if ship.heeling_moment_nm == 0:
             return []
         heel = steady_heel(RollModel(ship, self.vessel.tank))
@@ -309,7 +309,7 @@ class Scenario(Section):
             return []
         remedy = f"lower {' or '.join(SAILED[-2:])}"
         if heel is None:
-            return [f"capsizes her without a wave, as no righting moment holds it: {remedy}"]
+            return [f"capsizes the ship without a wave, as no righting moment holds it: {remedy}"]
         return [
             f"heels steadily by {math.degrees(abs(heel.roll_rad)):.0f} degrees, at which the "
             f"tank is full or empty at one side: {remedy}"

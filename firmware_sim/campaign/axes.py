@@ -97,7 +97,7 @@ class Uniform(Section):
     """The greatest."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
-        """So many of them."""
+        """Draw `count` values."""
         return [float(each) for each in self.low + (self.high - self.low) * rng.random(count)]
 
 
@@ -105,12 +105,12 @@ class Normal(Section):
     """Normally distributed numbers."""
 
     mean: Finite
-    """Of the distribution."""
+    """Mean of the distribution."""
     std: Positive
     """Standard deviation."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
-        """So many of them."""
+        """Draw `count` values."""
         return [float(each) for each in self.mean + self.std * rng.standard_normal(count)]
 
 
@@ -118,10 +118,10 @@ class Consecutive(Section):
     """Whole numbers, another for each sample: seeds."""
 
     first: Annotated[int, Range(least=0)]
-    """The first of them."""
+    """The first number."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:  # noqa: ARG002
-        """So many of them."""
+        """Draw `count` values."""
         return list(range(self.first, self.first + count))
 
 
@@ -132,7 +132,7 @@ class Choice(Section):
     """The values."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
-        """So many of them."""
+        """Draw `count` values."""
         return [self.one_of[int(each)] for each in rng.integers(len(self.one_of), size=count)]
 
 
@@ -140,9 +140,9 @@ class Draws(Section):
     """Samples of keys that are drawn independently of one another, and of the rows of a table."""
 
     samples: _Count
-    """How many."""
+    """Number of samples."""
     seed: Annotated[int, Range(least=0)] = 1
-    """Of the draws; another than that of the waves."""
+    """Seed of the draws; another than that of the waves."""
     keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)
     """What is drawn for each dotted key."""
     table: Path | None = None

@@ -21,7 +21,7 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
     """A scenario's content with other values at some keys.
 
     ``*`` stands for every name, as in ``controllers.*.limits.pressure_pa``. A key of ``vessel``
-    counts for the controllers of the same ship, too: what she really is, apart from what they
+    counts for the controllers of the same ship, too: what the ship really is, apart from what they
     believe, is ``actual_ship``.
 
     Parameters

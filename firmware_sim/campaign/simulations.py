@@ -9,12 +9,10 @@ from typing import Final
 import numpy as np
 
 from firmware_sim.bench import run_in_turn
-from firmware_sim.figures import LEAST_ROLL_RAD, figures
+from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK, bare_figures, run_figures
 from firmware_sim.plant import Plant
-from firmware_sim.report_tables import NO_TANK
 from firmware_sim.run import RECORD_S, roll_without_tank
 from firmware_sim.scenario import PASSIVE, Scenario
-from firmware_sim.verdicts import mark_of
 from utank_hil.analysis.loop.loop_simulation import SensorNoise, passive_motion, simulate_loop
 from utank_hil.analysis.motion import bare_ship
 from utank_hil.analysis.motion.statistics import (
@@ -85,16 +83,16 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
 
 def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
     result = run_in_turn(scenario, seed, laws)
-    bare, runs = figures(result)
-    marks = {run.name: mark_of(result, run) for run in result.runs}
     sunk = result.without_tank_capsized_s < result.end_s
-    rows = [_row(NO_TANK, CAPSIZED if sunk else "", bare)]
-    for run in runs:
-        mark = marks[run.name]
-        row = _row(run.name, "" if mark is None else mark.word, run.roll, run.pump, run.strikes)
+    rows = [_row(NO_TANK, CAPSIZED if sunk else "", bare_figures(result))]
+    for run in run_figures(result):
+        if run.roll is None:
+            continue
+        mark = "" if run.mark is None else run.mark.word
+        row = _row(run.name, mark, run.roll, run.pump, run.strikes)
         row["roll_below_no_tank"] = _number(run.roll_below_no_tank)
         row["roll_below_passive"] = _number(run.roll_below_passive)
-        row["active_share"] = run.active_share
+        row["active_share"] = _number(run.active_share)
         rows.append(row)
     return rows
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from firmware_sim.campaign.study import Case, Scalar, Stop
-from firmware_sim.report_tables import NO_TANK
+from firmware_sim.figures import NO_TANK
 from utank_hil.analysis.motion.confidence import mean_interval
 
 _NOTHING: Final[Mapping[str, float]] = {}

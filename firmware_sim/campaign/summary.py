@@ -11,8 +11,7 @@ from firmware_sim.campaign.stopping import Stopping
 from firmware_sim.campaign.store import Results
 from firmware_sim.campaign.study import Case, Scalar, Stop
 from firmware_sim.campaign.work import FAILED, OK
-from firmware_sim.figures import LEAST_ROLL_RAD
-from firmware_sim.report_tables import NO_TANK
+from firmware_sim.figures import LEAST_ROLL_RAD, NO_TANK
 from utank_hil.analysis.motion.confidence import mean_interval
 
 ROLL: Final = "roll_rms_rad"

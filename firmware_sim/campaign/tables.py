@@ -5,7 +5,7 @@ from typing import Any
 
 from rich.table import Table
 
-from firmware_sim.report_tables import NO_TANK
+from firmware_sim.figures import NO_TANK
 from utank_hil.console.terminal import new_table
 
 Figure = dict[str, Any]

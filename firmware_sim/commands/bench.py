@@ -74,7 +74,8 @@ def bench(
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name, run_bench
-    from firmware_sim.report import REPORT_FILES, as_json, exit_code, write_report
+    from firmware_sim.figures import figures
+    from firmware_sim.report import REPORT_FILES, write_report
     from firmware_sim.report_tables import tables
     from firmware_sim.scenario import Scenario
 
@@ -121,18 +122,18 @@ def bench(
             fail(error, ExitCode.INTERRUPTED)
         except OSError as error:
             fail(error, ExitCode.USAGE if bus is None else ExitCode.NO_BUS)
-    files, failures = write_report(result, out, about)
+    found = figures(result)
+    files, failures = write_report(result, found, out, about)
     files |= {f"frames of {Path(name).stem}": out / name for name in logs}
-    told = as_json(result, files, about)
     if json_:
-        print_json(told)
+        print_json(found.as_json(files, about))
     else:
         console = Terminal()
-        for table in tables(told):
+        for table in tables(found):
             console.table(table)
-        for ending in told["endings"]:
+        for ending in found.endings:
             console.say(red=ending)
-        for limit in told["limits_passed"]:
+        for limit in found.limits_passed:
             console.say(yellow=limit)
         loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
         if loops:
@@ -145,13 +146,13 @@ def bench(
                 "no deadlines there."
             )
         console.files(files)
-        sound = [] if told["endings"] else ["run CONTROLLER.yaml --bus can0"]
+        sound = [] if found.endings else ["run CONTROLLER.yaml --bus can0"]
         console.lead_on(f"monitor {shown(out)}", *sound)
     if failures:
         fail("; ".join(failures))
     if view:
         watch(files["recording"])
-    raise typer.Exit(exit_code(result))
+    raise typer.Exit(found.exit_code)
 
 
 def _about(

@@ -68,7 +68,7 @@ def compare(
 
 def _recording(place: Path) -> Path:
     """The recording that a path stands for."""
-    from firmware_sim.report import RECORDING
+    from firmware_sim.report_page import RECORDING
 
     file = place / RECORDING if place.is_dir() else place
     if not file.is_file():

@@ -16,7 +16,7 @@ class _VesselOfScenario(BaseModel):
 
 
 def shipped_scenario(vessel: Vessel) -> Path | None:
-    """The shipped scenario of a vessel: the storm for its ship, else the first that is for her."""
+    """The shipped scenario of a vessel: the storm for its ship, else the first with the ship."""
     shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
     own = (p for p in shipped if load(p, _VesselOfScenario).vessel.version == vessel.version)
     return next(own, None)

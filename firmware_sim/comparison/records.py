@@ -25,13 +25,13 @@ from utank_hil.telemetry.recording import read_about
 from utank_hil.telemetry.signal_files import read_signals, require
 
 BATCH_PERIODS: Final = 40
-"""Mean periods of the roll in a batch: after so many a lightly damped ship has forgotten.
+"""Mean periods of the roll in a batch: after them a lightly damped ship has forgotten.
 
 With half of them, the 95 % interval of an hour holds the true difference of two ships of 2.5 % and
-5 % damping in 91 % of all hours, in waves of a peak as in white noise; with so many in 93 to 94 %.
+5 % damping in 91 % of all hours, in waves of a peak as in white noise; with all 40 in 93 to 94 %.
 """
 LEAST_PERIODS: Final = 20
-"""The same in a shorter record, down to `LEAST_BATCHES`."""
+"""Mean periods in a batch of a shorter record, down to `LEAST_BATCHES`."""
 MOST_BATCHES, LEAST_BATCHES = 30, 6
 _WAVES: Final = ("sea", "voyage")
 """Of a scenario: with the seed they draw the waves, whatever ship is in them."""
@@ -163,7 +163,7 @@ def _compared(first: Record, second: Record) -> list[Comparison]:
 
 
 def _capsized(*records: tuple[Path, str, Columns]) -> list[str]:
-    """Runs, by name and file, in which the ship capsized: how she lies there is no roll."""
+    """Runs, by name and file, in which the ship capsized: how it lies there is no roll."""
     return [
         f"run {run} of {path}"
         for path, run, columns in records

@@ -67,11 +67,11 @@ class Setup(Section):
     Attributes
     ----------
     actual_ship : dict of str to float
-        What she is from the moment of the fault on, keys as in a scenario.
+        What the ship is from the moment of the fault on, keys as in a scenario.
     redundancy : Redundancy
-        What she has beside what the scenario's vessel has.
+        What the ship has beside what the scenario's vessel has.
     displacement_n, least_gm_m : float, optional
-        Of her, instead of the vessel's.
+        Of the ship, instead of the vessel's.
     sea_estimate : EstimateSettings, optional
         Instead of the controller's.
     commissioned : bool
@@ -89,7 +89,7 @@ class Setup(Section):
 
     @property
     def equipped(self) -> Scenario:
-        """The scenario with all that the ship has."""
+        """The scenario with the setup's changes in it."""
         scenario, own = self.scenario, self.scenario.vessel
         weight_n = self.displacement_n or own.ship.displacement_n
         vessel = own.model_copy(
@@ -113,7 +113,7 @@ class Setup(Section):
         return self.equipped.controllers[self.controller]
 
     def scenario_of(self, fault_s: float) -> Scenario:
-        """The scenario with what she is from the fault on."""
+        """The scenario with what the ship is from the fault on."""
         scenario = self.equipped
         if not self.actual_ship:
             return scenario
@@ -199,8 +199,8 @@ class Limit(Section):
         From the fault on. `firmware_sim.fault_campaign.verdict` has what holds without the last.
     counts_from : dict of str to float
         Times count from when what the controller received of this is first so far from the truth:
-        before, nobody can know. Or from when the pump's pressure is so far from its set-point and
-        stays so, or from when the ship first rolls so far (`over_roll_rad`).
+        before, the fault does not show. Or from when the pump's pressure is so far from its
+        set-point and stays so, or from when the ship first rolls so far (`over_roll_rad`).
     roll : float
         Variance of the roll over the passive ship's.
     roll_window_s : float, optional

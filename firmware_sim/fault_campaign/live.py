@@ -52,7 +52,7 @@ _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
 
 
 Later = tuple[float, Callable[[], None]] | None
-"""What is still to be done so many s after the fault."""
+"""A time in s after the fault, and what is to be done then."""
 
 
 class LiveError(Exception):

@@ -1,6 +1,6 @@
 """One row in one sea: a ship under way, the fault, what came of it.
 
-All rows of a seed begin with the same ship in the same waves. She is simulated up to the fault
+All rows of a seed begin with the same ship in the same waves. It is simulated up to the fault
 once, and each row goes on from there in a copy of the process.
 """
 
@@ -36,17 +36,18 @@ T = TypeVar("T")
 
 SECOND_NS: Final = 1_000_000_000
 SAMPLE_TICKS: Final = 5
-"""Of the roll, for its variance, where the ship alone is integrated; and of a recording."""
+"""Ticks from sample to sample of a passive ship's roll, and of a recording: 50 ms."""
 SAMPLE_NS: Final = SAMPLE_TICKS * TICK_NS
 COLUMNS: Final = (*SIGNALS, *TRUTH[1:])
 _LOOK_S: Final = 0.1
+"""How often Ctrl-C is looked for while a copy works."""
 REARMED_S: Final = 20.0
 """For so long after the fault the first sea of a campaign sees whether anything arms again."""
 COMMANDS_NS: Final = 40_000_000
 """Two cycles of PUMP_CMD."""
 FLAGS: Final = get_args(StatusFlag)
 RECORDED_S: Final = 10.0
-"""Before the fault."""
+"""How long before the fault a recording begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,9 +277,9 @@ class Sea:
     def _passive_roll(
         self, seconds: float, *, enabled: bool, opening: float | None = None
     ) -> FloatArray:
-        """Of the ship that was passive all along, her pump enabled at zero pressure or off.
+        """Roll of the ship that was passive all along, its pump enabled at zero pressure or off.
 
-        Her valve is where it goes without power, or where it stuck: `opening`.
+        Its valve is where it goes without power, or where it stuck: `opening`.
         """
         scenario = self._setup.scenario_of(self._fault_s)
         plant = build_ship_side(scenario, self._seed, ()).plant

@@ -14,9 +14,9 @@ from utank_hil.safety.faults import FAULTS, Reaction
 STOP_ZERO_MS: Final = 250.0
 """Zero pressure after a stop was found, at the latest."""
 CUT_MS: Final = 100.0
-"""The same of a fault that only ever stops: a ramp that began in its place would take longer."""
+"""Zero pressure after a fault that only ever stops: a ramp in its place would take longer."""
 RAMP_ZERO_MS: Final = 1040.0
-"""And after a ramp began: a second, a cycle of the command and a tick of the drive."""
+"""Zero pressure after a ramp began: a second, a cycle of the command and a tick of the drive."""
 STOPS: Final = {
     row.code.name
     for row in FAULTS
@@ -155,7 +155,7 @@ def _worst(times_ms: Sequence[float | None]) -> float | None:
 
 
 def _reaction_ms(row: Row, outcome: Outcome) -> float | None:
-    """When the reaction began that the row asks for; at once where nobody could arm."""
+    """When the reaction began that the row asks for; at once where arming was refused."""
     if row.fault.from_start and row.expect.latched and not outcome.was_active:
         return 0.0 if outcome.code != "NONE" else None
     time = _TIME_OF.get(row.expect.reaction)

@@ -5,8 +5,8 @@ frame and takes part in the next arbitration again. The sender's transmit error 
 with each and falls by 1 with each frame that gets through (ISO 11898-1); above 127 the sender is
 error-passive, above 255 it is off the bus until the fault is over.
 
-What a gateway or a repeater may do besides, with no CAN controller noticing: lose, delay, double,
-change or swap frames.
+What a gateway or a repeater may do besides, with no CAN controller noticing: lose, delay, double
+or swap frames.
 """
 
 import random
@@ -46,7 +46,7 @@ class Disturbance:
     Attributes
     ----------
     does : str
-        "loses", "delays", "doubles", "changes" or "swaps" (with the next one of its identifier).
+        "loses", "delays", "doubles" or "swaps" (with the next one of its identifier).
     can_id : int or None
         None for all.
     by_ns : int
@@ -54,7 +54,7 @@ class Disturbance:
     """
 
     span: Span
-    does: Literal["loses", "delays", "doubles", "changes", "swaps"]
+    does: Literal["loses", "delays", "doubles", "swaps"]
     share: float
     can_id: int | None
     by_ns: int = 0
@@ -167,11 +167,6 @@ class FaultyBus:
                 frames.remove(arrived)
             elif each.does == "doubles":
                 frames.append(arrived)
-            elif each.does == "changes" and frame.data:
-                place = int(self._draw() * len(frame.data))
-                data = bytearray(frame.data)
-                data[place] ^= 1 + int(self._draw() * 255)
-                frames[frames.index(arrived)] = (time_ns, sender, Frame(frame.can_id, bytes(data)))
             elif each.does == "swaps" and before is None:
                 frames.remove(arrived)
                 self._swapped[frame.can_id] = arrived

@@ -12,7 +12,7 @@ from utank_hil.runners.node import Selective
 NEVER_NS: Final = 1 << 62
 
 Spoil = Callable[[Frame, float], Iterable[Frame]]
-"""Frames that reach the bus instead of one that its node sent, so many s after the fault began."""
+"""Frames that reach the bus instead of one of the node, at a time in s after the fault began."""
 
 
 class Span(NamedTuple):
@@ -60,8 +60,6 @@ class FaultyNode:
         The bus can't be reached, and why.
     warned : list of tuple of (Span, str)
         Its interface reports this in every tick, and carries frames all the same.
-    late_ticks : list of tuple of (Span, int)
-        Frames leave so many ticks late.
     """
 
     def __init__(self, node: Node) -> None:
@@ -75,8 +73,6 @@ class FaultyNode:
         self.deaf: list[Span] = []
         self.cut_off: list[tuple[Span, str]] = []
         self.warned: list[tuple[Span, str]] = []
-        self.late_ticks: list[tuple[Span, int]] = []
-        self._held: list[list[Frame]] = []
         self._actions: list[tuple[int, Callable[[], object]]] = []
 
     def at(self, time_ns: int, action: Callable[[], object]) -> None:
@@ -117,11 +113,4 @@ class FaultyNode:
             return ()
         for spoiled in self.spoiled:
             frames = [out for frame in frames for out in spoiled.frames(frame, now_ns)]
-        return self._delayed(frames, now_ns) if self.late_ticks else frames
-
-    def _delayed(self, frames: list[Frame], now_ns: int) -> list[Frame]:
-        late = max((ticks for span, ticks in self.late_ticks if span.holds(now_ns)), default=0)
-        self._held.append(frames)
-        due = self._held[: max(len(self._held) - late, 0)]
-        del self._held[: len(due)]
-        return [frame for each in due for frame in each]
+        return frames

@@ -66,7 +66,7 @@ class Replayed(FrameFault):
 
     kind: Literal["replayed"]
     frames: Annotated[int, Field(ge=2)]
-    """So many are repeated."""
+    """Number of frames that are repeated."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         """As in `FrameFault`."""
@@ -84,11 +84,11 @@ class Replayed(FrameFault):
 
 
 class Doubled(FrameFault):
-    """Every frame is sent so many times."""
+    """Every frame is sent several times."""
 
     kind: Literal["doubled"]
     times: Annotated[int, Range(least=2, most=100)] = 2
-    """So often each is sent."""
+    """How often each frame is sent."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         """As in `FrameFault`."""
@@ -100,7 +100,7 @@ class Inserted(FrameFault):
 
     kind: Literal["inserted"]
     back: Annotated[int, Range(least=1, most=10_000)]
-    """So many cycles ago."""
+    """Age of the frame in cycles."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         """As in `FrameFault`."""
@@ -120,7 +120,7 @@ class Counter(FrameFault):
     step: Annotated[int, Field(ge=0, le=15)]
     """From frame to frame; a sound one steps by 1."""
     one_of: Annotated[int, Field(ge=1)] = 1
-    """Of so many frames one is sent, as by a node that is slower than its cycle."""
+    """One frame in this number is sent, as by a node that is slower than its cycle."""
 
     def spoil(self, seed: int) -> Spoil:  # noqa: ARG002
         """As in `FrameFault`."""
@@ -142,7 +142,7 @@ class Counter(FrameFault):
 
 
 class Damaged(FrameFault):
-    """A fault of one frame of so many."""
+    """A fault of one frame in `every`."""
 
     every: Annotated[int, Field(ge=1)] = 1
 

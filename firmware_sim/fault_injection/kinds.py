@@ -32,7 +32,6 @@ AnyFault = Annotated[
     | nodes.Killed
     | nodes.Mute
     | nodes.Deaf
-    | nodes.Slow
     | nodes.Link
     | nodes.Pump
     | nodes.Drive

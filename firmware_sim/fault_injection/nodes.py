@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from firmware_sim.fault_injection.fault import Fault, FaultSpan, NodeName, whole_cycles
+from firmware_sim.fault_injection.fault import Fault, NodeName
 from firmware_sim.fault_injection.faulty_node import Span, Spoiled
 from firmware_sim.fault_injection.place import Bench
 from utank_hil.base.parameters import Finite, NotNegative
@@ -71,19 +71,6 @@ class Deaf(NodeFault):
     def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
         """Keep all frames away."""
         bench.nodes[self.node].deaf.append(span)
-
-
-class Slow(NodeFault):
-    """The node's frames leave late, by whole periods of the node."""
-
-    kind: Literal["slow"]
-    by_s: FaultSpan
-    """Delay of every frame, rounded up to whole periods of the node."""
-
-    def place(self, bench: Bench, span: Span, seed: int) -> None:  # noqa: ARG002
-        """Hold its frames back."""
-        node = bench.nodes[self.node]
-        node.late_ticks.append((span, whole_cycles(self.by_s, node.period_ns)))
 
 
 class Link(NodeFault):

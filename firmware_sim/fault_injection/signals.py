@@ -24,7 +24,7 @@ from utank_hil.canbus.catalogue import NamedMessage
 from utank_hil.canbus.codec import field_kind
 
 Change = Callable[[Sequence[Any], float], Sequence[Any]]
-"""The values instead of the true ones, so many s after the fault began."""
+"""Makes the values of a message of the true ones and the time in s since the fault began."""
 
 
 class SignalFault(MessageFault):
@@ -153,7 +153,7 @@ class Noise(SignalFault):
 
 
 class Spikes(SignalFault):
-    """One sample of so many is off."""
+    """One sample in `every` is off."""
 
     kind: Literal["spikes"]
     by: Finite
@@ -242,7 +242,7 @@ class Value(MessageFault):
     kind: Literal["value"]
     values: Annotated[dict[str, float | bool | str | None], Field(min_length=1)]
     every: Annotated[int, Field(ge=1)] = 1
-    """One message of so many says it."""
+    """One message in this number says it."""
 
     @model_validator(mode="after")
     def _known_values(self) -> "Value":

@@ -47,10 +47,10 @@ class BusFault(Fault):
 
 
 class Disturbed(BusFault):
-    """A gateway loses, delays, doubles, changes or swaps a share of the frames."""
+    """A gateway loses, delays, doubles or swaps a share of the frames."""
 
     kind: Literal["gateway"]
-    does: Literal["loses", "delays", "doubles", "changes", "swaps"]
+    does: Literal["loses", "delays", "doubles", "swaps"]
     """What becomes of the frames."""
     share: _SHARE = 1.0
     """Of the frames, by chance."""
@@ -86,7 +86,7 @@ class BitErrors(BusFault):
     share: _SHARE
     """Of the attempts to send, by chance."""
     node: NodeName | None = None
-    """Whose transceiver is broken; without it everybody's frames."""
+    """Whose transceiver is broken; without it the frames of all nodes."""
 
     def node_names(self) -> tuple[str, ...]:
         """The one with the transceiver, too."""

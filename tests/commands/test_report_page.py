@@ -9,6 +9,7 @@ from browsing import A4_PX, DESK, PHONE, WIDE, of_color, opened, pixels
 from playwright.sync_api import Browser
 
 from firmware_sim.bench import BenchOptions, run_bench
+from firmware_sim.figures import figures
 from firmware_sim.report import write_report
 from firmware_sim.scenario import Scenario
 from utank_hil.base.provenance import describe
@@ -28,10 +29,13 @@ SHOWN = """() => [...document.images].map(image =>
 def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Address of the report of a short bench of the storm."""
     folder = tmp_path_factory.mktemp("bench")
-    scenario = load_config(SCENARIO, Scenario).model_copy(update={"settle_s": 20.0})
+    scenario = load_config(SCENARIO, Scenario)
+    gpc = scenario.controllers["gpc"]  # a fourth curve that costs no design
+    controllers = {"dpc": scenario.controllers["dpc"], "gpc": gpc, "gpc again": gpc}
+    scenario = scenario.model_copy(update={"settle_s": 20.0, "controllers": controllers})
     result = run_bench(scenario, BenchOptions(duration_s=60.0), lambda *_: None)
     about = describe("bench", result.scenario, folder, options={}, seed=result.seed)
-    files, failures = write_report(result, folder, about)
+    files, failures = write_report(result, figures(result), folder, about)
     assert failures == []
     return files["report"].as_uri()
 

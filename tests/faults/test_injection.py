@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.fault_injection.kinds import AnyFault
@@ -26,7 +26,8 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.canbus.codec import Codec
-from utank_hil.configuration import ConfigError, load_config
+from utank_hil.configuration import load_config
+from utank_hil.configuration.files import problems_in_words
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.runners import Lockstep
 
@@ -155,7 +156,6 @@ def test_frames_are_spoiled_as_stated(fault, steps: set[int], intact: bool) -> N
         ({"kind": "counter", "step": 1, "one_of": 5, "message": "SENSOR_MOTION"}, 10),
         ({"kind": "mute", "node": "sensors"}, 0),
         ({"kind": "hangs", "node": "sensors", "at_s": 0.2}, 20),
-        ({"kind": "slow", "node": "sensors", "by_s": 0.05}, 45),
         ({"kind": "gateway", "does": "loses", "message": "SENSOR_MOTION"}, 0),
         ({"kind": "gateway", "does": "doubles", "message": "SENSOR_MOTION"}, 100),
         ({"kind": "gateway", "does": "delays", "message": "SENSOR_MOTION", "by_s": 0.105}, 39),
@@ -165,11 +165,9 @@ def test_frames_are_lost_doubled_and_delayed(fault, count: int) -> None:
     assert len(Bus(fault).of(MOTION)) == pytest.approx(count, abs=1)
 
 
-def test_a_gateway_swaps_frames_of_one_identifier_and_changes_bytes() -> None:
+def test_a_gateway_swaps_frames_of_one_identifier() -> None:
     swapped = Bus({"kind": "gateway", "does": "swaps", "message": "SENSOR_MOTION"})
     assert set(counters(swapped.of(MOTION))) == {3, 15}
-    changed = Bus({"kind": "gateway", "does": "changes", "message": "SENSOR_MOTION"})
-    assert all(MOTION.decode(frame.data) is None for frame in changed.of(MOTION))
 
 
 def test_wrong_length_is_on_the_wire() -> None:
@@ -327,8 +325,6 @@ def test_a_sender_that_is_off_the_bus_comes_back_when_the_fault_at_hand_is_over(
     ("by_s", "period_s", "late_s"), [(0.001, 0.01, 0.01), (0.025, 0.01, 0.03), (0.03, 0.01, 0.03)]
 )
 def test_a_delay_is_never_shorter_than_stated(by_s: float, period_s: float, late_s: float) -> None:
-    slow = Bus({"kind": "slow", "node": "sensors", "by_s": by_s})
-    assert len(slow.of(MOTION)) == len(sound().of(MOTION)) - round(late_s / period_s)
     late = Bus({"kind": "late", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "by_s": by_s})
     shift = round(late_s / period_s)
     true, shown = sound().said(MOTION, "roll_rad"), late.said(MOTION, "roll_rad")
@@ -372,8 +368,6 @@ def test_an_impostor_sends_beside_the_sender() -> None:
          "faults.0.for_s", "must be above 0 and at most 86400"),
         ({"kind": "late", "message": "SENSOR_MOTION", "signals": ["roll_rad"], "by_s": 1e300},
          "faults.0.by_s", "must be above 0 and at most 86400"),
-        ({"kind": "slow", "node": "sensors", "by_s": 1e300},
-         "faults.0.by_s", "must be above 0 and at most 86400"),
         ({"kind": "gateway", "does": "delays", "by_s": 1e300},
          "faults.0.by_s", "must be above 0 and at most 86400"),
         ({"kind": "inserted", "message": "SENSOR_MOTION", "back": 10**30},
@@ -382,21 +376,11 @@ def test_an_impostor_sends_beside_the_sender() -> None:
          "faults.0.values.quality", "must be 0 to 15"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named_at_its_key(tmp_path: Path, written, key: str, words: str) -> None:
-    import yaml
-
-    content = yaml.safe_load(Path("configs/scenarios/storm.yaml").read_text())
-    for name in ("vessel",):
-        content[name] = str(Path("configs/scenarios", content[name]).resolve())
-    content["controllers"] = {
-        name: str(Path("configs/scenarios", file).resolve())
-        for name, file in content["controllers"].items()
-    }
-    content["sea"]["file"] = str(Path("configs/scenarios", content["sea"]["file"]).resolve())
-    path = tmp_path / "wrong.yaml"
-    path.write_text(yaml.safe_dump({**content, "faults": [written]}))
-    with pytest.raises(ConfigError) as caught:
-        load_config(path, Scenario)
+def test_what_is_wrong_is_named_at_its_key(written, key: str, words: str) -> None:
+    content = dict(storm()) | {"faults": [written]}  # the rest is checked already
+    with pytest.raises(ValidationError) as caught:
+        Scenario.model_validate(content)
+    found = problems_in_words(caught.value, content, Scenario)
     assert any(
-        problem.key.startswith(key) and words in problem.reason for problem in caught.value.problems
-    ), [str(problem) for problem in caught.value.problems]
+        ".".join(map(str, at)).startswith(key) and words in reason for at, reason in found
+    ), found

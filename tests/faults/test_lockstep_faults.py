@@ -5,7 +5,6 @@ from itertools import pairwise
 import pytest
 from fault_bench import (
     ARMED,
-    CATALOGUE,
     MS,
     SECOND,
     Babbler,
@@ -20,8 +19,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from utank_hil.canbus import (
-    Address,
-    AddressClaim,
     ControlWord,
     DriveState,
     DriveStatus1,
@@ -124,26 +121,14 @@ def test_reset_and_a_new_press_of_arm_bring_it_back() -> None:
 R_MOTION = 250 * MS  # from the last good sample
 P_CLASS = 250 * MS  # from the fault
 
+# the rows of the campaign have each fault that lasts; here it ends, and nothing comes of that
 FAULTS = [
     # node, what happens to it, where it ends, by when
     ("sensors", {"spoil": dropped()}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"hangs": True}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": dropped(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": corrupted(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": corrupted(SensorMotion, byte=0)}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": corrupted(SensorMotion, byte=1)}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": frozen(SensorMotion)}, Fault.MOTION_SILENT, R_MOTION),
     ("sensors", {"delay_ticks": 5}, Fault.MOTION_SILENT, R_MOTION),
-    ("sensors", {"spoil": dropped(SensorTank)}, Fault.TANK_SILENT, 2020 * MS),
     ("sensors", {"spoil": corrupted(SensorTank)}, Fault.PROTECTION, 1100 * MS),
-    ("sensors", {"spoil": dropped(SensorPump)}, Fault.PUMP_SENSOR_SILENT, 2020 * MS),
-    ("drive", {"spoil": dropped()}, Fault.DRIVE_SILENT, P_CLASS),
     ("drive", {"hangs": True}, Fault.DRIVE_SILENT, P_CLASS),
-    ("drive", {"spoil": dropped(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
-    ("drive", {"spoil": corrupted(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
-    ("drive", {"spoil": frozen(DriveStatus1)}, Fault.DRIVE_SILENT, P_CLASS),
     ("controller", {"spoil": dropped(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
-    ("controller", {"spoil": corrupted(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
     ("controller", {"spoil": frozen(PumpCommand)}, Fault.DRIVE_FAULT, P_CLASS),
     ("panel", {"hangs": True}, Fault.OPERATOR_SILENT, 6220 * MS),
 ]
@@ -209,14 +194,6 @@ def test_frames_sent_twice_are_taken_once(victim: str) -> None:
     assert twice.ship.plant.roll_rad == pytest.approx(once.ship.plant.roll_rad, abs=1e-4)
 
 
-def test_second_node_with_the_controllers_address_stops_it_at_once() -> None:
-    claim = CATALOGUE.transmitter(PumpCommand).can_id
-    bench = armed_bench(extra=[Babbler(claim, 1, T0, T0 + MS)])
-    bench.run(7)
-    assert (bench.mode, bench.node.fault) == (Mode.FAULT, Fault.ADDRESS_CONFLICT)
-    assert bench.zero_ns(T0) - T0 <= TICK + CYCLE + WIRE
-
-
 def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
     """Frames of the highest priority starve all others: nobody hears anybody."""
     bench = armed_bench(extra=[Babbler(0, 2, T0, T0 + 2 * SECOND)])
@@ -228,33 +205,6 @@ def test_flood_of_the_bus_ends_at_zero_whoever_notices_first() -> None:
     assert {state for t, state in bench.heard.states if t > 9 * SECOND} == {DriveState.FAULT}
     # what had waited in the queues came late; it found the drive tripped
     assert stays_at_zero_though_the_panel_keeps_its_arm_bit(bench, 9 * SECOND)
-
-
-@pytest.mark.parametrize(
-    ("can_id", "fault"),
-    [
-        (0x1FFFFFFF, Fault.UNKNOWN_IDENTIFIERS),
-        # of the catalogue, and of no node that the controller listens to
-        (CATALOGUE.codec(AddressClaim, Address.VALVE).can_id, Fault.BUS_OVERLOAD),
-    ],
-)
-def test_flood_that_starves_nobody_ends_at_zero_all_the_same(can_id: int, fault: Fault) -> None:
-    bench = armed_bench(extra=[Babbler(can_id, 2, T0)])
-    bench.run(8.1)
-    assert (bench.mode, bench.node.fault) == (Mode.FAULT, fault)
-    assert bench.pressure_at_zero_since(8 * SECOND)
-
-
-def test_version_of_another_ship_forbids_arming() -> None:
-    other = storm().vessel.model_copy(
-        update={"tank": storm().vessel.tank.__class__(17.1, 4.88, 17.11, 6.22, 0.0, 1.80)}
-    )
-    scenario = storm().model_copy(update={"vessel": other})
-    bench = FaultBench(scenario=scenario)
-    bench.run(4)
-    assert bench.mode is Mode.INIT
-    assert bench.node.fault is Fault.VERSION_MISMATCH
-    assert {command.pressure_pa for _, command in bench.heard.commands} == {0.0}
 
 
 def test_same_seed_same_trace_byte_for_byte_and_another_seed_another() -> None:
@@ -280,7 +230,7 @@ def test_same_seed_same_trace_with_a_fault_in_it() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(seed=st.integers(0, 2**31), controller=st.sampled_from(sorted(storm().controllers)))
 def test_drive_never_refuses_a_frame_of_a_fault_free_run(seed: int, controller: str) -> None:
     bench = FaultBench(seed=seed, controller=controller)
@@ -314,7 +264,7 @@ failures = st.lists(
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(script=scripts, failures=failures, seed=st.integers(0, 100))
 def test_invariants_hold_under_paired_faults_and_any_operator(script, failures, seed: int) -> None:
     timed = tuple(TimedAction(tenths / 10, action) for tenths, action in script)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from firmware_sim.bench import BenchOptions, run_bench
 from firmware_sim.commands.init import init
-from firmware_sim.report import figures
+from firmware_sim.figures import figures
 from firmware_sim.scenario import Scenario
 from utank_hil.analysis.tank_sizing import usable_level_m
 from utank_hil.configuration import ControllerConfig, Vessel, load_config
@@ -87,7 +87,7 @@ def test_on_the_bench_the_law_is_armed_and_better_than_passive(
 ) -> None:
     scenario = load_config(project(PATROL)[0] / "scenario.yaml", Scenario)
     result = run_bench(scenario, BenchOptions(duration_s=200.0), lambda *_: None)
-    _, (passive, active) = figures(result)
+    passive, active = figures(result).compared
     assert (active.mode, active.fault, active.active_share) == ("ACTIVE", "NONE", 1.0)
     assert active.roll.rms_rad < 0.8 * passive.roll.rms_rad
     assert active.pump.level_peak_m < scenario.vessel.tank.level_limit_m

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from firmware_sim.bench import BenchResult
-from firmware_sim.report import as_json
+from firmware_sim.figures import figures as bench_figures
 from firmware_sim.report_tables import retuning_table
 from firmware_sim.retuning_figures import RetuningFigures, events_on_ships_time, retuning_figures
 from firmware_sim.run import COLUMNS, RECORD_S, Run
@@ -178,7 +178,7 @@ def test_table_says_what_was_found_beside_the_truth_and_the_json_the_same() -> N
         (205.0, REFUSED, 0.02, ("peak sensitivity [3] is too high",), None),
     )
     result = result_of(voyage(name="passive"), voyage(*GOOD), voyage(*refused, name="gpc"))
-    table = retuning_table(as_json(result, {}, {}))
+    table = retuning_table(bench_figures(result))
     dpc, gpc = zip(*(column.cells for column in table.columns), strict=True)
     assert dpc == (
         "dpc", "210", "1.15", "0.57", "50.0%", "7.600 ± 0.076 / 7.500", "49.00 / 48.19",
@@ -189,7 +189,7 @@ def test_table_says_what_was_found_beside_the_truth_and_the_json_the_same() -> N
     with console.capture() as capture:
         console.print(table)
     assert "ordered; peak sensitivity [3] is too high" in capture.get()
-    told = json.loads(json.dumps(as_json(result, {}, {}), allow_nan=False))["runs"]
+    told = json.loads(json.dumps(bench_figures(result).as_json({}, {}), allow_nan=False))["runs"]
     assert told[0]["retuning"] is None
     retuning = told[1]["retuning"]
     assert retuning["found"]["roll_period_s"] == 7.6
@@ -201,4 +201,4 @@ def test_table_says_what_was_found_beside_the_truth_and_the_json_the_same() -> N
 
 
 def test_bench_without_retuning_has_no_table_of_it() -> None:
-    assert not retuning_table(as_json(result_of(voyage(name="passive"), voyage()), {}, {})).rows
+    assert not retuning_table(bench_figures(result_of(voyage(name="passive"), voyage()))).rows

@@ -227,7 +227,7 @@ def test_wind_is_taken_as_far_as_the_ship_finds_a_heel_to_hold(
     if held:
         assert load_config(path, Scenario).actual_ship
         return
-    with pytest.raises(ConfigError, match="actual_ship: capsizes her without a wave"):
+    with pytest.raises(ConfigError, match="actual_ship: capsizes the ship without a wave"):
         load_config(path, Scenario)
 
 

@@ -171,12 +171,12 @@ def test_the_document_s_sections_are_valid(tmp_path: Path) -> None:
     [
         (
             {"kind": "jonswap", "hs_m": 2.0, "tp_s": 8.7, "speed_m_s": 5.0},
-            "growing (JONSWAP), significant height 2 m, peak period 8.7 s, waves at 90° to her "
-            "course (0° following, 90° from port, 180° head), her speed 5 m/s",
+            "growing (JONSWAP), significant height 2 m, peak period 8.7 s, waves at 90° to the "
+            "course (0° following, 90° from port, 180° head), speed 5 m/s",
         ),
         (
             {"kind": "regular", "amplitude_m": 0.5, "period_s": 10.0, "heading_deg": 45.0},
-            "one regular wave, amplitude 0.5 m, period 10 s, waves at 45° to her course "
+            "one regular wave, amplitude 0.5 m, period 10 s, waves at 45° to the course "
             "(0° following, 90° from port, 180° head)",
         ),
     ],

@@ -11,15 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from firmware_sim.bench import BenchResult
-from firmware_sim.figures import figures
+from firmware_sim.figures import figures, mark_of
 from firmware_sim.model_limits import MODEL_LIMITS, passed_limits, steepness
-from firmware_sim.on_board import judged_runs
-from firmware_sim.report import as_json, endings, exit_code
 from firmware_sim.report_tables import in_one_unit, motion_table, pump_table
 from firmware_sim.run import COLUMNS, RECORD_S, Run
 from firmware_sim.scenario import Scenario
 from firmware_sim.scenario_sea import JonswapSea
-from firmware_sim.verdicts import mark_of
 from utank_hil.canbus import Fault, Mode
 from utank_hil.configuration import load_config
 from utank_hil.console.exit_codes import ExitCode
@@ -77,13 +74,13 @@ def result_of(*runs: Run, operator: tuple[TimedAction, ...] = STORM.operator) ->
 
 def test_runs_that_count_are_ranked_by_their_roll_with_reductions() -> None:
     result = result_of(PASSIVE_RUN, run("a", 0.03), run("b", 0.02))
-    told = {each.name: each for each in figures(result)[1]}
+    told = {each.name: each for each in figures(result).compared}
     assert [told[name].rank for name in ("passive", "a", "b")] == [3, 2, 1]
     assert told["b"].roll_below_no_tank == pytest.approx(0.6)
     assert told["b"].roll_below_passive == pytest.approx(0.5)
-    assert endings(result) == []
-    assert exit_code(result) is ExitCode.OK
-    assert list(motion_table(as_json(result, {}, {})).columns[6].cells) == ["", "", "100%", "100%"]
+    assert figures(result).endings == ()
+    assert figures(result).exit_code == ExitCode.OK
+    assert list(motion_table(figures(result)).columns[6].cells) == ["", "", "100%", "100%"]
 
 
 BAD = {
@@ -111,23 +108,21 @@ BAD = {
 def test_a_marked_run_is_not_ranked_gives_no_reduction_and_the_exit_code_says_so(word: str) -> None:
     bad, why = BAD[word]
     result = result_of(PASSIVE_RUN, bad, run("good", 0.02))
-    told = {each.name: each for each in figures(result)[1]}
+    told = {each.name: each for each in figures(result).compared}
     marked = told["bad"]
     assert (marked.ranked, marked.rank) == (False, None)
     assert marked.roll_below_no_tank is marked.roll_below_passive is None
     assert [told[name].rank for name in ("good", "passive")] == [1, 2]
     assert told["good"].roll_below_passive == pytest.approx(0.5)
-    (said,) = endings(result)
+    (said,) = figures(result).endings
     assert said.startswith(f"bad: not ranked, {why}")
-    assert exit_code(result) is ExitCode.NOT_RANKED
+    assert figures(result).exit_code == ExitCode.NOT_RANKED
     rows = list(
-        zip(
-            *(column.cells for column in motion_table(as_json(result, {}, {})).columns), strict=True
-        )
+        zip(*(column.cells for column in motion_table(figures(result)).columns), strict=True)
     )
     assert [row[0] for row in rows] == ["no tank", "passive", "good", "bad"]
     assert rows[-1][4:6] == (word, "")
-    json_run = json.loads(json.dumps(as_json(result, {}, {}), allow_nan=False))["runs"][1]
+    json_run = json.loads(json.dumps(figures(result).as_json({}, {}), allow_nan=False))["runs"][1]
     assert json_run["mark"]["word"] == word
     assert json_run["mark"]["why"].startswith(why)
     assert (json_run["ranked"], json_run["rank"], json_run["roll_below_passive"]) == (
@@ -145,29 +140,29 @@ def test_a_marked_run_is_not_ranked_gives_no_reduction_and_the_exit_code_says_so
 )
 def test_nothing_is_said_to_be_below_a_passive_run_that_does_not_count(passive: Run) -> None:
     result = result_of(passive, run("good", 0.02))
-    _, (_, good) = figures(result)
+    _, good = figures(result).compared
     assert good.roll_below_passive is None
     assert good.roll_below_no_tank == pytest.approx(0.6)
-    assert exit_code(result) is ExitCode.NOT_RANKED
+    assert figures(result).exit_code == ExitCode.NOT_RANKED
 
 
 def test_nothing_is_said_to_be_below_a_bare_ship_that_capsized() -> None:
     result = result_of(PASSIVE_RUN, run("good", 0.02))
     result = dataclasses.replace(result, without_tank_capsized_s=88.0)
-    _, (_, good) = figures(result)
+    _, good = figures(result).compared
     assert good.roll_below_no_tank is None
     assert good.roll_below_passive == pytest.approx(0.5)
-    assert endings(result) == ["no tank: the ship capsized at 88.0 s"]
-    assert exit_code(result) is ExitCode.OK  # that the tank kept her up is what it is for
-    assert as_json(result, {}, {})["no_tank"]["capsized_s"] == 88.0
+    assert figures(result).endings == ("no tank: the ship capsized at 88.0 s",)
+    assert figures(result).exit_code == ExitCode.OK  # that the tank kept her up is what it is for
+    assert figures(result).as_json({}, {})["no_tank"]["capsized_s"] == 88.0
 
 
 def test_nobody_on_board_of_a_ship_that_capsized_is_judged() -> None:
     upset = run("upset", 0.02, capsized_s=80.0)
     result = result_of(PASSIVE_RUN, run("good", 0.02), upset)
-    assert set(judged_runs(result)) == {"no tank", "passive", "good"}
+    assert set(figures(result).on_board.runs) == {"no tank", "passive", "good"}
     result = dataclasses.replace(result, without_tank_capsized_s=88.0)
-    assert set(judged_runs(result)) == {"passive", "good"}
+    assert set(figures(result).on_board.runs) == {"passive", "good"}
 
 
 def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> None:
@@ -175,7 +170,7 @@ def test_time_in_which_the_operator_wanted_no_controller_does_not_count() -> Non
     script = (TimedAction(5.0, Action.ARM), TimedAction(60.0, Action.DISARM))
     result = result_of(PASSIVE_RUN, disarmed, operator=script)
     assert mark_of(result, disarmed) is None
-    assert figures(result)[1][1].active_share == pytest.approx(41 / 80)
+    assert figures(result).compared[1].active_share == pytest.approx(41 / 80)
     assert mark_of(result_of(PASSIVE_RUN, disarmed), disarmed) is not None
     never = result_of(PASSIVE_RUN, disarmed, operator=(TimedAction(5.0, Action.PASSIVE),))
     mark = mark_of(never, disarmed)
@@ -194,8 +189,8 @@ def test_operators_clock_starts_when_the_controller_is_ready() -> None:
 
 def test_a_run_without_a_row_is_said_by_the_exit_code() -> None:
     result = dataclasses.replace(result_of(PASSIVE_RUN, run("a", 0.03)), not_run=("b",))
-    assert endings(result) == ["not run: b"]
-    assert exit_code(result) is ExitCode.NOT_RANKED
+    assert figures(result).endings == ("not run: b",)
+    assert figures(result).exit_code == ExitCode.NOT_RANKED
 
 
 def test_ninety_percent_in_charge_is_enough_and_less_is_not() -> None:
@@ -227,7 +222,7 @@ def test_what_passes_a_limit_of_the_model_is_said_with_its_figure() -> None:
     ):  # fmt: skip
         assert words.startswith("limit of the model passed, ")
         assert expected in words
-    assert as_json(result, {}, {})["limits_passed"] == passed_limits(result)
+    assert figures(result).as_json({}, {})["limits_passed"] == tuple(passed_limits(result))
 
 
 def test_level_beyond_the_tank_without_a_strike_is_said_too() -> None:
@@ -257,6 +252,6 @@ def test_a_column_has_one_unit_in_which_its_largest_value_is_readable(values: li
 
 def test_small_ships_pumps_are_shown_in_kilowatts() -> None:
     weak = with_column(run("a", 0.03), "true_shaft_power_w", 4.2e3, slice(None))
-    table = pump_table(as_json(result_of(PASSIVE_RUN, weak), {}, {}))
+    table = pump_table(figures(result_of(PASSIVE_RUN, weak)))
     assert [column.header for column in table.columns][3:5] == ["power\nmean kW", "power\npeak kW"]
     assert list(table.columns[3].cells) == ["0.00", "4.20"]

@@ -54,7 +54,8 @@ def on_the_bench(ship: StarterShip, hs_m: float | None, duration_s: float) -> di
         }
         options = BenchOptions(duration_s=duration_s)
         result = run_bench(scenario, options, lambda _name, _done: None, laws)
-    bare, (passive, active) = figures(result)
+    found = figures(result)
+    bare, (passive, active) = found.no_tank, found.compared
     vessel, found = project.vessel, project.prediction
     cost, pump = tank_cost(vessel.ship, vessel.tank), vessel.pump
     assert pump is not None

@@ -1,7 +1,7 @@
 """Writes the page of one or several runs, of whatever kind."""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Final
@@ -23,7 +23,17 @@ def write_page(runs: list[Path], page: Path) -> Path:
     OSError, ValueError
         If a run can't be read or the page can't be written; says which.
     """
-    reports = [_report(run) for run in runs]
+    return write_reports([_report(run) for run in runs], page)
+
+
+def write_reports(reports: Sequence[Report], page: Path) -> Path:
+    """Write the page of these reports, one after the other.
+
+    Raises
+    ------
+    OSError
+        If the page can't be written.
+    """
     title, below = reports[0].title, reports[0].below
     if len(reports) > 1:
         title = ", ".join(each.title for each in reports)
