@@ -36,17 +36,12 @@ FaultName = Annotated[str, AfterValidator(_fault_name)]
 CountsFrom = Literal["roll_rad", "roll_rate_rad_s", "level_m", "pressure_pa", "over_roll_rad"]
 StatusFlag = Literal["degraded", "saturated"]
 Reaction = Literal["stop", "ramp", "halve", "alarm", "note", "none", "refuse", "drive"]
-REACTIONS: Final[dict[Reaction, str]] = {
-    "stop": "zero pressure at once, latched",
-    "ramp": "ramp to zero, latched",
-    "halve": "half the pressure, with an alarm",
-    "alarm": "an alarm; control goes on",
-    "note": "discarded or counted; control goes on",
-    "none": "not distinguished from a sound ship; control goes on",
-    "refuse": "not armed",
-    "drive": "the drive or the valve stops by itself",
-}
-"""What a row may ask for, in words."""
+"""What a row may ask for.
+
+Zero pressure at once, latched; a ramp to zero, latched; half the pressure with an alarm; an alarm
+while control goes on; a frame discarded or counted; nothing, as of a sound ship; no arming; a drive
+or valve that stops by itself.
+"""
 
 
 class Requirement(Section):

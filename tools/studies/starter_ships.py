@@ -54,11 +54,14 @@ def on_the_bench(ship: StarterShip, hs_m: float | None, duration_s: float) -> di
         }
         options = BenchOptions(duration_s=duration_s)
         result = run_bench(scenario, options, lambda _name, _done: None, laws)
-    found = figures(result)
-    bare, (passive, active) = found.no_tank, found.compared
+    measured = figures(result)
+    bare, (passive, active) = measured.no_tank, measured.compared
     vessel, found = project.vessel, project.prediction
     cost, pump = tank_cost(vessel.ship, vessel.tank), vessel.pump
     assert pump is not None
+    assert passive.roll is not None
+    assert active.roll is not None
+    assert active.pump is not None
     return {
         "ship": ship.name,
         "roll_period_s": 2 * math.pi / vessel.ship.natural_frequency_rad_s,
