@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -99,7 +100,7 @@ def test_case_that_can_not_be_computed_says_why(tmp_path: Path, simulation, valu
     ((name, seed, written),) = batch.cases
     both = json.dumps(json.loads(written) | values)
     wrong, right = run_batch(
-        batch.__class__(batch.simulation, batch.scenario, batch.code, ((name, seed, both),))
+        replace(batch, cases=((name, seed, both),))
     ), run_batch(batch)  # fmt: skip
     assert [row["status"] for row in wrong] == ["failed"]
     assert reason in wrong[0]["reason"]

@@ -202,7 +202,7 @@ def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monke
     result, _ = storm
     drawn: list[BenchCurve] = []
     monkeypatch.setattr(report, "draw_bench", lambda curves, *_, **__: drawn.extend(curves))
-    write_report(result, figures(result), tmp_path, about(result, tmp_path))
+    report._draw(result, figures(result), about(result, tmp_path), tmp_path / "bench.png")
     cells = [list(column.cells) for column in motion_table(figures(result)).columns]
     table = {row[0]: row for row in zip(*cells, strict=True)}
     for run, curve in zip(result.runs, drawn, strict=True):
@@ -297,8 +297,9 @@ def test_run_with_too_few_rows_is_told_and_not_compared(
     told = figures(some).as_json({}, {})["runs"][-1]
     assert (told["name"], told["compared"]) == (last.name, False)
     assert told["roll"] is None
-    _, failures = write_report(some, figures(some), tmp_path, about(some, tmp_path))
-    assert failures == []
+    if rows == slice(200):  # what it leaves of the picture and of the page is the least
+        _, failures = write_report(some, figures(some), tmp_path, about(some, tmp_path))
+        assert failures == []
     # without the passive run, nothing is said to be below it
     lone = dataclasses.replace(result, runs=(cut(whole[0], rows), *whole[1:], last))
     assert all(run.roll_below_passive is None for run in figures(lone).compared)
