@@ -1,11 +1,9 @@
 """Settings of all tests."""
 
-import inspect
 import os
 import signal
 import threading
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
@@ -64,41 +62,6 @@ def _every_picture_is_legible(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     monkeypatch.setattr(style, "save_figure", looked_at)
     yield
     assert not found, "\n".join(found)
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _a_law_that_designs_itself_is_designed_once(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[None]:
-    """Let the workers share such laws (`designed_once`): each takes eight seconds.
-
-    A session without workers keeps what it designed, and mutants are tried in one.
-    """
-    if "PYTEST_XDIST_WORKER" not in os.environ:
-        yield
-        return
-    from designed_once import shared
-
-    from utank_hil.analysis.loop import self_tuning
-
-    folder = tmp_path_factory.getbasetemp().parent / "designed"
-    folder.mkdir(exist_ok=True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(self_tuning, "_tuned", shared(self_tuning._tuned, folder))
-        yield
-
-
-@pytest.fixture
-def short_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a law that designs itself have a better observer than the first, not the best.
-
-    It has all margins, in a quarter of the time. No other test gets it.
-    """
-    from utank_hil.analysis.loop import observer_search, self_tuning
-
-    monkeypatch.setattr(observer_search, "_ITERATIONS", 10)
-    own = lru_cache(maxsize=16)(inspect.unwrap(self_tuning._tuned))
-    monkeypatch.setattr(self_tuning, "_tuned", own)
 
 
 @pytest.fixture(scope="module")

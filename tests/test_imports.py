@@ -18,15 +18,9 @@ pytestmark = pytest.mark.slow
 
 HEAVY = ("matplotlib", "numba", "rerun", "control", "pyarrow", "firmware_sim")
 
-SHORT_SEARCH = """
-from utank_hil.analysis.loop import observer_search
-observer_search._ITERATIONS = 10
-"""
-"""As the fixture `short_search`: what a search loads is loaded by its first step."""
-
 COMMAND = "import utank_hil.cli, utank_hil.commands.run, utank_hil.commands.panel"
 
-LOOP = f"""{SHORT_SEARCH}
+LOOP = """
 from pathlib import Path
 from utank_hil.canbus import SocketCanPort
 from utank_hil.console.common import load
@@ -110,7 +104,6 @@ sys.path.insert(0, "tests/commands")
 import ports
 import utank_hil.commands.run
 utank_hil.commands.run.SocketCanPort = ports.QuietBus
-{short_search}
 from {module}.cli import main
 sys.argv = {words!r}
 try:
@@ -122,9 +115,7 @@ finally:
 
 def without_extras(module: str, *words: str) -> subprocess.CompletedProcess[str]:
     """A command where only the dependencies of `run` are installed; prints what it has loaded."""
-    source = WITHOUT_EXTRAS.format(
-        missing=set(EXTRA_OF), module=module, words=["x", *words], short_search=SHORT_SEARCH
-    )
+    source = WITHOUT_EXTRAS.format(missing=set(EXTRA_OF), module=module, words=["x", *words])
     return subprocess.run(
         [sys.executable, "-c", source], capture_output=True, text=True, timeout=120, check=False
     )

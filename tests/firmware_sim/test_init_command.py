@@ -20,9 +20,6 @@ from utank_hil.console.common import new_app
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.gate import judge
 
-# the whole search is in the page on a ship of one's own, whose commands `test_how_to` runs
-pytestmark = pytest.mark.usefixtures("short_search")
-
 PATROL = {"length": 63, "beam": 9.5, "displacement": 1900, "gm": 0.9, "roll-period": 9.5}
 SLOW = {"length": 200, "beam": 32.2, "displacement": 42000, "gm": 1.2, "draught": 11.5}
 STIFF = SLOW | {"gm": 3.5}

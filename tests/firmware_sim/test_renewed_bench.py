@@ -18,7 +18,7 @@ from utank_hil.telemetry.frame_log import FrameLog
 from utank_hil.telemetry.replay import replay_log
 from utank_hil.telemetry.replay_head import recorded_config
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("short_search")]
+pytestmark = pytest.mark.slow
 
 DESIGN, TRIAL = RetuningState.DESIGN, RetuningState.TRIAL
 SCENARIO = load_config(Path("configs/scenarios/storm.yaml"), Scenario)

@@ -12,7 +12,7 @@ import pytest
 from tools.studies import many_seas
 from tools.studies.sea_trial import TrialShip
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("short_search")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.mark.evidence

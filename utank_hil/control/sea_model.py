@@ -18,6 +18,7 @@ Asilomar 1978.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated
 
@@ -144,18 +145,13 @@ class SeaModel:
                 f"sample_time_s {sample_time_s:g}: lower one of the two"
             )
             refuse("", [("sea.order", reason)])
-        kept = self._impulse_response(sample_time_s)[:samples]
-        return _balanced(kept, self.order, sample_time_s)
+        return _shaping_filter(self, sample_time_s, samples)
 
     def _impulse_response(self, sample_time_s: float) -> FloatArray:
         """Minimum-phase impulse response over the record, an even number of samples."""
-        from scipy.ndimage import gaussian_filter1d
-
         half = round(_RECORD_S / sample_time_s / 2)
         omega = 2 * np.pi * np.abs(np.fft.fftfreq(2 * half, sample_time_s))
-        density = gaussian_filter1d(
-            self.slope_density(omega), self.smoothing_rad_s / omega[1], mode="wrap"
-        )
+        density = _smoothed(self.slope_density(omega), self.smoothing_rad_s / float(omega[1]))
         density = density + self.floor * density.max()
         cepstrum = np.fft.ifft(np.log(np.pi * density / sample_time_s)).real
         causal = np.zeros(2 * half)
@@ -163,6 +159,26 @@ class SeaModel:
         causal[1:half] = cepstrum[1:half]
         causal[half] = cepstrum[half] / 2
         return np.asarray(np.fft.ifft(np.exp(np.fft.fft(causal))).real)
+
+
+def _smoothed(values: FloatArray, deviation: float) -> FloatArray:
+    """Periodic values, smoothed by a Gaussian that ends at four deviations, in samples."""
+    reach = int(4 * deviation + 0.5)
+    weights = np.exp(-0.5 / deviation**2 * np.arange(-reach, reach + 1) ** 2)
+    weights = (weights / weights.sum())[: reach + 1]
+    found: FloatArray = values * weights[reach]
+    for back in range(reach, 0, -1):
+        found += (np.roll(values, back) + np.roll(values, -back)) * weights[reach - back]
+    return found
+
+
+@lru_cache(maxsize=4)
+def _shaping_filter(sea: SeaModel, sample_time_s: float, samples: int) -> LinearModel:
+    """The filter of `SeaModel.shaping_filter`; the designs of one search share it, read-only."""
+    found = _balanced(sea._impulse_response(sample_time_s)[:samples], sea.order, sample_time_s)
+    for matrix in found[:4]:
+        matrix.flags.writeable = False
+    return found
 
 
 def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearModel:

@@ -20,16 +20,16 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 
-# a law of these sizes is condensed in a few milliseconds; a shipped one has 22 states, 19 knots and
+# a law of these sizes is condensed in a few milliseconds; a shipped one has 36 states, 19 knots and
 # 60 samples
-MOST_STATES: Final = 32
+MOST_STATES: Final = 48
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
 _MOST_OUTPUTS: Final = len(STATES)
 _MOST_ITERATIONS: Final = 200
 
 MOST_NUMBERS: Final = (
-    3 * MOST_STATES**2 + MOST_STATES * (2 + 2 * _MOST_OUTPUTS) + 2 * _MOST_OUTPUTS + MOST_KNOTS
+    3 * MOST_STATES**2 + MOST_STATES * (3 + 2 * _MOST_OUTPUTS) + 2 * _MOST_OUTPUTS + MOST_KNOTS
 )
 """Numbers in the arrays of a message."""
 
@@ -65,6 +65,7 @@ class RenewedLawMessage(
     input_weight: float
     first_output: Annotated[int, msgspec.Meta(ge=0, le=MOST_SAMPLES)]
     terminal: FloatArray
+    correction: FloatArray
     limits: PumpLimits
     level_output: int | None
     level_penalty: float
@@ -89,6 +90,7 @@ class RenewedLawMessage(
             input_weight=float(horizon.input_weight),
             first_output=horizon.first_output,
             terminal=horizon.terminal,
+            correction=horizon.correction,
             limits=law.limits,
             level_output=law.level_output,
             level_penalty=float(law.level_penalty),
@@ -123,6 +125,7 @@ class RenewedLawMessage(
             ("observer_gain", self.observer_gain, (n, m)),
             ("output_weight", self.output_weight, (m,)),
             ("terminal", self.terminal, (rest, n)),
+            ("correction", self.correction, (n,)),
             ("steady_state", self.steady_state, (n, n)),
             ("steady_command", self.steady_command, (n,)),
         )
@@ -138,6 +141,7 @@ class RenewedLawMessage(
                 self.input_weight,
                 first_output=self.first_output,
                 terminal=self.terminal,
+                correction=self.correction,
             )
         if not (np.isfinite(horizon.unlimited_state).all() and np.isfinite(horizon.hessian).all()):
             raise ValueError("the answer's law is not finite")

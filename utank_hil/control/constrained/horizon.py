@@ -41,8 +41,8 @@ class Horizon:
         The best plan is unlimited_state x + sum_q unlimited_target[q] y_T(k+q) as long as no limit
         is in its way.
     unlimited_target : ndarray, shape (N, j, m)
-    output_weight, input_weight, first_output, terminal
-        As `condense` was given them; no terminal cost has shape (0, n).
+    output_weight, input_weight, first_output, terminal, correction
+        As `condense` was given them; no terminal cost has shape (0, n), no correction is zero.
     """
 
     knots: npt.NDArray[np.int64]
@@ -57,6 +57,7 @@ class Horizon:
     input_weight: float
     first_output: int
     terminal: FloatArray
+    correction: FloatArray
 
 
 def condense(
@@ -68,6 +69,7 @@ def condense(
     *,
     first_output: int = 0,
     terminal: FloatArray | None = None,
+    correction: FloatArray | None = None,
 ) -> Horizon:
     """Cost and predictions of a plan.
 
@@ -87,6 +89,8 @@ def condense(
         Outputs before y(k + first_output) are not weighed.
     terminal : ndarray, shape (t, n), optional
         L.
+    correction : ndarray, shape (n,), optional
+        From the state, of a model without command, to what is added to the command of each sample.
 
     Raises
     ------
@@ -111,10 +115,13 @@ def condense(
     by_state = np.empty((samples, outputs, states))
     pulse = np.empty((samples, outputs))
     power = np.eye(states)
+    added = np.zeros(states) if correction is None else correction
+    corrections = np.empty((samples, states))
     reach = np.empty((states, samples))  # of u(k+q) on x(k+N)
     arrived = model.B[:, 0]
     for q in range(samples):
         by_state[q] = model.C @ power
+        corrections[q] = added @ power
         pulse[q] = model.D[:, 0] if q == 0 else by_state[q - 1] @ model.B[:, 0]
         power = model.A @ power
         reach[:, samples - 1 - q] = arrived
@@ -147,12 +154,14 @@ def condense(
         outputs_plan=by_plan,
         outputs_held=pulse.cumsum(axis=0),
         hessian=plan_rows.T @ plan_rows,
-        unlimited_state=-np.linalg.solve(triangle, orthogonal.T @ state_rows),
+        unlimited_state=corrections[list(knots)]
+        - np.linalg.solve(triangle, orthogonal.T @ state_rows),
         unlimited_target=by_target.reshape(len(knots), samples, outputs).swapaxes(0, 1),
         output_weight=output_weight,
         input_weight=input_weight,
         first_output=first_output,
         terminal=rest,
+        correction=added,
     )
 
 

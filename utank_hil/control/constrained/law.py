@@ -16,14 +16,14 @@ corrected, so if that lasts, the tank is passive.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.base.parameters import Positive, Range, range_problems, refuse
-from utank_hil.control.constrained.horizon import Horizon
+from utank_hil.control.constrained.horizon import Horizon, condense
 from utank_hil.control.constrained.plan_programme import PlanProgramme
 from utank_hil.control.limits import PumpLimits
 from utank_hil.control.lqg import LQGLaw
@@ -113,6 +113,49 @@ class ConstrainedLaw:
     def response(self, z: ComplexArray) -> ComplexArray:
         """Its transfer matrix at the points `z`, shape (N,); shape (N, 1, m)."""
         return self.unlimited().response(z)
+
+    def with_filter(self, a: FloatArray, b: FloatArray, c: FloatArray) -> "ConstrainedLaw":
+        """The law with a filter on its innovations, q+ = A q + B nu, and C q added to its plan.
+
+        Parameters
+        ----------
+        a : ndarray, shape (f, f)
+            Stable.
+        b : ndarray, shape (f, m)
+        c : ndarray, shape (f,)
+            In Pa.
+        """
+        from scipy.linalg import block_diag
+
+        horizon, model, f = self.horizon, self.model, len(a)
+
+        def padded(matrix: FloatArray) -> FloatArray:
+            return np.hstack([matrix, np.zeros((len(matrix), f))])
+
+        whole = LinearModel(
+            block_diag(model.A, a),
+            np.vstack([model.B, np.zeros((f, 1))]),
+            padded(model.C),
+            model.D,
+            model.dt,
+        )
+        return replace(
+            self,
+            model=whole,
+            observer_gain=np.vstack([self.observer_gain, b]),
+            horizon=condense(
+                whole,
+                tuple(horizon.knots.tolist()),
+                len(horizon.interpolation),
+                horizon.output_weight,
+                horizon.input_weight,
+                first_output=horizon.first_output,
+                terminal=padded(horizon.terminal),
+                correction=np.append(horizon.correction, c),
+            ),
+            steady_state=block_diag(self.steady_state, np.zeros((f, f))),
+            steady_command=np.append(self.steady_command, np.zeros(f)),
+        )
 
     def unlimited(self) -> LQGLaw:
         """The law as it is while no limit is touched: one that knows of none."""
