@@ -36,7 +36,7 @@ assert SocketCanPort
 files = sorted(Path("configs/controllers").glob("*.yaml"))
 configs = [load(path, ControllerConfig) for path in files]
 # one of each kind
-for config in {{(type(each.law), each.retuning is None): each for each in configs}}.values():
+for config in {(type(each.law), each.retuning is None): each for each in configs}.values():
     with RowWriter(SIGNALS, slots=64) as ring:
         node = build_controller_node(config, sink=ring.write)
         with stop_on_signals() as stop, real_time_scheduling():
@@ -57,7 +57,7 @@ def loaded_by(source: str) -> str:
         [sys.executable, "-W", "error", "-c", source + CHECK.format(heavy=HEAVY)],
         capture_output=True,
         text=True,
-        timeout=280,  # a self-tuned law takes 20 s on a slow machine
+        timeout=280,
         check=False,
     )
     assert done.returncode == 0, done.stderr
