@@ -69,6 +69,8 @@ def thousandfold(value: float) -> float:
          "ship.quadratic_damping_nms2_rad2", "at 10 degrees of roll"),
         (FIRST, {"ship__displacement_n": 4.1e4}, "ship.displacement_n",
          "a weight in newtons, not a mass"),
+        (FIRST, {"ship__displacement_n": 1.6e10, "ship__inertia_kg_m2": 9.6e10,
+                 "ship__stiffness_nm_rad": 2.4e10}, "ship.displacement_n", "m3 of water for a"),
         (FIRST, {"tank__damping_ratio": 10}, "tank.damping_ratio", "10 % is 0.10"),
         (FIRST, {"tank__lz_m": -20}, "tank.lz_m",
          "puts the duct 20 m above the ship's centre of gravity, and the tank is 17.1 m wide"),

@@ -213,9 +213,12 @@ def in_written_keys(problems: list[Problem], written: Collection[str]) -> list[P
 
 def _in_written_key(name: str, reason: str, written: Collection[str]) -> Problem:
     section, _, key = name.partition(".")
+    weight = key == "displacement"  # by whichever key it is given
+    if weight:
+        key, name = "displacement_n", "ship.displacement_n"
     if section != "ship" or key in written:
         return name, reason
-    if key == "displacement_n" and "gm_m" in written:
+    if key == "displacement_n" and "gm_m" in written and not weight:
         key = "stiffness_nm_rad"  # the radius of gyration is that of GM and period, at any weight
     by_formula = "beam_m" if key == "inertia_kg_m2" else key
     own = next((own for own, other in _PAIRS if other == key and own in written), by_formula)

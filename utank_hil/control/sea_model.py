@@ -65,7 +65,7 @@ class SeaModel:
 
     frequency_hz: tuple[Positive, ...]
     density_m2_hz: tuple[NotNegative, ...]
-    effective_slope: Positive = 0.5
+    effective_slope: Annotated[float, Range(above=0, most=2)] = 0.5
     order: Annotated[int, Range(least=1, most=32)] = 8
     floor: Annotated[float, Range(above=0, most=100)] = 1.3e-3
     smoothing_rad_s: Annotated[float, Range(above=0, most=1)] = 0.007

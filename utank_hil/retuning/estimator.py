@@ -11,7 +11,7 @@ from typing import Annotated, Final
 
 import numpy as np
 
-from utank_hil.base.parameters import Positive, Range, range_problems, refuse
+from utank_hil.base.parameters import Range, range_problems, refuse
 from utank_hil.canbus import SeaEstimate, ShipEstimate, Verdict
 from utank_hil.dynamics.linear import coupled_matrices
 from utank_hil.dynamics.ship import RollShip
@@ -59,7 +59,7 @@ class EstimateSettings:
 
     every_s: Annotated[float, Range(least=30, most=3600)] = 180.0
     record_s: Annotated[float, Range(least=300, most=LONGEST_RECORD_S)] = 1200.0
-    effective_slope: Positive = 0.5
+    effective_slope: Annotated[float, Range(above=0, most=2)] = 0.5
     renew: bool = False
 
     def __post_init__(self) -> None:

@@ -15,17 +15,22 @@ aligns with the surface, so the wave moment is the restoring stiffness times an 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Final
 
 import numpy as np
 
 from utank_hil.base.arrays import ComplexArray, FloatArray
-from utank_hil.base.parameters import NotNegative, range_problems, refuse
+from utank_hil.base.parameters import NotNegative, Range, range_problems, refuse
 from utank_hil.sea.encounter import encounter_frequency, wavenumber_rad_m
 from utank_hil.sea.harmonics import Harmonics
 from utank_hil.sea.spectrum import Spectrum
 
 BEAM_RAD = math.pi / 2  # waves travelling from port to starboard
 COMPONENTS = 512
+
+
+MOST_SLOPE_SHARE: Final = 2.0
+"""Twice the long-wave limit of a hull that follows the slope: beyond it the value is no share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +51,10 @@ class EffectiveSlope:
     Raises
     ------
     ValueError
-        If a value is negative or not finite.
+        If a value is negative or not finite, or the coefficient above `MOST_SLOPE_SHARE`.
     """
 
-    coefficient: NotNegative = 1.0
+    coefficient: Annotated[float, Range(least=0, most=MOST_SLOPE_SHARE)] = 1.0
     depth_m: NotNegative = 0.0
     beam_m: NotNegative = 0.0
 

@@ -82,6 +82,15 @@ def of_weight(ship: RollShip, tank: Tank) -> Iterator[Figure]:
     )
     share = gyration_m / tank.width_m
     yield Figure("ship.displacement_n", share, 0.05, 0.2, weight, 1.2, 5, weight)
+    volume_m3 = ship.displacement_n / (GRAVITY_M_S2 * tank.density_kg_m3)
+    yield Figure(
+        "ship.displacement",
+        volume_m3 / tank.width_m**3,  # about 1.5 beams cubed; a small tank has a third of the beam
+        warned_above=50,
+        refused_above=200,
+        high=f"is {volume_m3:.3g} m3 of water for a ship that holds a tank {tank.width_m:g} m "
+        "wide: displacement_n is a weight in newtons",
+    )
 
 
 def of_tank(ship: RollShip, tank: Tank) -> Iterator[Figure]:
