@@ -28,8 +28,9 @@ from utank_hil.analysis.tank_sizing import (
     size_tank,
     usable_level_m,
 )
-from utank_hil.base.parameters import ParameterError, Problem
+from utank_hil.base.parameters import ParameterError
 from utank_hil.configuration import ControllerConfig, Vessel
+from utank_hil.configuration.files import problems_in_words
 from utank_hil.configuration.ship_keys import WrittenShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
@@ -44,9 +45,12 @@ MOST_SLOPE_RAD: Final = math.radians(1.5)
 """Significant effective slope of the starter's sea: the pump is made for no more."""
 PERIODS_S: Final = (3.0, 18.0)
 """Peak periods of seas there are; within them the starter's sea has the ship's roll period."""
-_HEIGHT_PER_LENGTH = 1 / 40
-_HEIGHTS_M = (0.5, 5.0)
-_LEAST_LEVEL_CHANGE = 0.01  # a limit as the vessel has it anyway is not written
+_HEIGHT_PER_LENGTH: Final = 1 / 40
+"""A sea in which a ship of the length works, not the worst that it survives."""
+_HEIGHTS_M: Final = (0.5, 5.0)
+"""Least and greatest height: below it no tank is wanted, above it few ships are under way."""
+_LEAST_LEVEL_CHANGE: Final = 0.01
+"""A limit that is the vessel's own to this share is not written."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,14 +164,6 @@ def _valid(model: type[ModelT], content: dict[str, Any]) -> ModelT:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        problems: list[Problem] = []
-        for item in error.errors():
-            section = [str(part) for part in item["loc"][:1]]
-            cause = item.get("ctx", {}).get("error")
-            if isinstance(cause, ParameterError):
-                found = cause.problems
-            else:
-                reason = str(item["msg"]).removeprefix("Value error, ")
-                found = [(str(item["loc"][-1]), reason)]
-            problems += [(".".join((*section, name)), reason) for name, reason in found]
+        found = problems_in_words(error, content, model)
+        problems = [(".".join(map(str, key)), reason) for key, reason in found]
         raise ParameterError("starter", problems) from error

@@ -15,7 +15,9 @@ from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw
 
 MOST_STEP_S: Final = TICK_S / 2
+"""Of a law: the other half of a tick is for everything else in it."""
 STEPS_TIMED: Final = 5
+"""Of which the fastest counts: it is the law's own, not another process's."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,24 +114,6 @@ def test_every_wrong_value_of_a_scenario_s_sections_has_its_own_key(tmp_path: Pa
         assert reason in reasons[key]
 
 
-def test_missing_vessel_does_not_hide_what_else_is_wrong(tmp_path: Path) -> None:
-    path = controller(tmp_path, "gpc", vessel="nowhere.yaml", bit_rate=1, law__control_horizon=-1)
-    keys = {key for _, key, _ in told(invoke("check", path))}
-    assert keys == {"vessel", "bit_rate", "law.control_horizon"}
-
-
-def test_key_written_twice_is_refused_with_both_lines(tmp_path: Path) -> None:
-    path = controller(tmp_path, "gpc")
-    lines = len(path.read_text().splitlines())
-    path.write_text(path.read_text() + "name: again\nname: and again\n")
-    first = 1 + [line.startswith("name:") for line in path.read_text().splitlines()].index(True)
-    reasons = {reason for _, key, reason in told(invoke("check", path)) if key == "name"}
-    assert reasons == {
-        f"is written twice, in lines {first} and {lines + 1}: remove one",
-        f"is written twice, in lines {lines + 1} and {lines + 2}: remove one",
-    }
-
-
 def test_every_wrong_number_of_a_ship_has_its_own_key(tmp_path: Path) -> None:
     content = whole(CONFIGS / "ships" / "thesis_first.yaml")
     content["ship"] = {"inertia_kg_m2": -1, "stiffness_nm_rad": 0, "damping_nms_rad": -3}
@@ -240,15 +222,6 @@ def test_ship_that_a_scenario_changes_is_checked_too(
     ((file, at, why),) = told(invoke("check", path))
     assert (file, at) == (path.name, key)
     assert reason in why
-
-
-@pytest.mark.parametrize("text", ["name: a\n", "name: a\nvessel: b\n", "law: 1\ntank: 2\n"])
-def test_file_of_no_kind_is_told_what_each_kind_has(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "what.yaml"
-    path.write_text(text)
-    ((_, _, reason),) = told(invoke("check", path))
-    for word in ("controller", "law", "scenario", "sea", "ship", "tank"):
-        assert word in reason
 
 
 @pytest.mark.slow

@@ -154,12 +154,6 @@ def test_what_is_no_mapping_is_refused(tmp_path: Path, text: str, reason: str) -
         load_config(write(tmp_path, "bad.yaml", text), Scenario)
 
 
-def test_not_a_number_is_no_value(tmp_path: Path) -> None:
-    top = write(tmp_path, "top.yaml", "ship: {length_m: 1, name: A}\nduration_s: .nan\n")
-    with pytest.raises(ConfigError, match="duration_s"):
-        load_config(top, Scenario)
-
-
 def test_path_of_a_data_file_is_relative_to_the_file_that_names_it(tmp_path: Path) -> None:
     write(tmp_path, "ships/a.yaml", "length_m: 20\nname: ./data.txt\n")
     top = write(tmp_path, "top.yaml", "ship: ships/a.yaml\nduration_s: 10\n")

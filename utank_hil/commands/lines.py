@@ -12,6 +12,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.telemetry.events import event_text
 
 _END_S: Final = 10.0
+"""For the last line on a terminal that is slow."""
 _STANDARD_ERROR: Final = 2
 
 

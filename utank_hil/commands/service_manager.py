@@ -12,6 +12,7 @@ from utank_hil.base.tick import TICK_NS
 _FEEDS: Final = 4
 """Signs of life in the watchdog's time."""
 READY_S: Final = 30.0
+"""A third of the time in which systemd expects a service to be ready."""
 
 
 class ServiceManager(Closing):
