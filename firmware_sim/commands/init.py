@@ -191,7 +191,7 @@ def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
 def _place(name: str, prefix: str) -> str:
     """The option that sets a parameter; the parameter where none does."""
     section, _, option = name.rpartition(".")
-    if section not in ("", "ship", "sea", "law"):
+    if section not in ("", "ship", "sea", "law.sea"):
         return name
     for unit in _UNITS:
         option = option.removesuffix(unit)

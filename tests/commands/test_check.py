@@ -97,7 +97,7 @@ def test_every_wrong_value_of_a_scenario_s_sections_has_its_own_key(tmp_path: Pa
     path.write_text(yaml.safe_dump(content))
     reasons = {key: reason for _, key, reason in told(invoke("check", path))}
     expected = {
-        "sea.effective_slope.coefficient": "must be zero or more",
+        "sea.effective_slope.coefficient": "must be 0 to 2",
         "sea.effective_slope.depth_m": "must be zero or more",
         "sea.effective_slope.beam_m": "must be a number, got 'wide'",
         "sensors.roll_noise_rad": "must be zero or more",

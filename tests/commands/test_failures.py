@@ -16,6 +16,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import failures_named
 
 GPC = "configs/controllers/gpc.yaml"
+SHIP = "configs/ships/thesis_first.yaml"
 LOG = Path("tests/replay/every-mode.frames")
 PYTHONS_OWN = ("Errno", "Traceback", "codec", "unpack", "could not convert", "os error")
 
@@ -73,9 +74,9 @@ def test_a_results_file_that_does_not_fit_ends_any_command_in_words(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with little_room(), pytest.raises(SystemExit) as ended, failures_named():
-        app(["reproduce", "2.7", "--out", str(tmp_path)], standalone_mode=False)
+        app(["design", "tank", SHIP, "--out", str(tmp_path)], standalone_mode=False)
     assert ended.value.code == ExitCode.USAGE
-    assert capsys.readouterr().err.split() == f"error: {tmp_path}/2.7.png: File too large".split()
+    assert capsys.readouterr().err.split() == f"error: {tmp_path}/tank.png: File too large".split()
 
 
 def test_other_errors_are_those_of_the_program() -> None:
@@ -83,7 +84,7 @@ def test_other_errors_are_those_of_the_program() -> None:
         raise OSError(errno.ECONNRESET, "reset")
 
 
-@pytest.mark.parametrize("words", [("check", GPC), ("reproduce", "--list", "--json")])
+@pytest.mark.parametrize("words", [("check", GPC), ("check", SHIP, "--json")])
 def test_a_full_disk_behind_standard_output_is_said(words: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = started(words, stdout=full)

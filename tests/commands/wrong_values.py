@@ -45,7 +45,7 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
     ("constrained_gpc", {"law__sea__effective_slope": 0, "law__sea__order": 800,
                          "law__sea__floor": 200.0, "law__sea__smoothing_rad_s": 5.0,
                          "law__sea__frequency_hz": [0.1, -0.2]},
-     {"law.sea.effective_slope": "must be positive", "law.sea.order": "must be 1 to 32",
+     {"law.sea.effective_slope": "must be above 0", "law.sea.order": "must be 1 to 32",
       "law.sea.floor": "at most 100", "law.sea.smoothing_rad_s": "at most 1",
       "law.sea.frequency_hz.1": "must be positive"}),
     ("constrained_gpc", {"law__sea__frequency_hz": [0.2, 0.1], "law__sea__density_m2_hz": [1.0]},
@@ -127,5 +127,5 @@ WRONG: list[tuple[str, dict[str, object], dict[str, str]]] = [
      {"retuning.change_factor": "add `sea_estimate: {}`"}),
     ("gpc", {"sea_estimate": {"every_s": 1, "record_s": 60, "effective_slope": 0}},
      {"sea_estimate.every_s": "30 to 3600", "sea_estimate.record_s": "300 to 3600",
-      "sea_estimate.effective_slope": "positive"}),
+      "sea_estimate.effective_slope": "must be above 0"}),
 ]  # fmt: skip

@@ -31,7 +31,7 @@ def a_law(folder: Path) -> dict[str, Any]:
         "    def applied(self, u): pass\n"
         "    def reset(self): pass\n"
     )
-    return {"kind": "python", "factory": "mark_of_code:Law", "measured": ["roll_rad"]}
+    return {"kind": "python", "factory": "./mark_of_code.py:Law", "measured": ["roll_rad"]}
 
 
 def written(folder: Path, **keys: Any) -> Path:
@@ -49,20 +49,16 @@ def the_storm(folder: Path, controller: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def said(*words: object) -> tuple[int, str]:
     done = CliRunner(env={"COLUMNS": "300"}).invoke(app, [str(word) for word in words])
     return done.exit_code, done.stderr
 
 
-def test_code_is_refused_where_nobody_allows_it_and_nothing_of_it_is_imported(folder: Path) -> None:
-    controller = written(folder, law=a_law(folder))
-    scenario = the_storm(folder, controller)
+def test_code_that_nobody_allows_is_refused_and_nothing_of_it_is_imported(
+    tmp_path: Path,
+) -> None:
+    controller = written(tmp_path, law=a_law(tmp_path))
+    scenario = the_storm(tmp_path, controller)
     for words in (
         ("check", controller),
         ("check", scenario),
@@ -71,38 +67,38 @@ def test_code_is_refused_where_nobody_allows_it_and_nothing_of_it_is_imported(fo
     ):
         code, stderr = said(*words)
         assert code == ExitCode.USAGE
-        assert "law.kind: is python: it runs mark_of_code:Law" in stderr
+        assert "law.kind: is python: it runs" in stderr
         assert "--allow-code" in stderr
-    assert not (folder / "ran").exists()
+    assert not (tmp_path / "ran").exists()
 
 
 @pytest.mark.parametrize("kind", ["valve_clipped", "pump_with_valve"])
 def test_code_within_another_law_is_refused_even_where_code_is_allowed(
-    folder: Path, kind: str
+    tmp_path: Path, kind: str
 ) -> None:
-    law = {"kind": kind, "pump": a_law(folder)}
-    controller = written(folder, vessel=VALVE, law=law)
+    law = {"kind": kind, "pump": a_law(tmp_path)}
+    controller = written(tmp_path, vessel=VALVE, law=law)
     code, stderr = said("check", controller, "--allow-code")
     assert code == ExitCode.USAGE
     assert "law.pump.kind: must be one of" in stderr
-    assert not (folder / "ran").exists()
+    assert not (tmp_path / "ran").exists()
 
 
-def test_code_that_is_allowed_is_run(folder: Path) -> None:
-    controller = written(folder, law=a_law(folder), accept_low_margins=True)
+def test_code_that_is_allowed_is_run(tmp_path: Path) -> None:
+    controller = written(tmp_path, law=a_law(tmp_path), accept_low_margins=True)
     assert said("check", controller, "--allow-code")[0] == ExitCode.OK
     assert build_law(load_config(controller, ControllerConfig, allow_code=True))
-    assert (folder / "ran").exists()
+    assert (tmp_path / "ran").exists()
 
 
-def test_a_study_brings_in_no_code(folder: Path) -> None:
-    controller = written(folder, law={"kind": "passive"})
-    study = folder / "study.yaml"
+def test_a_study_brings_in_no_code(tmp_path: Path) -> None:
+    controller = written(tmp_path, law={"kind": "passive"})
+    study = tmp_path / "study.yaml"
     content = {
         "name": "S",
-        "scenario": str(the_storm(folder, controller)),
+        "scenario": str(the_storm(tmp_path, controller)),
         "simulation": "bus",
-        "set": {"controllers.own.law": a_law(folder)},
+        "set": {"controllers.own.law": a_law(tmp_path)},
     }
     study.write_text(json.dumps(content))
     with pytest.raises(ConfigError, match="--allow-code"):

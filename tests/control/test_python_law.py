@@ -1,5 +1,6 @@
 """Laws of one's own: what the factory may return, and what is said when it is no controller."""
 
+import pickle
 import sys
 from pathlib import Path
 
@@ -88,8 +89,7 @@ not_callable = 3
 @pytest.fixture(autouse=True)
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "own_laws.py").write_text(SOURCE, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     monkeypatch.delitem(sys.modules, "own_laws", raising=False)
 
 
@@ -143,8 +143,18 @@ def test_what_is_wrong_is_said_at_its_key(name, parameters, key, message) -> Non
 
 
 def test_a_module_that_is_not_there_is_said_with_where_it_was_looked_for(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=rf"it must be installed, or lie in {tmp_path}"):
+    with pytest.raises(ParameterError, match=r"install it, or name its file, ./own_lows.py:Gain"):
         PythonDesign("own_lows:Gain", ("roll_rad",)).build(PLANT)
+    with pytest.raises(ParameterError, match=rf"can't import {tmp_path}/own_lows.py: FileNotFound"):
+        PythonDesign(f"{tmp_path}/own_lows.py:Gain", ("roll_rad",)).build(PLANT)
+
+
+def test_a_file_is_a_module_of_its_own_and_its_law_goes_to_another_process(tmp_path: Path) -> None:
+    law = PythonDesign(f"{tmp_path}/own_laws.py:Gain", ("roll_rad",), {"gain": 3e5}).build(PLANT)
+    again = pickle.loads(pickle.dumps(law.controller.args))
+    assert again[0].endswith("own_laws.py:Gain")
+    assert law.controller().step(np.array([0.5])) == [1.5e5]
+    assert "own_laws" not in sys.modules
 
 
 @pytest.mark.parametrize(

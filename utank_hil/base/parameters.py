@@ -1,8 +1,9 @@
-"""Ranges of parameters: each stands at its field and is checked in one place, `range_problems`.
+"""Ranges of parameters: each stands once, at its field, and holds in code and in files alike.
 
 A dataclass annotates its fields (``inertia_kg_m2: Positive``) and hands its `range_problems`, and
 what else must hold, to `refuse`. A number that is out of its range raises `ParameterError`, a
-ValueError. Where a file is read, the annotation only refuses what is no number.
+ValueError. Where a file is read, each field is checked by the same annotation before the dataclass
+is made: so every wrong number of a file is found at once, also around a part that can't be made.
 """
 
 import math
@@ -102,7 +103,7 @@ class Range:
         return f"{self.least:g} or more and {high}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        """Take no number from what is none; the range is checked by `range_problems`."""
+        """Let configuration files check the field as they read it."""
         # here: nothing but files needs it
         from pydantic_core import PydanticCustomError, core_schema
 
@@ -111,7 +112,13 @@ class Range:
                 raise PydanticCustomError("number_type", "must be a number")
             return value
 
-        return core_schema.no_info_before_validator_function(a_number, handler(source))
+        def held(value: float) -> float:
+            if not self.holds(value):
+                raise ValueError(self.demand)
+            return value
+
+        number = core_schema.no_info_before_validator_function(a_number, handler(source))
+        return core_schema.no_info_after_validator_function(held, number)
 
 
 Finite = Annotated[float, Range()]
@@ -127,11 +134,11 @@ def range_problems(instance: "DataclassInstance") -> list[Problem]:
     return [
         problem
         for name, hint in _annotations(type(instance)).items()
-        for problem in outside(name, hint, getattr(instance, name))
+        for problem in _outside(name, hint, getattr(instance, name))
     ]
 
 
-def outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
+def _outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
     """The numbers in a value that lie outside the `Range` of its annotation, as problems.
 
     Parameters
@@ -145,14 +152,14 @@ def outside(name: str, hint: Any, value: Any) -> Iterator[Problem]:
         if missed := next((mark for mark in marks if not mark.holds(value)), None):
             yield name, f"{missed.demand}, got {value}"
         else:
-            yield from outside(name, arguments[0], value)
+            yield from _outside(name, arguments[0], value)
     elif origin is tuple:
         hints = repeat(arguments[0]) if arguments[1:] == (...,) else arguments
         for index, (inner, item) in enumerate(zip(hints, value, strict=False)):
-            yield from outside(f"{name}.{index}".lstrip("."), inner, item)
+            yield from _outside(f"{name}.{index}".lstrip("."), inner, item)
     elif origin in (Union, UnionType) and value is not None:
         for inner in arguments:
-            yield from outside(name, inner, value)
+            yield from _outside(name, inner, value)
 
 
 def refuse(owner: str, problems: list[Problem]) -> None:

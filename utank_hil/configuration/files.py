@@ -8,11 +8,11 @@ Every error carries the file and key where the wrong value was written.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, TypeVar
+from typing import Any, ClassVar, Final, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-from utank_hil.base.parameters import ParameterError, Problem, outside, refuse
+from utank_hil.base.parameters import ParameterError, Problem
 from utank_hil.configuration.error_words import words_for
 from utank_hil.configuration.known_keys import known_keys, nearest
 from utank_hil.configuration.yaml_text import Key, YamlError, parse_yaml
@@ -29,16 +29,6 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     noun: ClassVar[str] = ""
     """What a file of this is, in a word; empty for what is only a part of files."""
-
-    @field_validator("*")
-    @classmethod
-    def _in_range(cls, value: Any, info: ValidationInfo) -> Any:
-        field = cls.model_fields[str(info.field_name)]
-        hint: Any = field.annotation
-        for mark in field.metadata:
-            hint = Annotated[hint, mark]
-        refuse("", list(outside("", hint, value)))
-        return value
 
     def warnings(self) -> list[Problem]:
         """What is unusual in the section, by keys within it; it can be used all the same."""

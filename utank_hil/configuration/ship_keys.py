@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import PlainSerializer, WrapValidator
 
-from utank_hil.base.parameters import ParameterError, Problem, Range, range_problems, refuse
+from utank_hil.base.parameters import ParameterError, Problem, Range, refuse
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 
@@ -104,9 +104,7 @@ class WrittenShip(RollShip):
             for own, other in _PAIRS
             if self.gives(own) and self.gives(other)
         ]
-        absent = {each.name for each in fields(self) if getattr(self, each.name) is NOT_GIVEN}
-        wrong = [each for each in range_problems(self) if each[0] not in absent]
-        refuse("ship", wrong or twice or self._missing())
+        refuse("ship", twice or self._missing())
 
     def gives(self, name: str) -> bool:
         """Whether a key stands in the file."""

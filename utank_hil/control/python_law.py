@@ -1,6 +1,7 @@
 """A law of one's own: Python code outside this package, named in a configuration.
 
-The configuration names a factory, ``package.module:function``. It is called with the configured
+The configuration names a factory: ``package.module:function`` of an installed package, or
+``./file.py:function`` of a file beside the configuration. It is called with the configured
 parameters, and with the `DesignPlant` if it has a parameter named ``plant``. It returns a new
 `Controller` at rest: an object with ``sample_time_s``, ``step(y)``, ``applied(u)`` and ``reset()``.
 If that has an attribute ``linear``, its loop is judged by it: a discrete state-space model from the
@@ -9,14 +10,15 @@ judged by its impulse response at rest.
 """
 
 import importlib
+import importlib.util
 import inspect
 import math
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from numbers import Real
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
@@ -38,7 +40,8 @@ class PythonDesign:
     Parameters
     ----------
     factory : str
-        ``package.module:function``, importable from where the command is started.
+        ``package.module:function`` of an installed package, or ``./file.py:function`` of a file,
+        from the folder of the configuration.
     measured : tuple of str
         What the law measures, in order; names of `STATES`.
     parameters : mapping of str to any
@@ -57,10 +60,13 @@ class PythonDesign:
 
     def __post_init__(self) -> None:
         problems = measured_problems(self.measured)
-        module, colon, name = self.factory.partition(":")
-        dotted = all(part.isidentifier() for part in module.split("."))
-        if not (colon and dotted and name.isidentifier()):
-            reason = f"must be of the form package.module:function, got {self.factory!r}"
+        module, colon, name = self.factory.rpartition(":")
+        known = _is_file(module) or all(part.isidentifier() for part in module.split("."))
+        if not (colon and known and name.isidentifier()):
+            reason = (
+                "must be of the form package.module:function, or ./file.py:function, got "
+                f"{self.factory!r}"
+            )
             problems.append(("factory", reason))
         refuse("python", problems)
 
@@ -103,21 +109,36 @@ def _call(factory: str, parameters: dict[str, Any], plant: DesignPlant) -> Contr
 
 
 def _imported(factory: str) -> Callable[..., Any]:
-    module_name, _, name = factory.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)  # last: nothing there may stand in for an installed package
+    module_name, _, name = factory.rpartition(":")
     try:
-        module = importlib.import_module(module_name)
+        if _is_file(module_name):
+            module = _of_file(Path(module_name).resolve())
+        else:
+            module = importlib.import_module(module_name)
     except Exception as error:
         reason = f"can't import {module_name}: {type(error).__name__}: {error}"
-        if isinstance(error, ModuleNotFoundError):
-            reason += f"; it must be installed, or lie in {here}"
+        if isinstance(error, ModuleNotFoundError) and not _is_file(module_name):
+            reason += f"; install it, or name its file, ./{module_name}.py:{name}"
         raise _refused("factory", reason) from error
     function: object = getattr(module, name, None)
     if not callable(function):
         raise _refused("factory", f"module {module_name} has no function {name}")
     return function
+
+
+def _is_file(module: str) -> bool:
+    return module.endswith(".py")
+
+
+@cache
+def _of_file(path: Path) -> ModuleType:
+    """The module of a file, without a name under which others could import it."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def _try_out(controller: Controller, outputs: int) -> None:
