@@ -213,7 +213,7 @@ def test_a_ship_that_no_file_may_hold_is_told_and_leaves_no_file(
 ) -> None:
     nonsense = replace(RETUNED, found=replace(FOUND, inertia_kg_m2=-1.0))
     lines = Lines()
-    module._tell(nonsense, ships(tmp_path), lines)
+    module._print(nonsense, ships(tmp_path), lines)
     lines.close()
     said = capfd.readouterr().err
     assert "could not be written" in said

@@ -79,7 +79,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_of_a_recording_says_what_happened(recording: Path, tmp_path: Path) -> None:
     page = write_page([recording], tmp_path / "page.html").read_text(encoding="utf-8")
     rms = math.degrees(0.03 / math.sqrt(2))
-    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of her passive twin" in page
+    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in page
     assert "In charge for 75% of the time" in page
     assert 'class="verdict bad"' in page
     assert "A reservoir is &lt;full&gt;. Look at it." in page
@@ -132,11 +132,11 @@ def test_gaps_in_the_roll_are_left_out_of_its_figures(tmp_path: Path) -> None:
     roll[:10] = roll[1000:1500] = np.nan
     page = write_page([of_roll(tmp_path / "a.rrd", roll)], tmp_path / "a.html").read_text()
     rms = math.degrees(math.sqrt(np.nanmean(roll**2)))
-    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of her passive twin" in page
-    assert "her roll is known for 89.8% of it" in page
+    assert f"{rms:.2f}° RMS, 50% less than the {2 * rms:.2f}° of its passive twin" in page
+    assert "the roll is known for 89.8% of it" in page
     assert "Spectra and exceedance" in page
     page = write_page([of_roll(tmp_path / "b.rrd", np.nan * roll)], tmp_path / "b.html").read_text()
-    assert "In charge for 100% of the time: how much she rolled is not known." in page
+    assert "In charge for 100% of the time: the roll is not known." in page
     assert "Spectra and exceedance" not in page
 
 

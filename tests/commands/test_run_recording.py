@@ -235,7 +235,7 @@ def test_run_says_within_a_second_that_nothing_is_recorded_or_logged_any_longer(
                 break
         run.send_signal(signal.SIGINT)
         output = run.communicate()[0]
-    lost = "the process that tells events ended with code -9"
+    lost = "the process that logs events ended with code -9"
     assert told[-2] == "not recorded any longer: the recorder failed: exit code -9\n"
     assert told[-1] == f"events are not logged any longer: {lost}\n"
     report = json.loads(output)

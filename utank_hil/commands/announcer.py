@@ -1,7 +1,7 @@
-"""Tells what happens while the loop goes on: a process of its own, as the loop has no time.
+"""The announcer: a process that logs and prints events, for which the loop has no time.
 
 The loop writes an event into shared memory. This process logs it, prints it if retuning made it,
-and keeps the ship that was found in files. It reads what is left when the loop was killed, too.
+and writes the ship that was found to files. It reads the rest when the loop was killed, too.
 """
 
 import multiprocessing
@@ -25,10 +25,10 @@ from utank_hil.runners.stopping import SIGNALS, signals_waiting
 from utank_hil.telemetry.events import Event, EventReader, EventWriter, event_text
 
 LOOK_S: Final = 0.5
+"""Time between two looks at the ring: soon enough to be read by people."""
 _NICENESS: Final = 5
-_START_S: Final = 30.0
-_END_S: Final = 10.0
-_PRINTED_S: Final = 5.0
+_START_S, _END_S, _PRINTED_S = 30.0, 10.0, 5.0
+"""Times for the process to start, to end, and to print the last lines, on a busy machine."""
 
 
 class Announcer:
@@ -77,7 +77,7 @@ class Announcer:
             else:
                 process.kill()
                 process.join()
-                self.error = f"the process that tells events did not start ({process.exitcode})"
+                self.error = f"the process that logs events did not start ({process.exitcode})"
 
     def write(self, event: Event, start_ns: int) -> None:
         """Take one event; never waits."""
@@ -85,7 +85,7 @@ class Announcer:
             self._writer.write_event(event, start_ns)
 
     def failure(self) -> str:
-        """Why the process has ended before the run, once; never waits."""
+        """The reason why the process has ended before the run, once; never waits."""
         if self.error is not None or self._process is None or self._process.is_alive():
             return ""
         self._note_end(self._process)
@@ -103,17 +103,17 @@ class Announcer:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-            self.error = "the process that tells events did not end and was killed"
+            self.error = "the process that logs events did not end and was killed"
         else:
             self._note_end(self._process)
 
     def _note_end(self, process: SpawnProcess) -> None:
         if process.exitcode != 0:
-            self.error = f"the process that tells events ended with code {process.exitcode}"
+            self.error = f"the process that logs events ended with code {process.exitcode}"
 
 
 def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: Connection) -> None:
-    """Tell events until their writer ends or dies; the whole life of the process."""
+    """Log and print events until their writer ends or dies: the whole life of the process."""
     with EventReader(ring) as reader, ExitStack() as stack:
         # a terminal may be held up, and the log must not wait for it
         lines, events = Lines(), None
@@ -138,7 +138,7 @@ def announce(ring: str, ships: IdentifiedShips | None, log: Path | None, ready: 
                 if events is not None:
                     _log(events, event, reader.start_ns, lines)
                 if isinstance(event, RetuningEvent):  # alarms are printed at once, by the run
-                    _tell(event, ships, lines)
+                    _print(event, ships, lines)
             if last:
                 break
             time.sleep(LOOK_S)
@@ -161,7 +161,7 @@ def _log(events: EventLog, event: Event, start_ns: int, lines: Lines) -> None:
         lines.say(f"an event was not logged: {error}")
 
 
-def _tell(event: RetuningEvent, ships: IdentifiedShips | None, lines: Lines) -> None:
+def _print(event: RetuningEvent, ships: IdentifiedShips | None, lines: Lines) -> None:
     kept = ""
     if ships is not None and event.found is not None and event.state is RetuningState.RETUNED:
         try:

@@ -48,7 +48,7 @@ class EventLog:
         left = (json.dumps(line, ensure_ascii=False) + "\n").encode(errors="replace")
         begin = self._file.seek(0, os.SEEK_END)
         try:
-            while left:  # what fits is written; what is left tells why it does not
+            while left:  # what fits is written; the next write gives the reason
                 left = left[self._file.write(left) :]
             os.fsync(self._file.fileno())
         except OSError:

@@ -16,10 +16,11 @@ if TYPE_CHECKING:
     from utank_hil.telemetry.viewer import Viewer
 
 LIVE: Final = "rerun+http://"
-"""How the address of a live stream begins."""
+"""Beginning of the address of a live stream."""
 LOOKS: Final = "&theme=dark&hide_welcome_screen&notebook=0&persist=0"
-"""Of the viewer in a browser: the colours are for a dark ground, and nothing else is to be seen."""
+"""Options of the viewer in a browser: a dark ground, as the colours ask for, and no menus."""
 _LOOK_S: Final = 0.25
+"""Time between two looks at the ring and at the viewer: smooth to the eye of a watch-keeper."""
 _NICENESS: Final = 5
 
 

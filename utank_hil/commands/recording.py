@@ -21,8 +21,9 @@ from utank_hil.telemetry.rows import RowWriter
 NAME: Final = "run-{}.rrd"
 FRAMES: Final = f"run-{{}}{SUFFIX}"
 PART_S: Final = 3600.0
-"""A recording goes on in another file after so long."""
-RING_SLOTS: Final = 1640  # 82 s: a recorder that sleeps less loses nothing
+"""Length of one file of a recording."""
+RING_SLOTS: Final = 1640
+"""Of each ring, 82 s at 20 Hz: a recorder that is held up for less loses nothing."""
 
 
 @dataclass(slots=True)
@@ -70,7 +71,7 @@ class RunRecording:
     head : mapping, optional
         Head of the frame log (`utank_hil.telemetry.replay_head`); without it there is none.
     keep_bytes : int, optional
-        The folder's oldest recordings are removed beyond so much; without it none are.
+        The folder's oldest recordings beyond this size are removed; without it none are.
     log : Path, optional
         Log of the run's events, whose time the recording is named by: a report looks for it there.
 
@@ -154,7 +155,7 @@ class RunRecording:
             self._records.write(records)
 
     def failure(self) -> str:
-        """Why the recorder has ended before the run, once; never waits."""
+        """The reason why the recorder has ended before the run, once; never waits."""
         if self._recorder is None or not self._recorder.has_ended:
             return ""
         self._end_recorder()

@@ -1,4 +1,4 @@
-"""What a report says of a recording of ``utank-hil run``: the ship, her twin, alarms, deadlines."""
+"""The report of a recording of ``utank-hil run``: ship, passive twin, alarms, deadlines."""
 
 import json
 import math
@@ -24,8 +24,9 @@ from utank_hil.telemetry.highlight import in_service
 from utank_hil.telemetry.rotation import whole_of
 
 STEP_S: Final = 0.05
-"""Between the samples that are drawn: ample for a ship."""
+"""Step between the samples that are drawn: ample for a ship."""
 LEAST_ROWS: Final = 3
+"""Rows that statistics and a spectrum need."""
 RUN, LOG = "run-", "log-"
 """Beginnings of the names of a run's recording and of its log of alarms."""
 
@@ -94,10 +95,10 @@ def _verdict(rows: dict[str, FloatArray], alarms: list[dict[str, Any]]) -> Verdi
 
 
 def _rolled(rows: dict[str, FloatArray], active: npt.NDArray[np.bool_]) -> str:
-    """How much she rolled in these rows, as far as it is known."""
+    """The roll in these rows, in words, as far as it is known."""
     known = active & np.isfinite(rows["roll_rad"])
     if not known.any():
-        return "how much she rolled is not known"
+        return "the roll is not known"
     roll = roll_statistics(rows["roll_rad"][known])
     words = f"{_degrees(roll.rms_rad)} RMS"
     both = known & np.isfinite(rows["twin_roll_rad"])
@@ -106,11 +107,11 @@ def _rolled(rows: dict[str, FloatArray], active: npt.NDArray[np.bool_]) -> str:
         share = 1 - roll_statistics(rows["roll_rad"][both]).rms_rad / twin
         words += (
             f", {abs(share):.0%} {'less' if share >= 0 else 'more'} than the "
-            f"{_degrees(twin)} of her passive twin"
+            f"{_degrees(twin)} of its passive twin"
         )
     words += f"; {_degrees(roll.maximum_rad)} at most"
     share_known = known.sum() / active.sum()
-    return words if share_known == 1 else f"{words}; her roll is known for {share_known:.1%} of it"
+    return words if share_known == 1 else f"{words}; the roll is known for {share_known:.1%} of it"
 
 
 def _longest_known(roll_rad: FloatArray) -> FloatArray:
@@ -139,12 +140,12 @@ def _histories(rows: dict[str, FloatArray], scratch: Path, title: str) -> Report
         scratch / "histories.png",
         title,
     )
-    says = "Roll of the ship and of her passive twin, level and pressure"
+    says = "Roll of the ship and of its passive twin, level and pressure"
     return ReportPicture(file.read_bytes(), says)
 
 
 def _modes(rows: dict[str, FloatArray]) -> ReportTable:
-    """When which mode and fault began."""
+    """Times at which modes and faults began."""
     state = np.column_stack([rows["mode"], rows["fault"]])
     begins = np.flatnonzero(np.any(np.diff(state, axis=0, prepend=np.nan) != 0, axis=1))
     table = [

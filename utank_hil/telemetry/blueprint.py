@@ -25,8 +25,9 @@ from utank_hil.telemetry.units import UNITS, Field, field_of
 from utank_hil.telemetry.viewer import TIMELINE
 
 HALF_WINDOW_S: Final = 60.0
+"""Half the width of the plots around the cursor: some ten rolls."""
 MOST_SHADES: Final = 4
-"""In one plot; of several runs, so many ships are shown side by side."""
+"""Most lines of a plot, and most ships that are shown side by side."""
 WATCH_SHARES: Final = {1: (5, 4), MOST_SHADES: (5, 7, 4)}
 """Heights of ships, words and plot, for one ship and for several: no remedy of a fault is cut."""
 
@@ -41,7 +42,7 @@ PARTS: Final = {
     "valve": ("valve_opening",),
     "pump": ("pressure_command_pa", "pressure_actual_pa", "pump_power_w"),
 }
-"""Columns of parts of the ship that she may not have."""
+"""Columns of parts that a ship may lack."""
 ESTIMATES: Final = (
     "sea_verdict", "significant_height_m", "peak_period_s", "wave_moment_rms_rad",
     "wave_moment_deviation", "sea_age_s", "ship_verdict", "roll_period_s",
@@ -73,7 +74,7 @@ SUBJECTS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
         ("Bus load, %", ("bus_load",)),
     ),
 }
-"""Plots of the engineer's tabs: title and columns, the first of them for several runs."""
+"""Plots of the engineer's tabs: title and columns, of which the first is shown of several runs."""
 
 # Okabe and Ito's colour-blind safe palette, in an order for a dark background
 _PALETTE: Final = (
@@ -102,15 +103,13 @@ def make_blueprint(
 
     Parameters
     ----------
-    columns : sequence of str
-        Telemetry columns to be shown, of those given to `RunLog`.
     runs : sequence of str
-        Names of the runs; with several, a colour stands for a run, else for a signal.
+        With several, a colour stands for a run, else for a signal.
     span_s : (float, float), optional
         First and last time of a finished recording, shown in one tab as a whole and in another
         around the cursor. By default the view is live and follows the newest data.
     size : SceneSize, optional
-        Of the scenes, if the runs have any; without, there is no tab for the watch.
+        Without it there are no scenes, and no tab for the watch.
     zero : collection of (str, str), optional
         Run and column of the signals that are zero throughout: a line that says nothing.
     """
@@ -145,20 +144,13 @@ def make_blueprint(
 
 
 def columns_of(columns: Sequence[str], about: Mapping[str, Any] | None) -> list[str]:
-    """Columns without those of parts that the ship, or the controller, has not.
-
-    Parameters
-    ----------
-    columns : sequence of str
-    about : mapping or None
-        Where they come from (`utank_hil.base.provenance`).
-    """
-    told = (about or {}).get("configuration", {})
-    vessel = told.get("vessel") or {}
+    """Columns without those of parts that the recorded ship or controller lacks."""
+    configuration = (about or {}).get("configuration", {})
+    vessel = configuration.get("vessel") or {}
     missing = {
         name for part in PARTS if part in vessel and vessel[part] is None for name in PARTS[part]
     }
-    if "sea_estimate" in told and told["sea_estimate"] is None:
+    if "sea_estimate" in configuration and configuration["sea_estimate"] is None:
         missing.update(ESTIMATES)
     return [column for column in columns if column not in missing]
 
@@ -251,7 +243,7 @@ def _subjects(
 def _others(
     fields: Mapping[Field, Sequence[int]], runs: Sequence[str], axis: rrb.TimeAxis
 ) -> list[rrb.View]:
-    """Plots of what has no place of its own: by unit, of several runs one for each signal."""
+    """Plots of the signals without a place: one a unit, or of several runs one a signal."""
     most = MOST_SHADES if len(runs) == 1 else 1
     groups = [[field for field in fields if field.unit.plot == plot]
               for plot in dict.fromkeys(unit.plot for unit in UNITS)]  # fmt: skip
@@ -316,11 +308,11 @@ def _plot(
     }
     if len(runs) > 1 and title == fields[0].unit.plot:
         title = f"{fields[0].label}: {title}"
-    told = ", ".join(f"{label} {color}" for label, color in named)
+    key = ", ".join(f"{label} {color}" for label, color in named)
     return rrb.TimeSeriesView(
         contents=[paths[i] for i in shown],
         overrides=overrides,
-        name=f"{title}: {told}" if told else title,
+        name=f"{title}: {key}" if key else title,
         axis_x=axis,
         plot_legend=rrb.PlotLegend(visible=False),
     )

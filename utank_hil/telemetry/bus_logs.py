@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 BUS_SUFFIXES: Final = (".log", ".asc", ".blf")
 _EARLY_NS: Final = TICK_NS // 5
-"""A frame may be so much earlier than the controller's first one was in its tick."""
+"""How much earlier in its tick a frame may be than the controller's first one was."""
 
 
 class BusLogError(ValueError):
@@ -51,7 +51,7 @@ def write_bus_log(path: Path, entries: Iterable[Entry]) -> int:
     Returns
     -------
     int
-        Frames written.
+        Number of frames.
     """
     from can import Message
 

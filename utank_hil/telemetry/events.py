@@ -16,7 +16,7 @@ _SLOTS: Final = 64
 """A retuning has four events in four minutes; readers look every 0.5 s."""
 _LONGEST_BYTES: Final = 8192
 _MOST_BYTES_A_CHARACTER: Final = 6
-"""Of an escaped character in JSON."""
+"""Length of an escaped character in JSON."""
 _CUT: Final = _LONGEST_BYTES // (2 * _MOST_BYTES_A_CHARACTER)
 
 

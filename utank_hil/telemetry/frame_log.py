@@ -122,7 +122,7 @@ class FrameLog:
     Parameters
     ----------
     path : Path
-        Its first part, or one of them to be read from there on.
+        The first part, or another to be read from there on.
 
     Attributes
     ----------

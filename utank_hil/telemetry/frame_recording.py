@@ -1,4 +1,4 @@
-"""From the ring of frames to the frame log."""
+"""The way from the ring of frames to the frame log."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -37,7 +37,7 @@ class FrameRecording(Closing):
 
     @property
     def place(self) -> int:
-        """Of the ring, as `RingReader.place`."""
+        """As that of a `RingReader`."""
         return self._reader.place
 
     def write(self) -> None:

@@ -1,4 +1,4 @@
-"""Where in a recording something happens."""
+"""The time in a recording at which something happens."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def highlight_s(file: Path) -> float:
 
 
 def in_service(rows: dict[str, FloatArray]) -> npt.NDArray[np.bool_]:
-    """Which rows are not of the start, where what is awaited is a fault until it has come."""
+    """Rows after the start, in which a signal that is awaited counts as a fault until it comes."""
     started: npt.NDArray[np.bool_] = (rows["mode"] != Mode.INIT) & (rows["mode"] != Mode.STANDBY)
     return started
 

@@ -1,6 +1,6 @@
 """Runs on this machine: found by their rings in shared memory, and streamed to viewers.
 
-A run is not asked and does not notice: a ring has any number of readers.
+A run does not notice its viewers: a ring has any number of readers.
 """
 
 from collections.abc import Mapping
@@ -21,6 +21,7 @@ from utank_hil.telemetry.viewer import LOOPBACK, hold_port, live_url, port_of
 MEMORY: Final = "64MiB"
 """History for a viewer that connects late; bounds the memory of the stream."""
 _START_S: Final = 5.0
+"""Time in which the server of a stream starts, even on a busy machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ def live_runs() -> list[LiveRun]:
             with RowReader(name) as rows:
                 if rows.columns == SIGNALS:
                     found.append((name, rows.writer_pid, rows.about or {}))
-        except OSError:  # gone since, of another version or kind, or somebody else's
+        except OSError:  # gone since, of another version or kind, or another user's
             continue
     return [LiveRun(ring, events.get(pid), pid, about) for ring, pid, about in found]
 
@@ -79,7 +80,7 @@ class LiveStream(Closing):
     Raises
     ------
     OSError
-        If the run has ended meanwhile, or somebody else took the port.
+        If the run has ended meanwhile, or another program took the port.
     """
 
     def __init__(self, run: LiveRun) -> None:
@@ -95,7 +96,7 @@ class LiveStream(Closing):
             stack.callback(stream.disconnect)
             try:
                 stream.flush(timeout_sec=_START_S)
-            except RuntimeError as error:  # or viewers would show what somebody else sends there
+            except RuntimeError as error:  # or viewers would show the other program
                 again = "start it again: it takes another"
                 raise OSError(f"port {port} of this machine was taken; {again}") from error
             self._log = live_log(stream, self._ring.columns, run.about)

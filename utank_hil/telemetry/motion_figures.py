@@ -17,9 +17,9 @@ from utank_hil.telemetry.viewer import TIMELINE
 
 NEEDED: Final = ("time_s", "roll_rad", "roll_rate_rad_s")
 STEP_S: Final = 0.2
-"""Between two samples of both."""
+"""Step between two samples of both figures."""
 SPECTRUM_S: Final = 20.0
-"""Between two spectra."""
+"""Time between two spectra."""
 RECORD_S: Final = 300.0
 SEGMENT: Final = 500
 """Samples of a segment, of which the squares are averaged: 0.01 Hz apart."""

@@ -1,4 +1,4 @@
-"""Taps that write down what a controller node is handed, and what it answers.
+"""Taps that record what a controller node is handed, and what it answers.
 
 They stand between the runner and the node, and between the controller and its retuner. Nothing
 is changed on the way, so the node does the same with them as without.
@@ -39,7 +39,7 @@ class NodeTap:
     taps : sequence of RetunerTap
         Whose records belong among the node's.
     every : int
-        Ticks whose records are handed on together; the stop hands on what is left.
+        Ticks whose records are handed on together; the stop hands on the rest.
     """
 
     def __init__(

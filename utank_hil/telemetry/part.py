@@ -25,8 +25,11 @@ from utank_hil.telemetry.scene import scene_size
 Sink: TypeAlias = rr.FileSink | rr.GrpcServerSink
 
 _FLUSH_TIMEOUT_S: Final = 5.0
-_RESERVED_BYTES: Final = 1 << 18  # for the beginning of a recording, mostly its blueprint
-_FOOTER: Final = (b"FOOT", 64)  # mark within the last bytes of a finished file
+"""Time for a batch of 0.5 s to reach the disk; without a limit Rerun waits on a full one."""
+_RESERVED_BYTES: Final = 1 << 18
+"""Room for the beginning of a recording, mostly its blueprint."""
+_FOOTER: Final = (b"FOOT", 64)
+"""Mark within the last bytes of a finished file."""
 
 
 def open_stream(

@@ -37,9 +37,9 @@ from utank_hil.telemetry.rows import RowReader
 from utank_hil.telemetry.viewer import rerun_environment
 
 BATCH_S: Final = 0.5
-"""Between two writes: one costs 1 kB of file, and a kill loses up to two."""
+"""Time between two writes: one costs 1 kB of file, and a kill loses up to two."""
 RETRY_S: Final = 10.0
-"""Between two tries to begin a file."""
+"""Time between two tries to begin a file."""
 _NICENESS: Final = 5
 _FULL_BYTES: Final = 1 << 20
 """A disk with less room counts as full."""
@@ -163,7 +163,7 @@ def _main() -> None:
         reason = _reason(error, file)
         state.complained = reason == state.failure
         state.failure = reason
-        if state.report.parts and state.task.rotation and not _nobody_writes(state.task.rows):
+        if state.report.parts and state.task.rotation and not _writer_ended(state.task.rows):
             begun = part_of(file, state.report.parts + 1)
             for suffix in SUFFIXES:  # of a part that has nothing yet
                 begun.with_suffix(suffix).unlink(missing_ok=True)
@@ -183,8 +183,8 @@ def _complain(state: RecorderState, more: str = "") -> None:
             sys.stderr.flush()
 
 
-def _nobody_writes(ring: str) -> bool:
-    """Whether the writer of a ring has closed it or is dead: there is nothing to try again for."""
+def _writer_ended(ring: str) -> bool:
+    """Whether the writer of a ring has closed it or is dead, so that nothing more would come."""
     try:
         with RingReader(ring) as reader:
             return reader.ended
@@ -193,7 +193,7 @@ def _nobody_writes(ring: str) -> bool:
 
 
 def _reason(error: Exception, file: Path) -> str:
-    """Why a recording failed: Rerun says nothing of a full disk."""
+    """The reason why a recording failed; Rerun gives none for a full disk."""
     with suppress(OSError):
         if shutil.disk_usage(file.parent).free < _FULL_BYTES:
             return f"the disk of {file.parent} is full ({error})"

@@ -17,6 +17,7 @@ NEEDS_RERUN: Final = "it needs rerun-sdk: pip install 'utank-hil[viewer]'"
 _MODULE: Final = "utank_hil.telemetry.recorder"
 _START_TIMEOUT_S: Final = 30.0
 _STOP_TIMEOUT_S: Final = 30.0
+"""Times for Rerun to load, and for the last rows to reach the disk, on a busy machine."""
 _FIELDS: Final = {each.name for each in fields(RecorderReport)}
 _READ_BYTES: Final = 1 << 16
 """What a pipe holds."""

@@ -1,4 +1,4 @@
-"""What the recorder is told, and what it takes along from file to file: plain and typed."""
+"""The recorder's task, its report, and the state that it keeps from file to file."""
 
 import json
 import os

@@ -37,7 +37,8 @@ from utank_hil.telemetry.viewer import TIMELINE, rerun_binary, rerun_environment
 
 _ROWS: Final = f"{ARCHETYPE}:{COMPONENT}"
 _TEXT: Final = "TextDocument:text"
-_BLOCK_ROWS: Final = 8192  # rows of a chunk, the unit in which the viewer loads a file
+_BLOCK_ROWS: Final = 8192
+"""Rows of a chunk, the unit in which the viewer loads a file."""
 
 
 def write_recording(
@@ -170,8 +171,8 @@ def read_about(path: Path) -> dict[str, Any]:
 def _chunks(path: Path, component: str) -> list[Chunk]:
     """Return the chunks with a component; of a damaged file, those that can be read.
 
-    A killed recorder leaves it cut. Of anything else, as a disk that was full for a time or a power
-    cut leave it, a warning tells: rows may be missing in the middle.
+    A killed recorder leaves a file that is cut. Any other damage, as by a disk that was full for a
+    time or by a power cut, is warned of: rows may be missing in the middle.
     """
     try:
         return _read_chunks(path, component)

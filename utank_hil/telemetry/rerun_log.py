@@ -40,7 +40,7 @@ STATE_COLUMNS: Final = ("mode", "fault")
 PICTURES_S: Final = 60.0
 """Length of the drawings that are written to a file at once; a kill loses them, not the rows."""
 ONE_COLOR: Final = (0xE6, 0x9F, 0x00)
-"""Of a run that is alone."""
+"""Colour of a run that is alone."""
 _ESCAPE: Final = re.compile(r"\\u\{(?P<code>[0-9A-Fa-f]+)\}|\\(?P<mark>.)")  # of entity paths
 
 _MODE_COLORS: Final = {
@@ -183,7 +183,7 @@ class RunLog:
 
 
 def _changed(states: FloatArray, before: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which rows of states differ from the row before."""
+    """Rows of states that differ from the row before."""
     changed: npt.NDArray[np.bool_] = (np.diff(states, axis=0, prepend=before) != 0).any(axis=1)
     return changed
 

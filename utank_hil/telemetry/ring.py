@@ -126,7 +126,7 @@ class RingWriter(Closing):
         stride = slot_bytes + 8
         size = first + slots * stride
         self.name = name or f"{_PREFIX}{os.getpid()}-{secrets.token_hex(4)}"
-        # a killed process group has nobody left to unlink its own
+        # a process group that was killed as a whole has left its own
         for left_over in {self.name, *ring_names()}:
             _remove_if_orphaned(left_over)
         try:
@@ -193,7 +193,7 @@ class RingWriter(Closing):
         shm.close()
         try:
             shm.unlink()
-        except FileNotFoundError:  # removed by somebody, as by systemd-logind when its user leaves
+        except FileNotFoundError:  # removed from outside, as by systemd-logind when its user leaves
             resource_tracker.unregister(f"/{self.name}", "shared_memory")
 
 
@@ -311,7 +311,7 @@ def held_ring(name: str) -> str:
 
 def _opened(name: str) -> int:
     """Descriptor of a ring's segment, to read."""
-    # somebody else's may be a pipe, which waits for a writer, or a link to a device
+    # a file of another user may be a pipe, which waits for a writer, or a link to a device
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
     flags |= 0 if name.startswith(_HELD) else os.O_NOFOLLOW
     try:
@@ -325,7 +325,7 @@ def _opened(name: str) -> int:
 
 
 def ring_names() -> list[str]:
-    """Names of the rings on this machine, in order; what of them can be read is not known."""
+    """Names of the files on this machine that may be rings, in order."""
     return sorted(path.name for path in _SHM.glob(f"{_PREFIX}*"))
 
 
@@ -359,7 +359,7 @@ def _process_start(pid: int) -> int | None:
 def _remove_if_orphaned(name: str) -> None:
     """Unlink a segment of that name if it is this user's and its writer died without unlinking it.
 
-    What belongs to somebody else, or can be changed by others, is not even read.
+    A file that belongs to another user, or that others may write to, is not even read.
     """
     with suppress(OSError):  # none, no ring, or gone since
         status = os.stat(_SHM / name, follow_symlinks=False)

@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Final
 
 _GROWTH: Final = 1.05
-"""Of a file over the one before: compression differs from file to file."""
+"""Growth of a file over the one before: compression differs from file to file."""
 SUFFIXES: Final = (".rrd", ".frames")
 """Files of one recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """When the next file begins, and what is removed for it.
+    """The length of a file, and how much the folder may hold.
 
     Attributes
     ----------

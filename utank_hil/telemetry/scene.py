@@ -19,14 +19,15 @@ from utank_hil.safety.faults import fault_text
 from utank_hil.telemetry.viewer import TIMELINE
 
 PERIOD_S: Final = 0.2
-"""Between two pictures: a roll of some seconds moves smoothly."""
+"""Time between two pictures: a roll of some seconds moves smoothly."""
 WORDS_PERIOD_S: Final = 2.0
+"""Time between two texts: one can be read, and its figures are means of minutes."""
 NEEDED: Final = (
     "roll_rad", "twin_roll_rad", "port_level_m", "starboard_level_m", "pressure_actual_pa",
 )  # fmt: skip
 
 RESERVOIR, _BEYOND, _KEEL = 0.16, 0.12, 0.14
-"""Of the sketch, in widths of the tank: reservoir, hull beyond it, keel below the duct."""
+"""Widths of reservoir and of hull beyond it, depth of keel below the duct, in tank widths."""
 _ARROW: Final = 0.6
 """Length of the arrow at the pump's greatest pressure, in widths of the tank."""
 LINES: Final = 8
@@ -252,7 +253,7 @@ class Scene(Figure):
         send_at(self._recording, f"{self._path}/{name}", rows[:, self._at["time_s"]], columns)
 
     def _is_news(self, row: FloatArray) -> bool:
-        """Whether words are due, or say another mode or fault than before."""
+        """Whether words are due, or mode or fault have changed."""
         now_s = row[self._at["time_s"]]
         state = (row[self._at["mode"]], row[self._at["fault"]])
         if state == self._said and now_s < self._words_due_s - 1e-9:

@@ -214,7 +214,7 @@ def _lacks(path: Path, name: str, columns: Mapping[str, FloatArray]) -> SignalFi
 
 
 def _line(path: Path, rows: Any, index: int) -> str:
-    """Where a row stands: line of a CSV, counted from 1 with the header, or row of a table."""
+    """Place of a row: line of a CSV, counted from 1 with the header, or row of a table."""
     row = int(rows[index])
     return f"line {row + 2}" if path.suffix.lower() == ".csv" else f"row {row}"
 

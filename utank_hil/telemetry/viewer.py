@@ -15,9 +15,9 @@ from utank_hil.base.closing import Closing
 TIMELINE: Final = "time"
 """Name of the time line of all recordings."""
 _TRIES, _PAUSE_S = 20, 0.5
-"""How long a viewer that starts is asked to move its cursor: ten seconds."""
+"""A viewer that starts is asked to move its cursor every half second, for ten seconds."""
 LOOPBACK: Final = "127.0.0.1"
-"""Where viewers listen; Rerun's own default is every interface."""
+"""Address on which viewers listen; Rerun's own default is every interface."""
 
 
 class Viewer(Closing):
@@ -54,7 +54,7 @@ class Viewer(Closing):
 
     @property
     def failed(self) -> bool:
-        """Whether it ended because it can't be, for example for want of a graphics driver."""
+        """Whether the viewer ended by an error, for example for want of a graphics driver."""
         return (self._process.poll() or 0) > 0
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ def open_viewer(source: Path | str, at_s: float | None = None, *, window: bool =
         if at_s is not None:
             _move_cursor(viewer, port, at_s)
         return viewer
-    held.append(hold_port())  # Rerun 0.41 may hang if somebody else has the page's port
+    held.append(hold_port())  # Rerun 0.41 may hang if the page's port is taken
     page_port = port_of(held[1])
     command += ["--serve-web", "--web-viewer-port", str(page_port), str(source)]
     data = live_url(port) if isinstance(source, Path) else source
@@ -146,7 +146,7 @@ def hold_port() -> socket.socket:
     """Return a socket that holds a free TCP port of the loopback interface until it is closed.
 
     It does not listen. A server that sets SO_REUSEADDR, as Rerun's do, may listen on the port; the
-    kernel chooses it for nobody else.
+    kernel chooses it for no other socket.
     """
     held = socket.socket()
     held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
