@@ -183,8 +183,7 @@ def test_a_missing_ring_and_a_foreign_segment_are_refused() -> None:
         foreign.write_bytes(content)
         with pytest.raises(RingError, match="telemetry ring"):
             RowReader(foreign.name)
-        with pytest.raises(RingError, match="remove it"):
-            RowWriter(["a"], name=foreign.name)
+        RowWriter(["a"]).close()
     foreign.unlink()
 
 
@@ -287,16 +286,11 @@ def test_a_pipe_of_somebody_else_holds_nobody_up() -> None:
     pipe.unlink()
 
 
-def test_the_name_of_a_living_writer_is_not_taken_over() -> None:
-    with RowWriter(["a"]) as writer, pytest.raises(RingError, match="its writer runs"):
-        RowWriter(["a"], name=writer.name)
-
-
 WRITE_FOR_EVER = """
 import sys, numpy as np
 from utank_hil.telemetry.rows import RowWriter
-writer = RowWriter([str(i) for i in range(14)], slots=64, name=sys.argv[1])
-print("ready", flush=True)
+writer = RowWriter([str(i) for i in range(14)], slots=64)
+print(writer.name, flush=True)
 sys.stdin.readline()
 number, steps = 0, np.arange(1.0, 15.0)
 row = np.empty(14)
@@ -308,17 +302,17 @@ while True:
 
 
 @contextlib.contextmanager
-def python(code: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def python(code: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A process that prints the name of its ring first, and that name."""
     process = subprocess.Popen(
-        [sys.executable, "-c", code, *arguments],
+        [sys.executable, "-c", code],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,  # the tracker reports what a killed writer left behind
         text=True,
     )
     try:
-        assert process.stdout.readline() == "ready\n"
-        yield process
+        yield process, process.stdout.readline().strip()
     finally:
         process.kill()
         process.communicate()
@@ -338,10 +332,9 @@ def wait_for(condition: Callable[[], bool], seconds: float = 10.0) -> None:
 
 @pytest.mark.slow
 def test_no_torn_row_from_a_writer_at_full_speed() -> None:
-    name = f"utank-{os.getpid()}-stress"
     seen = 0
     last = -1.0
-    with python(WRITE_FOR_EVER, name) as process, RowReader(name) as reader:
+    with python(WRITE_FOR_EVER) as (process, name), RowReader(name) as reader:
         begin(process)
         deadline = time.monotonic() + 1.5
         while time.monotonic() < deadline and (seen < 200_000 or reader.lost == 0):
@@ -361,8 +354,7 @@ def test_no_torn_row_from_a_writer_at_full_speed() -> None:
 
 
 def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed() -> None:
-    name = f"utank-{os.getpid()}-killed"
-    with python(WRITE_FOR_EVER, name) as process, RowReader(name) as reader:
+    with python(WRITE_FOR_EVER) as (process, name), RowReader(name) as reader:
         begin(process)
         wait_for(lambda: len(reader.read_rows()) > 0)
         assert not reader.ended
@@ -371,28 +363,14 @@ def test_a_killed_writer_is_noticed_even_as_a_zombie_and_its_segment_is_removed(
         wait_for(lambda: not (SHM / name).exists())
 
 
-def test_the_segment_of_a_dead_writer_is_replaced() -> None:
-    name = f"utank-{os.getpid()}-orphan"
-    untracked = "from multiprocessing import resource_tracker\n" + WRITE_FOR_EVER.replace(
-        "print(", "resource_tracker.unregister('/' + writer.name, 'shared_memory'); print("
-    )
-    with python(untracked, name) as process:
-        process.kill()
-        process.wait()
-    # it is there, unless a writer of a test beside this one has removed it
-    with RowWriter(["new"], name=name) as writer, RowReader(writer.name) as reader:
-        assert reader.columns == ("new",)
-
-
 def test_segments_of_dead_writers_are_removed_by_the_next_whoever_it_is() -> None:
-    name = f"utank-{os.getpid()}-killed-with-its-tracker"
     untracked = "from multiprocessing import resource_tracker\n" + WRITE_FOR_EVER.replace(
         "print(", "resource_tracker.unregister('/' + writer.name, 'shared_memory'); print("
     )
     foreign = SHM / f"utank-{os.getpid()}-no-ring"
     foreign.write_bytes(bytes(1000))
     try:
-        with python(untracked, name) as process:
+        with python(untracked) as (process, name):
             with RowWriter(["a"]) as writer:
                 assert (SHM / name).exists()  # its writer lives
             process.kill()
@@ -459,5 +437,4 @@ def test_ring_without_room_is_refused_instead_of_killing_its_writer_later(
 
     monkeypatch.setattr(os, "posix_fallocate", full)
     with pytest.raises(RingError, match=r"no room for .* No space left"):
-        RowWriter(["a"], name="utank-no-room")
-    assert not (SHM / "utank-no-room").exists()
+        RowWriter(["a"])

@@ -26,13 +26,12 @@ class RowWriter(RingWriter):
         self,
         columns: Sequence[str],
         slots: int = 8192,
-        name: str | None = None,
         about: Mapping[str, Any] | None = None,
     ) -> None:
         if not columns or len(set(columns)) != len(columns):
             raise ValueError(f"a ring needs columns with different names, got {tuple(columns)}")
         content = {"columns": tuple(columns), "about": about}
-        super().__init__(RingKind.ROWS, 8 * len(columns), 1, slots, content, name)
+        super().__init__(RingKind.ROWS, 8 * len(columns), 1, slots, content)
 
 
 class RowReader(RingReader):
