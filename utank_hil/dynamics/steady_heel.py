@@ -9,8 +9,8 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics.nonlinear import RollModel
 
-_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))
-_HALVINGS: Final = 12
+_HEELS_RAD: Final = np.radians(np.linspace(0.0, 89.9, 2000))  # a step of 0.05 degrees
+_HALVINGS: Final = 12  # to a four-thousandth of the pressure
 
 
 class SteadyHeel(NamedTuple):

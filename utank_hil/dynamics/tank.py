@@ -22,7 +22,7 @@ from utank_hil.base.parameters import (
     refuse,
 )
 
-GRAVITY_M_S2 = 9.80665
+GRAVITY_M_S2 = 9.80665  # standard gravity (ISO 80000-3)
 
 
 @dataclass(frozen=True, slots=True)

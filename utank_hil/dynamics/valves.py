@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from utank_hil.base.parameters import Positive, Problem, Range, range_problems, refuse
 from utank_hil.dynamics.tank import Tank
 
-AIR_DENSITY_KG_M3 = 1.225
+AIR_DENSITY_KG_M3 = 1.225  # ISO 2533, at sea level
 STOPPING_S = 1e-3
 """A valve that stops the water faster is as good as closed."""
 

@@ -25,7 +25,7 @@ from utank_hil.identification.shrinkage import shrinkage_estimate
 _RANK = 1e-12  # smallest pivot of the Gram matrix, relative to the first
 _EXACT = 1e-10  # relative residual of data without noise
 _CONVERGED = 1e-9  # the next correction is its square, far below rounding
-_CORRECTIONS = 6
+_CORRECTIONS = 6  # at most
 _INFLATION = 100.0  # above, noise in weak directions of the input exceeds shrinkage's bias
 
 

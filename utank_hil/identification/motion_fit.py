@@ -53,14 +53,14 @@ TOP_RAD_S: Final = 2.4
 RESOLUTION: Final = 0.03
 """Width of a spectral band over the given ship's natural frequency."""
 LEAST_TAPERS: Final = 3
-_STARTS = np.log([0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2])
+"""Least averages of a spectral estimate: with fewer the distribution of its logarithm is skewed."""
+_STARTS = np.log([0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2])  # stiffness: roll periods x 0.67 to 1.5
 _NOISE_BAND = (0.4, 0.9)  # of the Nyquist frequency: no motion there, only noise
-_NOISE_LINES = 200
+_NOISE_LINES = 200  # their median is known to a few per cent
 _NOISE_TAPERS = 4
-_MEDIAN = 0.918  # median over mean of chi-square with eight degrees of freedom
+_MEDIAN = 0.918  # median over mean of chi-square with twice `_NOISE_TAPERS` degrees of freedom
 _STEP = np.array([0.02, 0.03, 0.1])  # for the curvature
 _MOST_TRIES = 250  # of ships
-_INFLATION = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ def fit_motion(
     simplex = first + np.vstack([np.zeros(3), np.diag(0.5 * np.minimum(prior, 0.2))])
     options = {"initial_simplex": simplex, "xatol": 2e-3, "fatol": 1e-2, "maxfev": _MOST_TRIES}
     theta = minimize(cost, first, method="Nelder-Mead", options=options).x
-    covariance = _INFLATION**2 * _inverse_curvature(cost, theta, prior)
+    covariance = _inverse_curvature(cost, theta, prior)
     whole = _Record(motion, plant, sample_time_s, max(BAND[1] * natural, TOP_RAD_S))
     return whole.fit(theta, covariance, record.likelihood(theta).log_likelihood)
 

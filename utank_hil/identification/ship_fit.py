@@ -45,8 +45,8 @@ _PRESSURE_SPREAD = 0.005  # gain errors of pressure sensor and pressure loop
 _DELAY_SPREAD_S = 2 * TICK_S  # a frame arrives in one tick or the next
 _PRESSURE = len(_SPREAD)  # index of the pressure gain in theta; the delays follow
 _STARTS = np.log([0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # initial values of the stiffness factor
-_PASSES = 5
-_CONVERGED = 1e-3
+_PASSES = 5  # at most
+_CONVERGED = 1e-3  # of the dispersion: far below what it is known to
 
 
 @dataclass(frozen=True, slots=True, eq=False)

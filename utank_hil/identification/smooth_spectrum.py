@@ -16,11 +16,11 @@ from utank_hil.base.arrays import FloatArray
 
 _SPREAD = 2.0  # standard deviation of the logarithm about its level: a factor of 7
 _LENGTH = 0.3  # Matern's length over the logarithm of frequency: a third of an octave
-_LEVEL_SPREAD = 5.0
+_LEVEL_SPREAD = 5.0  # of the logarithm: practically free
 _START = 0.1  # of the mean density: the level about which the logarithm is spread
-_STEPS = 60
-_CONVERGED = 1e-4
-_TINY = 1e-9
+_STEPS = 60  # of Newton's method, at most
+_CONVERGED = 1e-4  # of the logarithm
+_TINY = 1e-9  # keeps the prior and the weights positive definite
 
 
 class LogSpectrum(NamedTuple):

@@ -10,7 +10,7 @@ from utank_hil.identification.era import era
 from utank_hil.identification.modal import ModalParameters, modal_assurance, modal_parameters
 
 _FREQUENCY = 0.01  # relative changes from one order to the next that count as stable
-_DAMPING = 0.05
+_DAMPING = 0.05  # these three as usual for stabilization diagrams (Peeters and De Roeck 1999)
 _SHAPE = 0.98  # modal assurance
 
 

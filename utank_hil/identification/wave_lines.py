@@ -20,7 +20,7 @@ from utank_hil.identification.disturbance import DisturbanceBasis
 from utank_hil.identification.lag_regression import LagRegression
 from utank_hil.identification.record import channel_scale, stacked_record
 
-_ORDER = 12
+_ORDER = 12  # three times the states of ship and tank: their memory, but not a wave's
 _RIDGE = 1e-4  # squared relative noise of 1 %
 _STEPS_A_CYCLE = 4  # trial frequencies per DFT bin (one cycle over the record)
 _EVIDENCE = 30.0  # least F statistic of a line; noise reaches 6, an irregular sea 20

@@ -21,6 +21,7 @@ from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode, refuse_shap
 
 _MOST_REASONS: Final = 20
 _MOST_CHARACTERS: Final = 500
+"""A refusal is for a person to read: a screen of sentences, whatever an exception says."""
 _MOST_OUTPUTS: Final = len(STATES)
 
 LONGEST_BYTES: Final = OVERHEAD_BYTES + max(

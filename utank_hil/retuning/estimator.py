@@ -25,7 +25,9 @@ from utank_hil.retuning.retuner import Retuner
 COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
 """Of the motion's record."""
 SAMPLE_TIME_S: Final = 0.2
+"""Sample time of the record: its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
 LONGEST_RECORD_S: Final = 3600.0
+"""Time for which a sea may be taken as stationary."""
 OUTDATED: Final = 3.0
 """Intervals without another estimate after which the last one is outdated: two may fail."""
 SHIP_OUTDATED_S: Final = 3600.0

@@ -22,6 +22,7 @@ from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
 FADE_SAMPLES: Final = 15
+"""Samples of a fade: 3 s at 0.2 s, a quarter of the first ship's roll period."""
 _NOTHING: Final = np.zeros(1)
 
 

@@ -11,7 +11,7 @@ from ctypes import c_char
 from typing import Final
 from zlib import crc32
 
-_HEADER_WORDS: Final = 4
+_HEADER_WORDS: Final = 4  # number, length, check sum, heartbeat
 
 
 class Mailbox:

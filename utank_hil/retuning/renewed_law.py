@@ -20,13 +20,14 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 
-# a law of these sizes is condensed in a few milliseconds; a shipped one has 36 states, 19 knots and
-# 60 samples
 MOST_STATES: Final = 48
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
+"""Greatest sizes of a law: it is condensed in a few milliseconds. A shipped one has 36 states, 19
+knots and 60 samples.
+"""
 _MOST_OUTPUTS: Final = len(STATES)
-_MOST_ITERATIONS: Final = 200
+_MOST_ITERATIONS: Final = 200  # three times the budget of the shipped laws
 
 MOST_NUMBERS: Final = (
     3 * MOST_STATES**2 + MOST_STATES * (3 + 2 * _MOST_OUTPUTS) + 2 * _MOST_OUTPUTS + MOST_KNOTS

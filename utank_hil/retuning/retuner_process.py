@@ -23,9 +23,9 @@ from utank_hil.retuning.desk import Desk
 from utank_hil.retuning.retuner import Work
 from utank_hil.retuning.worker import run_watchdog
 
-_START_S: Final = 30.0
-_HANGS_S: Final = 600.0
-_END_S: Final = 2.0
+_START_S: Final = 30.0  # scipy has to be imported, on a busy machine
+_HANGS_S: Final = 600.0  # the longest `answer_within_s`: no answer is awaited after it
+_END_S: Final = 2.0  # of waiting for a killed process
 
 
 class RetunerProcess(Closing):

@@ -12,6 +12,7 @@ EARLIEST_VERDICT_S: Final = 30.0
 
 _SWEPT: Final = ("multisine", "chirp")
 _BAND_RAD_S: Final = (0.2, 1.2)
+"""Band of ship and tank: roll periods of 5 to 31 s."""
 
 
 @dataclass(frozen=True, slots=True)

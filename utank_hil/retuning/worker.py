@@ -15,9 +15,9 @@ from typing import Final
 from utank_hil.base.background import give_way
 from utank_hil.retuning.desk import Desk
 
-_POLL_S: Final = 0.1
-_RESTART_DELAY_S: Final = 1.0  # after a worker has ended
-_NICENESS: Final = 10
+_POLL_S: Final = 0.1  # an answer takes seconds
+_RESTART_DELAY_S: Final = 1.0  # a worker that dies at once does not take the processor
+_NICENESS: Final = 10  # a tenth of the processor beside a busy process of normal priority
 _SECOND_NS: Final = 1_000_000_000
 
 
