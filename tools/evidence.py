@@ -47,7 +47,6 @@ PARTS: Final = {
     "share_of_possible": Part("python -m tools.studies.share_of_possible --seeds 8 --json", 6),
     "many_seas": Part("python -m tools.studies.many_seas --seconds 900 --seeds 3 --json", 15),
     "renewed_seas": Part("python -m tools.studies.renewed_seas --seeds 3 --json", 30),
-    "renewed_voyage": Part("python -m tools.studies.renewed_voyage --json", 8),
     "sea_estimates": Part("python -m tools.studies.sea_estimates --hours 3 --json", 30),
     "starter_ships": Part("python -m tools.studies.starter_ships --json", 3),
     "february_hours": Part(_study("february_hours"), 80),
@@ -67,8 +66,7 @@ PARTS: Final = {
     "coverage": Part("make coverage", 5),
     "tests": Part("pytest -n auto -rA -m 'evidence and not socketcan'", 10),
     "tests_on_vcan": Part(
-        "tools/vcan pytest -m evidence tests/socketcan --ignore=tests/socketcan/test_service.py",
-        60,
+        "tools/vcan pytest -m evidence tests/socketcan --ignore=tests/socketcan/test_service.py", 60
     ),
     "service": Part("tools/vcan --uml pytest -rA -m evidence tests/socketcan/test_service.py", 4),
     # what it costs

@@ -9,11 +9,11 @@ from utank_hil.nodes.inbox import Inbox
 
 
 @pytest.mark.slow
-def test_a_hundred_thousand_frames_of_noise_break_no_claim_in_any_mode() -> None:
-    counts = frames.fuzz(100_000, seed=1)
-    assert counts["whole"] + counts["not whole"] == 100_000
-    assert min(counts[f"in {mode.name}"] for mode in Mode) > 1000
-    assert counts["not whole"] > 50_000
+def test_noise_breaks_no_claim_in_any_mode() -> None:
+    counts = frames.fuzz(30_000, seed=1)
+    assert counts["whole"] + counts["not whole"] == 30_000
+    assert min(counts[f"in {mode.name}"] for mode in Mode) > 100
+    assert counts["not whole"] > 15_000
 
 
 def test_a_frame_that_is_not_whole_and_is_believed_is_found(

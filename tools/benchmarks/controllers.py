@@ -180,10 +180,7 @@ def memory(controller: Controller, seen: list[FloatArray]) -> dict[str, float]:
         peaks.append(tracemalloc.get_traced_memory()[1] - before)
     left = tracemalloc.get_traced_memory()[0] - begin - sys.getsizeof(peaks)
     tracemalloc.stop()
-    return {
-        "held_bytes": float(np.mean(peaks)),
-        "kept_bytes": max(left, 0) / len(seen),
-    }
+    return {"held_bytes": float(np.mean(peaks)), "kept_bytes": max(left, 0) / len(seen)}
 
 
 def measure(steps: int) -> dict[str, dict[str, float]]:

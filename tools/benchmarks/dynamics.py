@@ -248,10 +248,7 @@ def scaling(ships: list[int], components: int) -> list[dict[str, Any]]:
         initial = np.zeros((count, 4))
         simulate_batch(MODEL, STEP_S, initial, wave=wave)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        taken = seconds(
-            partial(simulate_batch, MODEL, duration_s, initial, wave=wave),
-            2,
-        )
+        taken = seconds(partial(simulate_batch, MODEL, duration_s, initial, wave=wave), 2)
         rows.append(
             {
                 "ships": count,

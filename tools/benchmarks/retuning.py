@@ -33,12 +33,7 @@ from utank_hil.dynamics import coupled_model
 from utank_hil.dynamics.sampling import sample
 from utank_hil.nodes.panel import Action, TimedAction
 from utank_hil.nodes.signals import SIGNALS
-from utank_hil.retuning import (
-    AdaptiveController,
-    RetunerProcess,
-    ShipFigures,
-    make_pulses,
-)
+from utank_hil.retuning import AdaptiveController, RetunerProcess, ShipFigures, make_pulses
 from utank_hil.runners import (
     Lockstep,
     LoopStatistics,

@@ -197,11 +197,7 @@ def record(case: Case, folder: Path, home: Path | None = None) -> Path:
             wanted=True,
         )  # fmt: skip
         controller = build_controller_node(
-            config,
-            law,
-            commissioned=True,
-            retuner=desks.retuner,
-            estimating=desks.estimating,
+            config, law, commissioned=True, retuner=desks.retuner, estimating=desks.estimating
         )
         node = NodeTap(controller, sink.write, desks.taps)
         ship, joining = ship_nodes(case, 0)

@@ -187,14 +187,7 @@ def main() -> int:
     spawn = get_context("spawn")
     with one_thread_each(), ProcessPoolExecutor(options.workers, mp_context=spawn) as pool:
         rows = list(pool.map(rated, cases))
-    show(
-        {
-            "aim_per_hour": AIM_PER_HOUR,
-            "by_monitor": by_monitor(rows),
-            "runs": rows,
-        },
-        options,
-    )
+    show({"aim_per_hour": AIM_PER_HOUR, "by_monitor": by_monitor(rows), "runs": rows}, options)
     return 0
 
 

@@ -20,15 +20,15 @@ from pydantic import ConfigDict
 
 from firmware_sim.bench import jobs_of
 from firmware_sim.lockstep_run import run_lockstep
-from firmware_sim.run import Job, Run
+from firmware_sim.run import RECORD_S, Job, Run
 from firmware_sim.scenario import PASSIVE, Scenario
 from firmware_sim.scenario_sea import IrregularSea
 from tools.printing import command_line, show
 from tools.studies.clairvoyant import clairvoyant_bound
 from tools.studies.many_seas import SIXTEEN, seas
-from tools.studies.renewed_voyage import motion_between
 from tools.studies.trial_setup import CONFIGS, chosen, shipped
 from utank_hil.analysis.motion.confidence import mean_interval
+from utank_hil.base.arrays import FloatArray
 from utank_hil.base.one_thread import one_thread_each
 from utank_hil.canbus.enumerations import Mode, RetuningState
 from utank_hil.configuration import load_config
@@ -38,6 +38,8 @@ LAWS: Final = {"GPC, roll": "gpc", "constrained": "constrained_gpc", "renewed": 
 """Of configs/controllers."""
 FROM_S: Final = 1200.0
 TO_S: Final = 2400.0
+STEP_S: Final = 0.2
+"""Of the motion that the bound is computed for."""
 
 
 class GivenSea(IrregularSea):
@@ -84,6 +86,17 @@ def judged(case: tuple[str, Spectrum, int]) -> tuple[str, dict[str, Any]]:
             for law in LAWS
         },
     }
+
+
+def motion_between(run: Run, begin_s: float, end_s: float) -> FloatArray:
+    """Roll, rate, level and rate of a run, every `STEP_S`."""
+    inside = run.between(begin_s, end_s)
+    every = round(STEP_S / RECORD_S)
+    columns = []
+    for name in ("true_roll_rad", "true_level_m"):
+        values = run.column(name)[inside]
+        columns += [values[::every], np.gradient(values, RECORD_S)[::every]]
+    return np.column_stack(columns)
 
 
 def _window(run: Run, column: str) -> Any:

@@ -102,13 +102,7 @@ def figure_capsize() -> Figure:
                 float(bare[0]),
                 "the phase of the wave is not given",
             ),
-            Row(
-                "the same over all phases, least",
-                "N m",
-                WEAK_NM,
-                float(np.min(bare)),
-                "as above",
-            ),
+            Row("the same over all phases, least", "N m", WEAK_NM, float(np.min(bare)), "as above"),
             Row(
                 f"the same at the phase that fits best, {least_deg:g}°",
                 "N m",

@@ -78,13 +78,7 @@ def _rows(name: str, law: PredictiveLaw, half_m: float) -> list[Row]:
         **{(GPC_BOTH, "roll", k): "printed with e8: a misprint of the exponent" for k in (1, 2)},
     }
     return [
-        Row(
-            f"{name}: {what}(k-{k})",
-            unit,
-            theirs,
-            float(mine),
-            slips.get((name, what, k), reason),
-        )
+        Row(f"{name}: {what}(k-{k})", unit, theirs, float(mine), slips.get((name, what, k), reason))
         for what, unit, given, made in parts
         for k, (theirs, mine) in enumerate(zip(given, made, strict=True), 1)
     ]

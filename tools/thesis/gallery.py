@@ -17,12 +17,7 @@ _ABOUT: Final = (
     "Every figure and printed number of chapters 2 to 4 of Passive and active nonlinear control of "
     "ship roll motions using U-tube tanks (2006), made anew."
 )
-_SIGNS: Final = {
-    Verdict.HOLDS: "✓",
-    Verdict.PARTLY: "◐",
-    Verdict.FAILS: "✗",
-    Verdict.OPEN: "?",
-}
+_SIGNS: Final = {Verdict.HOLDS: "✓", Verdict.PARTLY: "◐", Verdict.FAILS: "✗", Verdict.OPEN: "?"}
 
 
 def write_gallery(

@@ -6,13 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from tools.thesis.capsize.contest import (
-    LAWS,
-    PATTI_B,
-    PRINTED_NM,
-    WAVE_RAD_S,
-    law_factory,
-)
+from tools.thesis.capsize.contest import LAWS, PATTI_B, PRINTED_NM, WAVE_RAD_S, law_factory
 from tools.thesis.capsize.survival import Survival, controlled_run
 from tools.thesis.capsize.threshold import without_tank
 from utank_hil.base.arrays import FloatArray

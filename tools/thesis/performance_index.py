@@ -23,11 +23,7 @@ FREQUENCY_RATIOS: Final = np.linspace(0.01, 2.0, 2000)
 """The source does not say how far it went."""
 
 
-def performance_index(
-    law: LinearLaw,
-    plant: DesignPlant,
-    measured: tuple[str, ...],
-) -> float:
+def performance_index(law: LinearLaw, plant: DesignPlant, measured: tuple[str, ...]) -> float:
     """Index J in rad/Pa; the more the better.
 
     Parameters

@@ -18,13 +18,7 @@ from tools.thesis.figure import Figure
 from tools.thesis.friction_families import figure_2_3, figure_2_4, figure_2_5, figure_2_6
 from tools.thesis.fuzzy_parameters import figure_4_12, figure_4_13, figure_4_16
 from tools.thesis.gains import figure_first_ship, figure_gains
-from tools.thesis.law_figures import (
-    figure_3_6,
-    figure_3_7,
-    figure_3_8,
-    figure_3_9,
-    figure_3_10,
-)
+from tools.thesis.law_figures import figure_3_6, figure_3_7, figure_3_8, figure_3_9, figure_3_10
 from tools.thesis.magnification import figure_magnification
 from tools.thesis.membership import figure_4_5
 from tools.thesis.optimum import figure_3_2, figure_3_3, figure_3_4

@@ -26,9 +26,7 @@ class ResponseAmplitude(NamedTuple):
 
 
 def simulated_response(
-    model: RollModel,
-    frequency_rad_s: FloatArray,
-    amplitude_nm: float,
+    model: RollModel, frequency_rad_s: FloatArray, amplitude_nm: float
 ) -> ResponseAmplitude:
     """Simulate each frequency to the steady state, and take the first harmonic.
 

@@ -9,11 +9,7 @@ import numpy as np
 from tools.thesis.capsize.threshold import without_tank
 from tools.thesis.figure import Check, Curve, Figure, Panel, Row, Verdict
 from tools.thesis.ships import ROLL_RAD_S, first_ship
-from tools.thesis.stimulation import (
-    StimulatedRoll,
-    stimulate_on_still_water,
-    tuned_tank,
-)
+from tools.thesis.stimulation import StimulatedRoll, stimulate_on_still_water, tuned_tank
 from utank_hil.analysis.motion.decay import roll_decay
 from utank_hil.base.arrays import FloatArray
 from utank_hil.control.optimal_tank import ship_ratios
@@ -159,11 +155,7 @@ def figure_2_8() -> Figure:
                 f"damping ratio {own:.3f} without the tank; a tenfold fall in "
                 f"{found.cycles_to_tenth:.1f} cycles is one of {with_tank:.3f}",
             ),
-            Check(
-                "field experiments are similar",
-                Verdict.OPEN,
-                "no measured curve is printed",
-            ),
+            Check("field experiments are similar", Verdict.OPEN, "no measured curve is printed"),
         ),
         columns=1,
     )

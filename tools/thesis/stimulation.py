@@ -50,11 +50,7 @@ def tuned_tank(ship: RollShip, tank: Tank) -> Tank:
 
 
 def stimulate_on_still_water(
-    model: RollModel,
-    pressure_pa: float,
-    frequency_rad_s: float,
-    *,
-    off_s: float = 141.0,
+    model: RollModel, pressure_pa: float, frequency_rad_s: float, *, off_s: float = 141.0
 ) -> StimulatedRoll:
     """Drive the roll with a sinusoidal pressure from rest, stop the pump, and let the roll decay.
 

@@ -1,23 +1,20 @@
-"""Capsizing of the nonlinear coupled model: equilibria, threshold, safe basin, probability.
+"""Capsizing of the nonlinear coupled model: equilibria, threshold, safe basin.
 
 All functions use `simulate_batch`, which runs on all cores. A ship counts as capsized when its roll
 passes a given angle beyond the saddle.
 """
 
 import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from tools.thesis.capsize.sea_stack import stacked_seas
 from utank_hil.base.arrays import FloatArray
 from utank_hil.dynamics import RollModel, WaveMoment, simulate_batch
 from utank_hil.dynamics.simulate import WaveComponents
 from utank_hil.dynamics.tank import negligible
 
-CONFIDENCE = 0.95  # of the interval of a probability
 LIMIT_RAD = math.radians(89)  # of the search for equilibria
 BLOCK = 256  # amplitudes tried at once in the search for a threshold
 
@@ -47,16 +44,6 @@ class Threshold(NamedTuple):
 
     safe_nm: float
     capsizing_nm: float
-
-
-class Probability(NamedTuple):
-    """Estimated probability of capsizing, with an exact (Clopper-Pearson) confidence interval."""
-
-    estimate: float
-    low: float
-    high: float
-    capsized: int
-    ships: int
 
 
 def without_tank(model: RollModel) -> RollModel:
@@ -168,77 +155,6 @@ def safe_basin(
     level = np.clip(np.tan(roll) * model.tank.width_m / 2, -limit, limit)
     initial = np.stack([roll, rate, level, np.zeros_like(roll)], axis=-1).reshape(-1, 4)
     result = simulate_batch(
-        model,
-        duration_s,
-        initial,
-        wave=WaveMoment([], [], []) if wave is None else wave,
+        model, duration_s, initial, wave=WaveMoment([], [], []) if wave is None else wave
     )
     return np.asarray(np.isinf(result.capsized_s).reshape(roll.shape))
-
-
-def erosion(
-    model: RollModel,
-    amplitude_nm: FloatArray,
-    frequency_rad_s: float,
-    roll_rad: FloatArray,
-    roll_rate_rad_s: FloatArray,
-    duration_s: float,
-) -> FloatArray:
-    """Area of the safe basin in regular waves, relative to that in calm water.
-
-    Parameters
-    ----------
-    amplitude_nm : ndarray, shape (n,)
-    roll_rad, roll_rate_rad_s : ndarray
-        Grid of starts, as for `safe_basin`.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-
-    Raises
-    ------
-    ValueError
-        If no start survives even in calm water.
-    """
-    grid = (roll_rad, roll_rate_rad_s, duration_s)
-    calm = int(np.count_nonzero(safe_basin(model, *grid)))
-    if not calm:
-        raise ValueError("no start of the grid survives in calm water: narrow it")
-    area = np.empty(len(amplitude_nm))
-    for n, amplitude in enumerate(amplitude_nm):
-        wave = WaveMoment([amplitude], [frequency_rad_s], [0.0])
-        basin = safe_basin(model, *grid, wave=wave)
-        area[n] = np.count_nonzero(basin) / calm
-    return area
-
-
-def capsize_probability(
-    model: RollModel,
-    seas: WaveMoment | Iterable[WaveComponents],
-    duration_s: float,
-) -> Probability:
-    """Probability of capsizing within a time, by Monte Carlo over irregular seas.
-
-    Parameters
-    ----------
-    seas : WaveMoment or iterable of utank_hil.sea.Harmonics
-        Arrays of shape (n, m), n random seas of m components; or n moments of one sea each, such
-        as ``Sea.irregular(spectrum, seed).roll_moment(stiffness)`` for some seeds.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As `stacked_seas`.
-    """
-    from scipy.stats import beta
-
-    stack = seas if isinstance(seas, WaveMoment) else stacked_seas(seas)
-    result = simulate_batch(model, duration_s, wave=stack)
-    ships = len(result.capsized_s)
-    capsized = int(np.count_nonzero(np.isfinite(result.capsized_s)))
-    tail = (1 - CONFIDENCE) / 2
-    low = float(beta.ppf(tail, capsized, ships - capsized + 1)) if capsized else 0.0
-    safe = ships - capsized
-    high = float(beta.ppf(1 - tail, capsized + 1, safe)) if safe else 1.0
-    return Probability(capsized / ships, low, high, capsized, ships)

@@ -4,24 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tools.thesis.capsize.sea_stack import stacked_seas
 from tools.thesis.capsize.threshold import (
-    capsize_probability,
     capsize_threshold,
     equilibria,
-    erosion,
     safe_basin,
     without_tank,
 )
-from utank_hil.dynamics import (
-    RollModel,
-    RollShip,
-    Tank,
-    WaveMoment,
-    simulate,
-    simulate_reference,
-)
-from utank_hil.sea import Sea, jonswap
+from utank_hil.dynamics import RollModel, RollShip, Tank, WaveMoment, simulate, simulate_reference
 
 # Table 4.1
 PATTI = RollShip(1.468e6, 2.366e6 * 0.2138, 3.206e3, 9.882e4, restoring_odd_nm=(-2.366e6 * 0.6713,))
@@ -69,13 +58,6 @@ def test_the_calm_basin_is_bounded_by_the_heteroclinic_cycle():
     clear = np.abs(margin) > 1e-3
     np.testing.assert_array_equal(safe[clear], (margin < 0)[clear])
     assert 0.2 < safe.mean() < 0.9
-
-
-def test_waves_erode_the_basin():
-    roll, rate = np.linspace(-0.55, 0.55, 15), np.linspace(-0.35, 0.35, 15)
-    area = erosion(without_tank(MODEL), np.array([0.0, 4e4, 9e4]), 0.6, roll, rate, 60.0)
-    assert area[0] == 1
-    assert area[0] > area[1] > area[2]
 
 
 def test_threshold_separates_survival_from_capsize():
@@ -146,58 +128,3 @@ def test_the_tank_raises_the_threshold_by_half():
 def test_nothing_capsizes_below_the_highest_amplitude_tried():
     found = capsize_threshold(MODEL, 0.6, 1e3, duration_s=60.0, cells=50)
     assert found == (1e3, math.inf)
-
-
-def test_probability_has_the_exact_binomial_interval():
-    """Clopper-Pearson: 2.5 % of binomials at the upper end have as few, at the lower as many."""
-    from scipy.stats import binom
-
-    bare = without_tank(MODEL)
-    spectrum = jonswap(4.5, 10.5)
-    moments = [
-        Sea.irregular(spectrum, seed, components=48).roll_moment(PATTI.stiffness_nm_rad)
-        for seed in range(60)
-    ]
-    found = capsize_probability(bare, moments, 300.0)
-    assert found.ships == 60
-    assert 0 < found.capsized < 60
-    assert found.low < found.estimate == found.capsized / 60 < found.high
-    assert binom.cdf(found.capsized, 60, found.high) == pytest.approx(0.025)
-    assert binom.sf(found.capsized - 1, 60, found.low) == pytest.approx(0.025)
-    # the same ships one at a time
-    alone = [simulate(bare, 300.0, wave=moment).capsized_s for moment in moments[:6]]
-    six = capsize_probability(bare, stacked_seas(moments[:6]), 300.0)
-    assert six.capsized == np.isfinite(alone).sum()
-
-
-def test_nobody_capsizes_in_a_calm_and_the_interval_says_how_sure_that_is():
-    calm = [Sea.regular(0.0, 0.6).roll_moment(PATTI.stiffness_nm_rad)] * 60
-    found = capsize_probability(MODEL, calm, 20.0)
-    assert (found.estimate, found.low) == (0, 0)
-    assert found.high == pytest.approx(1 - 0.025 ** (1 / 60))
-
-
-@pytest.mark.slow
-def test_more_ships_capsize_in_a_higher_sea_and_fewer_with_the_tank():
-    def share(model, hs_m):
-        return capsize_probability(
-            model,
-            [
-                Sea.irregular(jonswap(hs_m, 10.5), seed, components=48).roll_moment(
-                    PATTI.stiffness_nm_rad
-                )
-                for seed in range(40)
-            ],
-            300.0,
-        ).estimate
-
-    bare = without_tank(MODEL)
-    assert share(bare, 2.0) == 0
-    assert 0 < share(bare, 4.5) < share(bare, 8.0)
-    assert share(MODEL, 4.5) < share(bare, 4.5)
-
-
-def test_a_single_sea_is_no_list_of_seas():
-    moment = Sea.irregular(jonswap(4.0, 10.0), 1).roll_moment(PATTI.stiffness_nm_rad)
-    with pytest.raises(TypeError, match="got one Harmonics: put it in a list"):
-        capsize_probability(MODEL, moment, 20.0)
