@@ -95,6 +95,9 @@ def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
         ],
     )
 
+    # the generated page of keys reads the meanings there
+    written.__doc__, written.__module__ = design.__doc__, design.__module__
+
     def read(content: Any, checked: Callable[[Any], Any]) -> Any:
         if isinstance(content, design):
             return content
