@@ -101,6 +101,7 @@ def test_every_row_reaches_the_file_and_the_footer_is_written(tmp_path: Path) ->
     assert recorder.stop() is report
     np.testing.assert_allclose(recorded(file), rows, rtol=4e-16)
     RrdReader(file).store()  # needs the footer
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_recorder_ends_by_itself_when_the_ring_is_closed(tmp_path: Path) -> None:
@@ -286,7 +287,9 @@ def test_events_are_recorded_with_their_time_and_reasons(tmp_path: Path) -> None
     ]
 
 
-def test_reasons_survive_a_controller_that_is_killed(tmp_path: Path) -> None:
+def test_a_recorder_ends_with_a_killed_controller_and_keeps_its_last_words(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "run.rrd"
     code = f"""
 import os, signal, sys
@@ -314,7 +317,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     recorder = RecorderProcess(RecordingTask(ring, str(file), events=events))
     writer.communicate("\n")
     wait_for(lambda: recorder._process.poll() == 0)
-    recorder.stop()
+    assert recorder.stop() == RecorderReport(rows=1, lost=0, parts=1)
     assert "retuning REFUSED: why it was" in [line.text for line in text_log(file)]
 
 
@@ -337,32 +340,6 @@ def test_run_by_hand_it_ends_on_a_signal_with_all_rows(
     assert process.returncode == 0
     assert json.loads(output) == {"rows": 7, "lost": 0, "parts": 1, "records_lost": 0}
     assert len(recorded(file)) == 7
-
-
-def test_recorder_ends_when_the_writer_is_killed(tmp_path: Path) -> None:
-    file = tmp_path / "run.rrd"
-    code = f"""
-import sys, numpy as np
-from utank_hil.telemetry.rows import RowWriter
-from utank_hil.telemetry.rotation import Rotation
-ring = RowWriter({SIGNALS!r})
-ring.write(np.zeros({len(SIGNALS)}))
-print(ring.name, flush=True)
-sys.stdin.read()
-"""
-    writer = subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    recorder = RecorderProcess(RecordingTask(writer.stdout.readline().strip(), str(file)))
-    writer.kill()
-    wait_for(lambda: recorder._process.poll() == 0)
-    writer.communicate()
-    assert recorder.stop() == RecorderReport(rows=1, lost=0, parts=1)
-    assert len(recorded(file)) == 1
 
 
 def test_recorder_whose_starter_is_gone_ends_without_a_complaint(

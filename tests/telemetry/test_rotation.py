@@ -118,15 +118,6 @@ def test_a_stop_between_two_files_loses_no_row_of_a_ring_that_is_gone(tmp_path: 
     assert len(times(tmp_path / "run-a-part002.rrd")) == 7
 
 
-@pytest.mark.slow
-def test_without_rotation_there_is_one_file(tmp_path: Path) -> None:
-    with RowWriter(SIGNALS) as ring:
-        recorder = RecorderProcess(RecordingTask(ring.name, str(tmp_path / "run-a.rrd")))
-        ring.write(rows(0, 350))
-    assert recorder.stop() == RecorderReport(350, 0, 1)
-    assert [path.name for path in tmp_path.iterdir()] == ["run-a.rrd"]
-
-
 @given(
     sizes=st.lists(st.integers(980, 1020), min_size=8, max_size=8),
     keep_bytes=st.integers(2200, 5000),

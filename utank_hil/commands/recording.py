@@ -1,7 +1,7 @@
 """The recording of a run: if it fails, the controller runs on, and the failure is printed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -96,17 +96,11 @@ class RunRecording:
         self._recorder: RecorderProcess | None = None
         try:
             self._ring = RowWriter(SIGNALS, RING_SLOTS, about=about)
-        except OSError as error:
-            self.summary.error = str(error)
-            return
-        if folder is None:
-            return
-        reason = why_not_writable(folder)
-        if reason is not None:
-            self.summary.error = reason
-            return
-        stamp = None if log is None else log.stem.partition("-")[2]
-        try:
+            if folder is None:
+                return
+            if (reason := why_not_writable(folder)) is not None:
+                raise OSError(reason)
+            stamp = None if log is None else log.stem.partition("-")[2]
             files = claimed_files(folder, NAME, *([] if head is None else [FRAMES]), stamp=stamp)
         except OSError as error:
             self.summary.error = str(error)
@@ -174,13 +168,9 @@ class RunRecording:
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
             try:
-                report = recorder.stop()
+                self.summary = replace(self.summary, **asdict(recorder.stop()))
             except RecorderError as error:
                 self.summary.error = str(error)
-            else:
-                self.summary.rows, self.summary.lost = report.rows, report.lost
-                self.summary.records_lost = report.records_lost
-                self.summary.parts = report.parts
 
     def _close_records(self) -> None:
         records, self._records = self._records, None
