@@ -277,7 +277,7 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
                 refused_commands=run.refused_commands,
                 fallbacks=run.fallbacks,
                 law_error=run.law_error,
-                loop=None if run.loop is None else run.loop.statistics.summary(),
+                loop=None if run.loop is None else run.loop.summary(),
                 retuning=retuning,
                 **judged,
             )

@@ -12,7 +12,6 @@ from firmware_sim.run import (
     COLUMNS,
     SECOND_NS,
     Job,
-    LoopResult,
     Run,
     ShipFigures,
     Watch,
@@ -67,7 +66,7 @@ class ControllerRun:
 
     rows: FloatArray
     start_ns: int
-    loop: LoopResult
+    loop: LoopStatistics
     retuning: tuple[RetuningEvent, ...]
     fallbacks: int | None = None
     law_error: str = ""
@@ -120,7 +119,9 @@ def _ship_run(ship: ShipSide, truth: TruthRecorder, log: MemoryLog) -> ShipRun:
     return ShipRun(log.rows, truth.start_ns, ship_figures(ship, truth))
 
 
-def _controller_run(controller: ControllerNode, log: MemoryLog, loop: LoopResult) -> ControllerRun:
+def _controller_run(
+    controller: ControllerNode, log: MemoryLog, loop: LoopStatistics
+) -> ControllerRun:
     return ControllerRun(
         log.rows,
         controller.start_ns,
@@ -165,7 +166,7 @@ def _run_loop(
     statistics: LoopStatistics,
     watch: Watch | None,
     begin_ns: Callable[[], int] | None = None,
-) -> LoopResult:
+) -> LoopStatistics:
     port = None if channel is None else SocketCanPort(channel, heard_by(nodes))
     loop = RealTimeLoop(nodes, port, statistics=statistics)
 
@@ -174,11 +175,11 @@ def _run_loop(
         return watch is not None and watch.stopped(done_s)
 
     try:
-        with real_time_scheduling() as scheduling:
+        with real_time_scheduling():
             if begin_ns is not None:  # asked last: from here on nothing is left to load or build
                 MonotonicClock().sleep_until(begin_ns())
             loop.run(stop, job.ticks * TICK_NS)
     finally:
         if port is not None:
             port.close()
-    return LoopResult(statistics, scheduling)
+    return statistics

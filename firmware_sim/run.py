@@ -26,7 +26,7 @@ from utank_hil.nodes.controller import ControllerNode
 from utank_hil.nodes.panel import TimedAction
 from utank_hil.nodes.signals import ROW_TICKS, SIGNALS
 from utank_hil.retuning import RetuningEvent
-from utank_hil.runners import LoopStatistics, SchedulingReport
+from utank_hil.runners import LoopStatistics
 from utank_hil.telemetry.frame_log import BlockSink, FrameLogWriter
 from utank_hil.telemetry.memory_log import MemoryLog
 from utank_hil.telemetry.node_tap import NodeTap, Tapped
@@ -75,14 +75,6 @@ class Job:
         return round(self.duration_s * SECOND_NS / TICK_NS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LoopResult:
-    """How one real-time loop kept its time."""
-
-    statistics: LoopStatistics
-    scheduling: SchedulingReport
-
-
 class ShipFigures(NamedTuple):
     """Fields of `Run`, in its order."""
 
@@ -118,8 +110,8 @@ class Run:
         Greatest angular impulse of a strike on the ship.
     pump_speed_rad_s : float
         Greatest speed of the pump's rotor.
-    loop : LoopResult or None
-        Of the loop with the controller; None in simulated time.
+    loop : LoopStatistics or None
+        How the loop with the controller kept its time; None in simulated time.
     retuning : tuple of RetuningEvent
         What the controller did to retune itself.
     law_error : str
@@ -135,7 +127,7 @@ class Run:
     capsized_s: float = math.inf
     max_strike_impulse_nms: float = 0.0
     pump_speed_rad_s: float = 0.0
-    loop: LoopResult | None = None
+    loop: LoopStatistics | None = None
     retuning: tuple[RetuningEvent, ...] = ()
     fallbacks: int | None = None
     law_error: str = ""

@@ -135,7 +135,7 @@ def bench(
             console.say(red=ending)
         for limit in found.limits_passed:
             console.say(yellow=limit)
-        loops = {run.name: run.loop.statistics for run in result.runs if run.loop is not None}
+        loops = {run.name: run.loop for run in result.runs if run.loop is not None}
         if loops:
             console.table(timing_table(loops))
         else:

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -35,17 +35,22 @@ from utank_hil.configuration.shipped import CONFIGS
 STORM: Final = CONFIGS / "scenarios" / "storm.yaml"
 CONTROLLER: Final = CONFIGS / "controllers" / "gpc.yaml"
 START_S: Final = 180.0
-"""In an emulated kernel imports take long."""
+"""Longest time to being in charge: in an emulated kernel imports take long."""
 STARTS: Final = 3
-"""A machine that holds processes up may end the run before there is a fault to be tried: that, and
-nothing else, has it started anew."""
+"""Most starts: a machine that holds processes up may end a run before its fault is tried. Nothing
+else has it started anew."""
 ATTEMPTS: Final = 3
-"""And may spoil what is judged."""
+"""Most attempts at a row: such a machine may spoil what is judged, too."""
 DRIVEN_PA: Final = 5e3
-WATCHED_S: Final = 3.0
+"""Pressure from which the pump works: a tenth of the limit of the storm's ship."""
 RESTED_S: Final = 1.0
+"""For how long a program is stopped: no timeout of the other side is longer, but the panel's."""
+WATCHED_S: Final = 3.0
+"""For how long the bus is watched after the fault: two seconds longer."""
 _RECENT_S: Final = 0.5
+"""Greatest age of the last CTRL_STATUS of a controller that is in charge: five cycles."""
 _LOOK_S: Final = 0.002
+"""Time between two looks: a fifth of the shortest cycle of a message."""
 _EXTENDED_MASK: Final = 0x1FFFFFFF
 _BUS_OFF: Final = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
 """An error frame that says bus-off, as a kernel's driver hands it on."""
@@ -223,15 +228,6 @@ ACTIONS: Final[dict[str, tuple[Act, Stream | None]]] = {
 
 
 @contextmanager
-def _bench(bus: str) -> Iterator[LiveBench]:
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        bench = LiveBench(bus, folder)
-        stack.callback(bench.close)
-        yield bench
-
-
-@contextmanager
 def _in_charge(bus: str) -> Iterator[LiveBench]:
     """A bench whose controller is in charge, if need be not the first one.
 
@@ -241,7 +237,10 @@ def _in_charge(bus: str) -> Iterator[LiveBench]:
         If none came so far.
     """
     for start in range(1, STARTS + 1):
-        with _bench(bus) as bench:
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            closing(LiveBench(bus, Path(folder))) as bench,
+        ):
             try:
                 bench.wait_in_charge()
             except LiveError:

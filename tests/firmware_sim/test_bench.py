@@ -33,6 +33,7 @@ from utank_hil.console.exit_codes import ExitCode
 from utank_hil.control import PassiveDesign
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.pictures import BenchCurve
+from utank_hil.reports.page import write_page
 from utank_hil.telemetry.recording import read_recording
 
 pytestmark = pytest.mark.slow
@@ -196,6 +197,13 @@ def test_report_leaves_picture_recording_and_figures_behind(storm, tmp_path: Pat
         assert f"<td>{run['name']}</td>" in page
         assert f"<td>{math.degrees(run['roll']['rms_rad']):.2f}</td>" in page
     assert all(run["compared"] and run["rows"] == run["expected_rows"] for run in told["runs"])
+    # the page that is made later of the files is the same, pictures of rounded rolls apart
+    again = write_page([tmp_path], tmp_path / "again.html").read_text(encoding="utf-8")
+    pictures = re.compile('base64,[^"]*')
+    assert pictures.sub("", again) == pictures.sub("", page)
+    files["figures"].write_text(files["figures"].read_text().replace('"bus_load"', '"load"'))
+    with pytest.raises(ValueError, match="bus_load that can be used"):
+        write_page([tmp_path], tmp_path / "again.html")
 
 
 def test_picture_says_the_same_figures_as_the_table(storm, tmp_path: Path, monkeypatch) -> None:

@@ -119,7 +119,7 @@ def recorded(case: Case, told: set[Mode | Fault], processes: ProcessPoolExecutor
     job = Job(case.name, scenario, config, build_law(config), (), scenario.seed, case.seconds, file)
     controller = processes.submit(run_controller, job, CHANNEL, Together())
     processes.submit(run_ship, case).result()
-    statistics = controller.result().loop.statistics
+    statistics = controller.result().loop
     sent = (STATUS.decode(data) for number, data, kind, _ in entries(file)
             if kind == Kind.SENT and number == STATUS.can_id)  # fmt: skip
     statuses = [status for status in sent if status is not None]
