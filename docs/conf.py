@@ -11,6 +11,7 @@ version = release = importlib.metadata.version("utank-hil")
 
 root_doc = "docs/index"
 include_patterns = [
+    "SECURITY.md",
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",

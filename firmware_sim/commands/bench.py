@@ -70,7 +70,7 @@ def bench(
 
     In real time each run lasts its duration; without **--duration** that is 120 s. A run
     that capsized, ended in a fault or was not in charge is marked, not ranked, and the exit code
-    says so (docs/exit-codes.md).
+    says so (docs/deployment.md).
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name, run_bench

@@ -53,7 +53,7 @@ def faults(
     In lockstep on all cores. Without **--full** the roll is compared over 60 s, and over
     20 s where the controller stays in charge, and rows that take minutes are left out. Rows that
     need processes and an interface run with **--bus** only. The exit code says whether a row
-    failed (docs/exit-codes.md).
+    failed (docs/deployment.md).
     """
     # loaded when it runs: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign

@@ -106,7 +106,7 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
             {"control_word": ControlWord.ENABLE_OPERATION, "pressure_pa": 12000.0},
         ),
         (
-            "valve",
+            "drive",
             "VALVE_CMD",
             3,
             {"control": 1, "opening": 0.4, "timeout_s": 0.05},
@@ -114,7 +114,7 @@ def test_the_worked_frame_is_that_of_the_message_byte_by_byte() -> None:
             {"control": ValveControl.FOLLOW, "opening": pytest.approx(0.4)},
         ),
         (
-            "hardwired",
+            "sensor",
             "HARDWIRED_INPUTS",
             4,
             {"port_high": 0, "starboard_high": 0, "stop_loop": 1, "quality": 0},
@@ -192,7 +192,7 @@ def test_frames_to_test_an_encoder_with_are_right(name: str) -> None:
 
 def test_cycles_of_the_pages_are_the_catalogues() -> None:
     found = []
-    for page in ("sensor", "drive", "valve", "hardwired", "panel"):
+    for page in ("sensor", "drive", "panel"):
         found += re.findall(r"^\| ([A-Z_0-9]+)(?:, \w+)? \| (\d+) ms", text(page), re.M)
     assert len(found) == 14
     for name, cycle in found:
@@ -205,7 +205,7 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
         ("sensor", "no good SENSOR_MOTION | 40 ms", LIMITS.motion_age_ms),
         ("sensor", "no good SENSOR_TANK | 100 ms; 1 s", LIMITS.tank_degraded_age_ms),
         ("sensor", "no good SENSOR_PUMP | 200 ms; 1 s", LIMITS.pump_degraded_age_ms),
-        ("hardwired", "no good HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
+        ("sensor", "no good HARDWIRED_INPUTS | 150 ms", LIMITS.hardwired_age_ms),
         ("drive", "DRIVE_STATUS_1 silent | 60 ms", LIMITS.drive_age_ms),
         (
             "drive",
@@ -213,14 +213,14 @@ def test_cycles_of_the_pages_are_the_catalogues() -> None:
             LIMITS.echo_age_ms,
         ),
         ("drive", "out of OPERATION_ENABLED while active | 40 ms", LIMITS.drive_enabled_within_ms),
-        ("valve", "VALVE_STATUS silent | 60 ms", LIMITS.valve_age_ms),
+        ("drive", "VALVE_STATUS silent | 60 ms", LIMITS.valve_age_ms),
         (
-            "valve",
+            "drive",
             "the echo stands still, or is more than three commands behind | 100 ms",
             LIMITS.valve_echo_age_ms,
         ),
-        ("valve", "not FOLLOWING while active | 100 ms", LIMITS.valve_follows_within_ms),
-        ("valve", "by `opening_time_s` | 300 ms", LIMITS.valve_off_within_ms),
+        ("drive", "not FOLLOWING while active | 100 ms", LIMITS.valve_follows_within_ms),
+        ("drive", "by `opening_time_s` | 300 ms", LIMITS.valve_off_within_ms),
         ("panel", "silent, before arming | 600 ms", LIMITS.panel_age_to_arm_ms),
         ("panel", "silent, while armed | 5 s", LIMITS.panel_age_armed_ms),
         ("panel", "No CTRL_STATUS for 300 ms", SILENT_NS / 1e6),

@@ -1,24 +1,23 @@
 """Figures that documents give for shipped files and laws are those of the files and laws."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tools.studies.share_of_possible import STORM_HOUR, entrants, expecting, measured_hour, shipped
+from tools.studies.share_of_possible import STORM_HOUR, expecting, measured_hour, shipped
 from utank_hil.analysis.loop.robustness import robustness
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import ConstrainedDesign
 from utank_hil.sea import jonswap
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "constrained-control.md").read_text()
+PAGE = (ROOT / "docs" / "control.md").read_text()
 
 
 def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
-    text = " ".join((ROOT / "docs" / "pump.md").read_text().split())
+    text = " ".join((ROOT / "docs" / "dynamics.md").read_text().split())
     pattern = r"is the similar one of ([\d.]+) m² for (\d+) kPa: (\d+) rad/s and ([\d.]+) kW"
     found = re.search(pattern, text)
     assert found is not None
@@ -27,31 +26,6 @@ def test_pump_of_the_fishing_boat_is_that_of_her_file() -> None:
               pump.max_power_w / 1e3)  # fmt: skip
     for written, value in zip(found.groups(), values, strict=True):
         assert float(written) == pytest.approx(value, rel=5e-3)
-
-
-def test_roll_in_the_readme_is_that_of_the_measured_rows() -> None:
-    measured = json.loads((ROOT / "docs/evidence/shipped_scenarios.json").read_text())
-    storm = {"scenario": "storm_all", "plant": None}
-    (group,) = (each for each in measured["result"]["groups"] if each["parameters"] == storm)
-    rows = {name: run["roll_below_passive"]["mean"] for name, run in group["runs"].items()}
-    text = " ".join((ROOT / "README.md").read_text().split())
-    pattern = r"LQG (\d+) %, DPC (\d+) %, GPC (\d+) %, and (\d+) % for the GPC that plans"
-    found = re.search(pattern, text)
-    for written, law in zip(found.groups(), ("lqg", "dpc", "gpc", "constrained"), strict=True):
-        assert int(written) == round(100 * rows[law])
-
-
-@pytest.mark.slow
-def test_laws_that_check_refuses_have_an_eigenvalue_above_one_in_the_table_and_no_others() -> None:
-    plant = shipped("gpc").plant
-    lines = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| ")]
-    refused = 0
-    for entrant in entrants(shipped("constrained_gpc").limits):
-        (cells,) = (cells for cells in lines if cells[0] == f"| {entrant.name}")
-        report = robustness(entrant.law, plant, entrant.measured, with_delay_margin=False)
-        assert (float(cells[-1].strip(" |")) > 1) == bool(report.failures()), entrant.name
-        refused += bool(report.failures())
-    assert refused == 2
 
 
 @pytest.mark.slow

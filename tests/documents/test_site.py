@@ -13,7 +13,7 @@ from utank_hil.pictures.style import COLORS
 
 pytestmark = pytest.mark.slow
 
-PAGES = ("index", "tutorial", "can-catalogue", "gallery", "README")
+PAGES = ("index", "tutorial", "can-catalogue", "thesis", "README")
 LOADED = "() => [...document.images].map(image => [image.src, image.naturalWidth, image.width])"
 LEAST_SHARE = 0.5
 """Of its size that a picture keeps on a narrow screen, and scrolls: words of 18 pixels become 9."""
@@ -32,7 +32,7 @@ def site() -> Path:
     return folder / "docs"
 
 
-@pytest.mark.evidence("can-catalogue", "gallery")
+@pytest.mark.evidence("can-catalogue", "thesis")
 @pytest.mark.parametrize("name", PAGES)
 def test_nothing_of_a_page_is_cut_and_it_asks_for_nothing(
     browser: Browser, site: Path, name: str
@@ -65,7 +65,7 @@ def test_a_phone_breaks_names_in_tables_at_blanks_alone(browser: Browser, site: 
 
 
 def test_the_gallery_shows_its_curves(browser: Browser, site: Path) -> None:
-    with opened(browser, (site / "gallery.html").as_uri(), DESK) as seen:
+    with opened(browser, (site / "thesis.html").as_uri(), DESK) as seen:
         seen.page.wait_for_load_state("load")
         pictures = seen.page.locator("article img").all()
         assert len(pictures) >= 8

@@ -74,7 +74,7 @@ def test_tank_command_expects_the_roll_that_the_storm_gives(first_tank):
     found = first_tank
     assert found["scenario"] == "Storm of 10 February 2019"
     expected = found["present"]["prediction"]
-    # docs/design.md: by `compare`, another way to the same figures
+    # docs/how-to/ship.md: by `compare`, another way to the same figures
     assert math.degrees(expected["without_tank_rad"]) == pytest.approx(2.73, abs=0.01)
     assert math.degrees(expected["passive"]["roll_rms_rad"]) == pytest.approx(2.21, abs=0.01)
     assert 0.1 < expected["active_below_passive"] < 0.4

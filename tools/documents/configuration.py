@@ -43,7 +43,7 @@ FILES = (
     (ControllerConfig, "Controller files", "`configs/controllers`: what `utank-hil run` takes."),
     (Scenario, "Scenario files", "`configs/scenarios`: what `utank-hil bench` takes."),
     (Study, "Study files", "`configs/studies`: what `utank-hil campaign` takes, see "
-     "[campaigns.md](campaigns.md)."),
+     "[bench.md](bench.md)."),
 )  # fmt: skip
 
 GENERAL = {

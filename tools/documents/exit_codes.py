@@ -1,9 +1,9 @@
-"""The table of docs/exit-codes.md, made from utank_hil/console/exit_codes.py."""
+"""The table of docs/deployment.md, made from utank_hil/console/exit_codes.py."""
 
 from tools.documents.marked import DOCS, written_anew
 from utank_hil.console.exit_codes import ExitCode
 
-PAGE = DOCS / "exit-codes.md"
+PAGE = DOCS / "deployment.md"
 
 TABLE = "| code | name | commands | meaning |\n|---|---|---|---|\n"
 

@@ -8,7 +8,7 @@ script
 1. prints the derived expressions (`--print`),
 2. checks them against `utank_hil.dynamics.tank_wrench` at random states, and
 3. prints every term of the printed (2.11), (2.12), (2.14), (2.16), (4.2), (4.3) that differs
-   (`--errata`), of which docs/errata.md has the table.
+   (`--errata`), of which docs/thesis.md has the table.
 
 The printed text is known through an optical character recognition; a slip may be its own.
 """

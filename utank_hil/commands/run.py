@@ -93,7 +93,7 @@ def run(
     controller runs without. A controller that retunes itself prints each step with its reasons when
     it happens; so does one that raises an alarm, and both are logged in the folder of --out. A
     fault that is latched at the end, or a lost bus, has an exit code of its own
-    (docs/exit-codes.md).
+    (docs/deployment.md).
 
     **Example:** utank-hil run configs/controllers/gpc.yaml --bus can0 --out log
     """

@@ -93,6 +93,8 @@ def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
             (each.name, own.get(each.name, hints[each.name]), field(**_default(each)))
             for each in fields(design)
         ],
+        # the generated page of all keys explains them by this docstring
+        namespace={"__doc__": design.__doc__, "__module__": design.__module__},
     )
 
     # the generated page of keys reads the meanings there

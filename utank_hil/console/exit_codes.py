@@ -1,4 +1,4 @@
-"""The exit codes of the commands: here, and as a table in ``docs/exit-codes.md``."""
+"""The exit codes of the commands: here, and as a table in ``docs/deployment.md``."""
 
 from enum import IntEnum
 

@@ -10,7 +10,7 @@ The plain energy law needs no design. In the energy of roll the pump's power is 
 P phi' (g_phi > 0, see `feedback_linearization`), so P = -kappa phi' takes the most: the valve shuts
 while phi' h' > 0, when the water flows to where it will push the roll on, and opens while it flows
 to where it will push back. A large kappa is the on-off law. Holding the water back makes the tank
-slower: the law gains in waves slower than the tank and loses in faster ones (docs/controllers.md).
+slower: the law gains in waves slower than the tank and loses in faster ones (docs/control.md).
 
 The command is a loss in Pa per (m/s)^2 of dh/dt, as `utank_hil.dynamics.valves` gives it for an
 opening. No valve shuts in no time: between two samples it stays where it is.

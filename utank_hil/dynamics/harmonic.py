@@ -2,7 +2,7 @@
 
 Written as in the thesis, with the tank angle tau = 2 h / L and in real arithmetic. So it is an
 independent check of complex arithmetic on the matrices. Errors of the print are corrected
-(docs/errata.md):
+(docs/thesis.md):
 
 * every pump term carries f^2, P0 / k_hh -> f^2 P0 / k_hh (A, B, C, D and (2.25));
 * (2.24) has no mass ratio in the roll's phase: atan2(2 q b_hh / C_c, f^2 - q^2);

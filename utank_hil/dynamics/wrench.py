@@ -1,6 +1,6 @@
 """Force and moment of the tank water on a ship in arbitrary motion, thesis (2.11), (2.14), (2.16).
 
-The printed expressions contain errors (docs/errata.md), so these are derived from the water's
+The printed expressions contain errors (docs/thesis.md), so these are derived from the water's
 linear and angular momentum. With m, S, J the mass, first moment and inertia tensor of the water
 about the centre of gravity, and s the angular momentum of the flow relative to the ship per dh/dt::
 

@@ -22,7 +22,7 @@ LEAST_CLEAR: Final = 0.8
 STIFFNESS_DEVIATION: Final = 0.03
 PERIOD_DEVIATION: Final = 0.05
 """Largest relative deviations for the ship to count as identified. With less to go by, waves
-are taken for the ship, at deviations of 0.036 and more (docs/sea-estimate.md).
+are taken for the ship, at deviations of 0.036 and more (docs/retuning.md).
 """
 FARTHEST: Final = 1.45
 """Largest factor between the roll period found and the configured ship's: loading changes it by

@@ -2,7 +2,7 @@
 
 The source gives neither Lz nor the tank's friction, the pump's limits or the laws' parameters; the
 values here are our own. The high-gain fuzzy parameters need a pump without limits, because
-saturation makes these laws unstable (docs/controllers.md). A limited pump gets lower gains.
+saturation makes these laws unstable (docs/control.md). A limited pump gets lower gains.
 """
 
 import math

@@ -19,7 +19,7 @@ The acceleration u is turned into pressure by a nominal g. The leakage (sigma) i
 over a sample, so that the parameters stay bounded and positive at any sample time; what drives them
 rests while the command is cut short or another law is in charge.
 
-Derivation, and where the print differs: docs/controllers.md.
+Derivation, and where the print differs: docs/control.md.
 """
 
 import math
