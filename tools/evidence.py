@@ -57,6 +57,11 @@ PARTS: Final = {
     "fault_campaign": Part("utank-hil faults --seeds 100 --json", 20),
     "fault_campaign_roll": Part("utank-hil faults --seeds 10 --full --json", 20),
     "false_alarms": Part("python -m tools.studies.false_alarms --hours 50 --json", 1200),
+    "monitor_margins": Part(
+        "python -m tools.studies.monitor_margins configs/scenarios/storm_all.yaml"
+        " --minutes 60 --json",
+        10,
+    ),
     "week": Part("python -m tools.studies.week --days 7 --json", 120),
     "fuzz_frames": Part("python -m tools.fuzz.frames --frames 10000000 --json", 8),
     "fuzz_configurations": Part(

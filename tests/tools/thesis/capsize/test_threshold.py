@@ -81,6 +81,7 @@ def test_threshold_is_the_first_window_and_not_one_above_it(phase_deg, low_nm, h
     assert low_nm < found.capsizing_nm < high_nm
 
 
+@pytest.mark.evidence("90-40500.0-False", "150-43900.0-False")
 @pytest.mark.parametrize(
     ("phase_deg", "amplitude_nm", "capsizes"),
     [(90, 4.05e4, False), (90, 4.13e4, True), (150, 4.39e4, False), (150, 4.45e4, True)],
