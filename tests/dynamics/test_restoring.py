@@ -27,14 +27,9 @@ def test_levers_are_met_and_the_slope_at_zero_is_the_stiffness():
 
 @pytest.mark.parametrize("ship", [LEVERS, PATTI, THESIS_SHIP])
 def test_energy_is_the_work_of_the_moment(ship):
-    roll = np.linspace(-1.5, 1.5, 61)
-    np.testing.assert_allclose(
-        restoring(ship).energy_nm(roll), ship_potential(ship, roll), rtol=1e-12, atol=1e-6
-    )
-    step = 1e-5
-    table = restoring(ship)
-    slope = (table.energy_nm(roll + step) - table.energy_nm(roll - step)) / (2 * step)
-    np.testing.assert_allclose(slope, table.moment_nm(roll), rtol=1e-4, atol=1.0)
+    roll, step = np.linspace(-1.5, 1.5, 61), 1e-5
+    slope = (ship_potential(ship, roll + step) - ship_potential(ship, roll - step)) / (2 * step)
+    np.testing.assert_allclose(slope, restoring(ship).moment_nm(roll), rtol=1e-4, atol=1.0)
 
 
 def test_levers_of_a_ship_with_other_figures_scale_with_its_stiffness():

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from roll_energy import LEVERS
+from roll_energy import LEVERS, ship_potential
 from streamline import GRAVITY, Motion, particles, rotation
 
 from utank_hil.dynamics import (
@@ -53,7 +53,7 @@ def energy(ship, tank, state):
         + 0.5 * ship.pitch_stiffness_nm_rad * pitch**2
         - ship.roll.offset_moment_nm * np.sin(roll)
         - ship.roll.wind_moment_nm * roll
-        + RollModel(ship.roll, tank).restoring.energy_nm(roll)
+        + ship_potential(ship.roll, roll)
     )
     return (
         0.5 * np.einsum("ni,ij,nj->n", nu, ship.mass_matrix(), nu)

@@ -35,16 +35,6 @@ class Restoring(NamedTuple):
         piece, since = self._locate(roll_rad)
         return np.sign(roll_rad) * _horner(self.coefficients_nm[piece], since)
 
-    def energy_nm(self, roll_rad: npt.ArrayLike) -> FloatArray:
-        """Potential energy at the given roll angles, zero upright."""
-        piece, since = self._locate(roll_rad)
-        powers = self.coefficients_nm.shape[1]
-        integrals = np.zeros((len(self.coefficients_nm), powers + 1))
-        integrals[:, 1:] = self.coefficients_nm / np.arange(1, powers + 1)
-        for i in range(1, len(integrals)):
-            integrals[i, 0] = _horner(integrals[i - 1], np.asarray(self.piece_rad))
-        return _horner(integrals[piece], since)
-
     def _locate(self, roll_rad: npt.ArrayLike) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """Piece of each angle, and the angle from the start of that piece."""
         heel = np.abs(np.asarray(roll_rad, dtype=np.float64))
