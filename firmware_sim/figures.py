@@ -38,6 +38,15 @@ LEAST_ROLL_RAD: Final = 1e-6
 LEAST_IN_CHARGE: Final = 0.9
 """Least share of the time ordered by the operator in which the controller must be in charge."""
 
+_OF_BENCH: Final = (
+    *("mode", "seed", "duration_s", "settle_s", "end_s", "interrupted", "not_run", "wall_s"),
+)
+_OF_RUN: Final = (
+    *("name", "end_s", "strikes", "max_strike_impulse_nms", "pump_speed_rad_s", "energy_j"),
+    *("bus_load", "refused_commands", "fallbacks", "law_error"),
+)
+"""Figures that are those of the bench and of the run."""
+
 _ORDERS: Final = {
     Action.ARM: Mode.ACTIVE,
     Action.PASSIVE: Mode.PASSIVE,
@@ -203,15 +212,8 @@ def figures(result: BenchResult) -> BenchFigures:
     """Compute what a bench comes to."""
     marks = {run.name: mark_of(result, run) for run in result.runs}
     return BenchFigures(
+        **{name: getattr(result, name) for name in _OF_BENCH},
         scenario=result.scenario.name,
-        mode=result.mode,
-        seed=result.seed,
-        duration_s=result.duration_s,
-        settle_s=result.settle_s,
-        end_s=result.end_s,
-        interrupted=result.interrupted,
-        not_run=result.not_run,
-        wall_s=result.wall_s,
         exit_code=int(_exit_code(result, marks)),
         endings=tuple(_endings(result, marks)),
         limits_passed=tuple(passed_limits(result)),
@@ -241,11 +243,10 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
     found = []
     for run in result.runs:
         counts, window = run.name in order, _window(result, run)
-        retuning = retuning_figures(run, result.scenario, result.settle_s)
-        judged: dict[str, Any] = {}
+        judged: dict[str, Any] = {name: getattr(run, name) for name in _OF_RUN}
         if run.name in rolls:
             roll = rolls[run.name]
-            judged = {
+            judged |= {
                 "rank": order.index(run.name) + 1 if counts else None,
                 "roll": roll,
                 "roll_below_no_tank": _share_below(roll, bare) if counts else None,
@@ -261,24 +262,14 @@ def run_figures(result: BenchResult) -> tuple[RunFigures, ...]:
             }
         found.append(
             RunFigures(
-                name=run.name,
                 compared=run.name in rolls,
                 ranked=counts,
                 mark=marks[run.name],
                 rows=result.rows_compared(run),
                 expected_rows=result.expected_rows,
-                end_s=run.end_s,
                 capsized_s=finite(run.capsized_s),
-                strikes=run.strikes,
-                max_strike_impulse_nms=run.max_strike_impulse_nms,
-                pump_speed_rad_s=run.pump_speed_rad_s,
-                energy_j=run.energy_j,
-                bus_load=run.bus_load,
-                refused_commands=run.refused_commands,
-                fallbacks=run.fallbacks,
-                law_error=run.law_error,
                 loop=None if run.loop is None else run.loop.summary(),
-                retuning=retuning,
+                retuning=retuning_figures(run, result.scenario, result.settle_s),
                 **judged,
             )
         )

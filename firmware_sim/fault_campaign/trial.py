@@ -129,7 +129,7 @@ class Excess:
 
 @dataclass(frozen=True, slots=True)
 class Rolls:
-    """Variances of the roll in rad^2, of the ship and of the passive one, over `window_s`."""
+    """Variances of the roll in rad^2, of the ship and of the passive one, over a window."""
 
     variance: float = math.nan
     passive_variance: float = math.nan
