@@ -20,10 +20,10 @@ from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 
-MOST_STATES: Final = 48
+MOST_STATES: Final = 64
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
-"""Greatest sizes of a law: it is condensed in a few milliseconds. A shipped one has 36 states, 19
+"""Greatest sizes of a law: it is condensed in a few milliseconds. A shipped one has 58 states, 19
 knots and 60 samples.
 """
 _MOST_OUTPUTS: Final = len(STATES)

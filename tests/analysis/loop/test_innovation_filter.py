@@ -28,7 +28,7 @@ UNIT = PLANT.limits.pressure_pa
 SPECTRUM = jonswap(4.0, 10.0)
 SEA = SeaModel(tuple(SPECTRUM.frequency_hz), tuple(SPECTRUM.density), order=16, floor=1.3e-4)
 DESIGN = ConstrainedDesign("constrained_gpc", SEA, slope_noise_rad_rt_s=0.01, heel_std_rad=0.003)
-LAW = DESIGN.law(PLANT)
+LAW = DESIGN.law(PLANT).unlimited()
 WEIGHTS = (1.0, 3e-5, 2.6e-4)
 
 
@@ -96,26 +96,23 @@ def test_it_costs_less_than_without_and_no_step_from_it_costs_less():
 
 
 def test_the_law_with_it_is_stable_on_all_ships_of_the_grid():
-    law = next(problem().laws()).unlimited()
+    law = next(problem().laws())
     for _, _, ship in ship_variants(PLANT.ship):
         sampled = dataclasses.replace(PLANT, ship=ship).sampled(DESIGN.measured, law.sample_time_s)
         assert all(closed_loop_radius(law, sampled, gain) < 1 for gain in GAINS)
 
 
-def test_without_limits_it_commands_what_the_law_and_the_filter_make_of_the_innovations():
-    a, b = laguerre(3, 0.6)
-    by_surprise = 1e-3 * np.random.default_rng(2).normal(size=(3, 3))
-    law = LAW.with_filter(a.T, by_surprise, 1e3 * b)
-    controller, plain = law.controller(), LAW.unlimited()
-    x, q, command = np.zeros(len(plain.model.A)), np.zeros(3), 0.0
+def test_within_limits_a_law_that_follows_commands_what_the_linear_one_does():
+    linear = next(problem().laws())
+    law = DESIGN.law(PLANT).following(linear)
+    z = np.exp(1j * np.geomspace(1e-3, 3, 50))
+    expected = linear.response(z)
+    np.testing.assert_allclose(law.response(z), expected, atol=1e-9 * np.abs(expected).max())
+    controller, plain = law.controller(), linear.controller()
     rng = np.random.default_rng(3)
     for _ in range(30):
         y = 1e-4 * rng.normal(size=3)
-        surprise = y - plain.model.C @ x - plain.model.D[:, 0] * command
-        x = plain.model.A @ x + plain.model.B[:, 0] * command + plain.observer_gain @ surprise
-        q = a.T @ q + by_surprise @ surprise
-        command = -float(plain.gain[0] @ x) + 1e3 * float(b @ q)
-        assert controller.step(y)[0] == pytest.approx(command, rel=1e-6, abs=1e-3)
+        assert controller.step(y)[0] == pytest.approx(plain.step(y)[0], rel=1e-6, abs=1e-3)
         assert not controller.limited
 
 

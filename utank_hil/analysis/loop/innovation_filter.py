@@ -1,6 +1,6 @@
 """The filter on a law's innovations that costs least in the expected sea and keeps the loop robust.
 
-The innovations nu of a constrained law's observer are white noise as long as ship and sea are as
+The innovations nu of a law's observer are white noise as long as ship and sea are as
 the model says. A stable filter Q from them to the command changes what the law does in that sea and
 can't make it unstable on that ship (Youla parametrization). With the basis of Laguerre f_k(z)::
 
@@ -39,9 +39,9 @@ from utank_hil.analysis.loop.robustness import (
 )
 from utank_hil.base.arrays import ComplexArray, FloatArray
 from utank_hil.control.constrained.design import ConstrainedDesign
-from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.constrained.sea_plant import sea_plant
 from utank_hil.control.design_plant import DesignPlant
+from utank_hil.control.lqg import LQGLaw
 from utank_hil.dynamics.linear import STATES
 from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.transfer import state_space_response
@@ -89,7 +89,7 @@ class InnovationFilter:
 
     Parameters
     ----------
-    law : ConstrainedLaw
+    law : LQGLaw
         Stable on all ships of the grid (`robustness`).
     design : ConstrainedDesign
         The design that it was made from.
@@ -104,7 +104,7 @@ class InnovationFilter:
 
     def __init__(
         self,
-        law: ConstrainedLaw,
+        law: LQGLaw,
         design: ConstrainedDesign,
         plant: DesignPlant,
         weights: tuple[float, float, float],
@@ -130,7 +130,7 @@ class InnovationFilter:
         self._own_ship(np.asarray(weights))
         self._other_ships()
 
-    def laws(self) -> Iterator[ConstrainedLaw]:
+    def laws(self) -> Iterator[LQGLaw]:
         """The law with its best filter, and those that were found on the way, the best first."""
         found, coefficients = [], np.zeros(self.coefficients)
         for _ in range(_TURNS):
@@ -141,7 +141,7 @@ class InnovationFilter:
         for each in reversed(found):
             yield self._filtered(each)
 
-    def prediction(self, law: ConstrainedLaw) -> Prediction:
+    def prediction(self, law: LQGLaw) -> Prediction:
         """Predicted motion under a law in the sea, with the noise of the sensors."""
         to_command = law.response(self._z)[:, 0] / self._unit_pa
         loop = np.einsum("wm,wm->w", to_command, self._by_pump[:, self._measured])
@@ -215,7 +215,7 @@ class InnovationFilter:
 
         The estimate is x = (z - A + B K)^-1 (B q + L nu), the command q - K x.
         """
-        law, unit = self._law.unlimited(), self._unit_pa
+        law, unit = self._law, self._unit_pa
         a, b, c, d, dt = law.model
         expected = c - d @ law.gain
         response = state_space_response(
@@ -293,9 +293,22 @@ class InnovationFilter:
         back = np.exp(-1j * angle_rad)
         self._room, self._rooms = back.real, (back[..., None] * self._turning).real
 
-    def _filtered(self, coefficients: FloatArray) -> ConstrainedLaw:
-        by_surprise = coefficients.reshape(_ORDER, -1) @ self._whitening
-        return self._law.with_filter(self._basis_a.T, by_surprise, self._unit_pa * self._basis_b)
+    def _filtered(self, coefficients: FloatArray) -> LQGLaw:
+        """The law with the filter's states q after its own: q+ = A' q + c nu, b q added."""
+        law, states = self._law, len(self._law.model.A)
+        a, b, c, d, dt = law.model
+        rest = np.zeros((states, _ORDER))
+        return LQGLaw(
+            LinearModel(
+                np.block([[a, rest], [rest.T, self._basis_a.T]]),
+                np.vstack([b, np.zeros((_ORDER, 1))]),
+                np.hstack([c, np.zeros((len(c), _ORDER))]),
+                d,
+                dt,
+            ),
+            np.hstack([law.gain, -self._unit_pa * self._basis_b[None]]),
+            np.vstack([law.observer_gain, coefficients.reshape(_ORDER, -1) @ self._whitening]),
+        )
 
     def _along(self, outputs: ComplexArray) -> ComplexArray:
         """What a transfer to innovations becomes behind the filter, per coefficient."""

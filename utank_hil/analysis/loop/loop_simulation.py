@@ -1,12 +1,15 @@
-"""A controller on the linear ship, without bus and nodes: for long runs in many seas.
+"""A closed loop of law, limiter and ship in waves, without bus and nodes.
 
-The ship's motion is that with the tank passive, known exactly, plus what the pump adds. Sensors,
-limiter and drive run every tick, level gauges and level observer every `LEVEL_TICKS`, the
-controller at its own sample time. Their order within a tick is that of the controller node.
+`run_law` runs a controller on anything that moves tick by tick. `NonlinearShip` is ship and tank
+with their nonlinear equations in a wave moment. `LinearShip` is for long runs in many seas: its
+motion is that with the tank passive, known exactly, plus what the pump adds. Sensors, limiter and
+drive run every tick, level gauges and level observer every `LEVEL_TICKS`, the controller at its own
+sample time. Their order within a tick is that of the controller node.
 """
 
+import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -17,6 +20,7 @@ from utank_hil.control.interface import Controller
 from utank_hil.control.level_observer import LevelObserver
 from utank_hil.control.limiter import CommandLimiter
 from utank_hil.dynamics.linear import STATES, state_matrices
+from utank_hil.dynamics.nonlinear import RollModel
 from utank_hil.dynamics.sampling import transition_and_step
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
@@ -89,6 +93,199 @@ def passive_motion(
     return np.asarray(steady + free.real)
 
 
+class ShipInWaves(Protocol):
+    """A ship with its tank and pump that moves tick by tick."""
+
+    def truth(self) -> FloatArray:
+        """`STATES` and the actual pressure; shape (5,)."""
+
+    def sensed(self) -> FloatArray:
+        """The same as the sensors show it."""
+
+    def advance(self, command_pa: float) -> None:
+        """Move by one tick with the command that the drive has got."""
+
+
+class LinearShip:
+    """A linear ship in waves in which its motion with the tank passive is known.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+        Ship, tank and lag of the pump.
+    wave_motion : ndarray, shape (n, 4)
+        From `passive_motion` with a step of `TICK_S`.
+    pump_gain : float
+        Pressure that a command of 1 Pa ends in.
+    seed : int
+        Of the noise.
+    """
+
+    def __init__(
+        self,
+        plant: DesignPlant,
+        wave_motion: FloatArray,
+        *,
+        pump_gain: float = 1.0,
+        noise: SensorNoise | None = None,
+        seed: int = 0,
+    ) -> None:
+        lag_s, n = plant.lag_s, len(STATES)
+        a, b = state_matrices(plant.ship, plant.tank)
+        lagged = np.block([[a, b[:, :1]], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
+        transition, step = transition_and_step(
+            lagged, np.append(np.zeros(n), pump_gain / lag_s)[:, None], TICK_S
+        )
+        self._advance = np.hstack([transition, step])
+        self._waves = np.column_stack([wave_motion, np.zeros(len(wave_motion))])
+        self._shown = _noise(noise, len(wave_motion), seed) + self._waves
+        self._by_pump = np.zeros(n + 2)  # the pump's motion and pressure; the command
+        self._tick = 0
+
+    def truth(self) -> FloatArray:
+        """`STATES` and the actual pressure."""
+        found: FloatArray = self._waves[self._tick] + self._by_pump[:-1]
+        return found
+
+    def sensed(self) -> FloatArray:
+        """The same with the sensors' noise."""
+        found: FloatArray = self._shown[self._tick] + self._by_pump[:-1]
+        return found
+
+    def advance(self, command_pa: float) -> None:
+        """Move by one tick."""
+        self._by_pump[-1] = command_pa
+        self._by_pump[:-1] = self._advance.dot(self._by_pump)
+        self._tick += 1
+
+
+class NonlinearShip:
+    """Ship and tank with their nonlinear equations, from rest, in a wave moment.
+
+    Parameters
+    ----------
+    plant : DesignPlant
+        Ship, tank and lag of the pump.
+    wave_moment : Harmonics
+        In N m.
+    ticks : int
+        Length of the run.
+    seed : int
+        Of the noise.
+
+    Attributes
+    ----------
+    capsized_s : float
+        Time at which the roll passed 90 degrees; infinite until then.
+    strikes : int
+        Impacts of the water at the limits of its level.
+    """
+
+    def __init__(
+        self,
+        plant: DesignPlant,
+        wave_moment: Harmonics,
+        ticks: int,
+        *,
+        noise: SensorNoise | None = None,
+        seed: int = 0,
+    ) -> None:
+        from utank_hil.dynamics import kernels  # here, because it loads a compiler
+
+        self._kernels, self._packed = kernels, RollModel(plant.ship, plant.tank).packed
+        self._wave = (
+            np.ascontiguousarray(wave_moment.amplitude, dtype=np.float64),
+            np.ascontiguousarray(wave_moment.frequency_rad_s, dtype=np.float64),
+            np.ascontiguousarray(wave_moment.phase_rad, dtype=np.float64),
+        )
+        self._noise = _noise(noise, ticks, seed)
+        self._decay = math.exp(-TICK_S / plant.lag_s) if plant.lag_s else 0.0
+        self._state, self._pressure, self._loss = np.zeros(len(STATES)), np.zeros(1), np.zeros(1)
+        self._summary = np.zeros(kernels.SUMMARY)
+        self._summary[kernels.CAPSIZED_S] = math.inf
+        self._tick = 0
+
+    @property
+    def capsized_s(self) -> float:
+        """Time of capsizing."""
+        return float(self._summary[self._kernels.CAPSIZED_S])
+
+    @property
+    def strikes(self) -> int:
+        """Number of impacts."""
+        return int(self._summary[self._kernels.STRIKES])
+
+    def truth(self) -> FloatArray:
+        """`STATES` and the actual pressure."""
+        return np.append(self._state, self._pressure)
+
+    def sensed(self) -> FloatArray:
+        """The same with the sensors' noise."""
+        found: FloatArray = self.truth() + self._noise[self._tick]
+        return found
+
+    def advance(self, command_pa: float) -> None:
+        """Move by one tick, the pressure held at its mean over it."""
+        before = float(self._pressure[0])
+        after = command_pa + (before - command_pa) * self._decay
+        self._pressure[0] = (before + after) / 2
+        self._kernels.advance(
+            *self._packed, *self._wave, self._pressure, self._loss, 1, math.pi / 2, self._tick, 1,
+            TICK_S, self._state, self._summary, np.empty((0, 5)), np.empty((0, 4)), 1,
+        )  # fmt: skip
+        self._pressure[0] = after
+        self._tick += 1
+
+
+def run_law(
+    ship: ShipInWaves,
+    controller: Controller,
+    measured: tuple[str, ...],
+    plant: DesignPlant,
+    ticks: int,
+) -> LoopRun:
+    """Run a controller on a ship, armed from the start.
+
+    Parameters
+    ----------
+    measured : tuple of str
+        Names of `STATES` that the controller sees, in its order.
+    plant : DesignPlant
+        Of which tank, limits and delay count, the delay a whole number of ticks.
+    ticks : int
+        Length of the run in ticks of `TICK_S`.
+
+    Raises
+    ------
+    ValueError
+        If delay or sample time are no whole number of ticks.
+    """
+    delay_ticks = _ticks("delay_s", plant.delay_s)
+    sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
+    columns = [STATES.index(name) for name in measured]
+    observer = LevelObserver(plant.tank, LEVEL_TICKS * TICK_S)
+    limiter = CommandLimiter(plant.limits, plant.tank, TICK_S)
+    truth, wishes = np.empty((ticks, len(STATES) + 1)), np.empty(ticks)
+    commands = [0.0] * delay_ticks
+    applied, wish_pa = np.zeros(1), 0.0
+    for k in range(ticks):
+        truth[k] = ship.truth()
+        if k % LEVEL_TICKS == 0 or k % sample_ticks == 0:
+            seen = ship.sensed()
+        if k % LEVEL_TICKS == 0:
+            observer.update(float(seen[_LEVEL]), float(seen[-1]))
+        if k % sample_ticks == 0:
+            if k:
+                applied[0] = limiter.mean_since_last_call()
+                controller.applied(applied)
+            seen[_SPEED] = observer.rate_m_s
+            wish_pa = float(controller.step(seen[columns])[0])
+        wishes[k] = wish_pa
+        commands.append(limiter.limit(wish_pa, observer.level_m, observer.rate_m_s))
+        ship.advance(commands[k])
+    return LoopRun(truth[:, :-1], truth[:, -1], np.array(commands[delay_ticks:]), wishes)
+
+
 def simulate_loop(
     plant: DesignPlant,
     wave_motion: FloatArray,
@@ -99,72 +296,18 @@ def simulate_loop(
     noise: SensorNoise | None = None,
     seed: int = 0,
 ) -> LoopRun:
-    """Run a controller, armed from the start.
+    """`run_law` on a `LinearShip`, for the length of its motion with the tank passive."""
+    ship = LinearShip(plant, wave_motion, pump_gain=pump_gain, noise=noise, seed=seed)
+    return run_law(ship, controller, measured, plant, len(wave_motion))
 
-    Parameters
-    ----------
-    plant : DesignPlant
-        Its delay must be a whole number of ticks.
-    wave_motion : ndarray, shape (n, 4)
-        From `passive_motion` with a step of `TICK_S`.
-    measured : tuple of str
-        Outputs that it sees, in its order.
-    pump_gain : float
-        Pressure that a command of 1 Pa ends in.
-    seed : int
-        Of the noise.
 
-    Raises
-    ------
-    ValueError
-        If delay or sample time are no whole number of ticks.
-    """
-    delay_ticks = _ticks("delay_s", plant.delay_s)
-    sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
-    noise = noise or SensorNoise()
-    lag_s = plant.lag_s
-    a, b = state_matrices(plant.ship, plant.tank)
-    pressure_effect = b[:, :1]
-    n = len(STATES)
-    lagged = np.block([[a, pressure_effect], [np.zeros((1, n)), np.full((1, 1), -1 / lag_s)]])
-    transition, step = transition_and_step(
-        lagged, np.append(np.zeros(n), pump_gain / lag_s)[:, None], TICK_S
-    )
-    advance = np.hstack([transition, step])
-    size = np.array([noise.roll_rad, noise.roll_rate_rad_s, noise.level_m, 0.0, noise.pressure_pa])
-    count = len(wave_motion)
-    # what the sensors show beyond the pump's own effect
-    shown = np.random.default_rng(seed).standard_normal((count, n + 1)) * size
-    shown[:, :n] += wave_motion
-    level_shown, pressure_shown = shown[:, _LEVEL].tolist(), shown[:, n].tolist()
-    columns = [STATES.index(name) for name in measured]
-    observer = LevelObserver(plant.tank, LEVEL_TICKS * TICK_S)
-    limiter = CommandLimiter(plant.limits, plant.tank, TICK_S)
-    by_pump = np.empty((count, n + 1))  # motion and pressure that the pump makes
-    wishes = np.empty(count)
-    commands = [0.0] * delay_ticks
-    memory, applied = np.zeros(n + 2), np.zeros(1)  # the pump's motion and pressure; the command
-    wish_pa = 0.0
-    for k in range(count):
-        by_pump[k] = memory[: n + 1]
-        if k % LEVEL_TICKS == 0:
-            observer.update(
-                level_shown[k] + float(memory[_LEVEL]), pressure_shown[k] + float(memory[n])
-            )
-        if k % sample_ticks == 0:
-            if k:
-                applied[0] = limiter.mean_since_last_call()
-                controller.applied(applied)
-            seen = shown[k] + by_pump[k]
-            seen[_SPEED] = observer.rate_m_s
-            wish_pa = float(controller.step(seen[columns])[0])
-        wishes[k] = wish_pa
-        commands.append(limiter.limit(wish_pa, observer.level_m, observer.rate_m_s))
-        memory[n + 1] = commands[k]
-        memory[: n + 1] = advance.dot(memory)
-    return LoopRun(
-        wave_motion + by_pump[:, :n], by_pump[:, n], np.array(commands[delay_ticks:]), wishes
-    )
+def _noise(noise: SensorNoise | None, ticks: int, seed: int) -> FloatArray:
+    """Noise of `STATES` and pressure; the level's rate is not measured."""
+    size = noise or SensorNoise()
+    sizes = np.array([size.roll_rad, size.roll_rate_rad_s, size.level_m, 0.0, size.pressure_pa])
+    drawn: FloatArray = np.random.default_rng(seed).standard_normal((ticks, len(sizes)))
+    drawn *= sizes
+    return drawn
 
 
 def _ticks(name: str, time_s: float) -> int:

@@ -14,6 +14,7 @@ What is left to choose is how far the law trusts ship and sea. As little noise o
 as makes it stable on all ships that it must stand, and half as much again. A filter on its
 innovations then makes it cost least in the expected sea, robust all the same
 (`innovation_filter`), a convex problem. Where that misses a margin, the law without it is taken.
+What foresees the waves for the plan at the limits is a Kalman filter without the added noise.
 """
 
 import math
@@ -106,7 +107,7 @@ class SelfTuned:
     Attributes
     ----------
     law : ConstrainedLaw
-        The design's, with a filter on its innovations.
+        It commands what the design's does with a filter on its innovations.
     prediction : Prediction
         In the sea that it expects.
     """
@@ -277,14 +278,14 @@ class _Search:
         for _ in range(_MORE_NOISES):
             design = self._design(noise, costlier)
             if self._stands_hard_cases(design):
-                start = design.law(self._plant)
+                start = design.law(self._plant).unlimited()
                 search = InnovationFilter(start, design, self._plant, self._weights(costlier))
-                for law in (*search.laws(), start):
-                    judged = robustness(
-                        law.unlimited(), self._plant, _MEASURED, with_delay_margin=False
-                    )
+                for linear in (*search.laws(), start):
+                    judged = robustness(linear, self._plant, _MEASURED, with_delay_margin=False)
                     if not judged.failures():
-                        prediction = search.prediction(law)
+                        planner = self._design(0.0, costlier).law(self._plant)
+                        prediction = search.prediction(linear)
+                        law = planner.following(linear)
                         return SelfTuned(design, law, judged, self._roll_rad, prediction)
             noise *= _MORE_NOISE
         return None

@@ -90,7 +90,7 @@ def condense(
     terminal : ndarray, shape (t, n), optional
         L.
     correction : ndarray, shape (n,), optional
-        From the state, of a model without command, to what is added to the command of each sample.
+        From the state to what is added to the command of each sample; no command changes it.
 
     Raises
     ------

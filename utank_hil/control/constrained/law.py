@@ -114,35 +114,38 @@ class ConstrainedLaw:
         """Its transfer matrix at the points `z`, shape (N,); shape (N, 1, m)."""
         return self.unlimited().response(z)
 
-    def with_filter(self, a: FloatArray, b: FloatArray, c: FloatArray) -> "ConstrainedLaw":
-        """The law with a filter on its innovations, q+ = A q + B nu, and C q added to its plan.
+    def following(self, law: LQGLaw) -> "ConstrainedLaw":
+        """The law that commands what a linear one does as long as no limit is touched.
+
+        Both estimates run side by side, and the plan is that of this law with the other's command
+        less its own added at each sample. Without surprises the difference fades as the linear
+        law's estimate comes to the plan's.
 
         Parameters
         ----------
-        a : ndarray, shape (f, f)
-            Stable.
-        b : ndarray, shape (f, m)
-        c : ndarray, shape (f,)
-            In Pa.
+        law : LQGLaw
+            For the same outputs, on a model whose estimate follows the same commands.
         """
         from scipy.linalg import block_diag
 
-        horizon, model, f = self.horizon, self.model, len(a)
+        horizon, own, other = self.horizon, self.model, law.model
+        f = len(other.A)
 
         def padded(matrix: FloatArray) -> FloatArray:
             return np.hstack([matrix, np.zeros((len(matrix), f))])
 
+        expected = np.hstack([law.observer_gain @ own.C, other.A - law.observer_gain @ other.C])
         whole = LinearModel(
-            block_diag(model.A, a),
-            np.vstack([model.B, np.zeros((f, 1))]),
-            padded(model.C),
-            model.D,
-            model.dt,
+            np.vstack([padded(own.A), expected]),
+            np.vstack([own.B, other.B]),
+            padded(own.C),
+            own.D,
+            own.dt,
         )
         return replace(
             self,
             model=whole,
-            observer_gain=np.vstack([self.observer_gain, b]),
+            observer_gain=np.vstack([self.observer_gain, law.observer_gain]),
             horizon=condense(
                 whole,
                 tuple(horizon.knots.tolist()),
@@ -151,7 +154,7 @@ class ConstrainedLaw:
                 horizon.input_weight,
                 first_output=horizon.first_output,
                 terminal=padded(horizon.terminal),
-                correction=np.append(horizon.correction, c),
+                correction=np.append(self.unlimited().gain, -law.gain),
             ),
             steady_state=block_diag(self.steady_state, np.zeros((f, f))),
             steady_command=np.append(self.steady_command, np.zeros(f)),
