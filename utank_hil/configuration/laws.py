@@ -87,18 +87,18 @@ def _as_written(design: Any, sections: dict[Any, Any]) -> Any:
     }
     if not own:
         return design
+    parameters = [
+        (each.name, own[each.name], field(**_default(each)))
+        for each in fields(design)
+        if each.name in own
+    ]
     written = make_dataclass(
         design.__name__,
-        [
-            (each.name, own.get(each.name, hints[each.name]), field(**_default(each)))
-            for each in fields(design)
-        ],
-        # the generated page of all keys explains them by this docstring
-        namespace={"__doc__": design.__doc__, "__module__": design.__module__},
+        parameters,
+        bases=(design,),
+        namespace={"__doc__": design.__doc__},
+        frozen=True,
     )
-
-    # the generated page of keys reads the meanings there
-    written.__doc__, written.__module__ = design.__doc__, design.__module__
 
     def read(content: Any, checked: Callable[[Any], Any]) -> Any:
         if isinstance(content, design):
@@ -114,17 +114,14 @@ def _default(parameter: Field[Any]) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not MISSING}
 
 
-def _one_of(kinds: tuple[type[LawDesign], ...], sections: dict[Any, Any]) -> Any:
-    """Annotation of a design of one of these kinds, its numbers given or not."""
+def _one_of(written: dict[type[LawDesign], Any], automatic: Any) -> Any:
+    """Annotation of one of these designs, by how a file writes it, its numbers given or not."""
     given = [
-        Annotated[_as_written(each, sections), *marks, Tag(kind)]
-        for each in kinds
-        for kind in get_args(get_type_hints(each)["kind"])
-        for marks in ([BeforeValidator(_code_allowed)] if each is PythonDesign else [],)
+        Annotated[each, Tag(kind)]
+        for design, each in written.items()
+        for kind in get_args(get_type_hints(design)["kind"])
     ]
-    automatic = _as_written(AutoDesign, sections)
-    given.append(Annotated[automatic, BeforeValidator(_without_numbers), Tag(_AUTO)])
-    return Annotated[reduce(or_, given), Discriminator(_tag)]
+    return Annotated[reduce(or_, (*given, Annotated[automatic, Tag(_AUTO)])), Discriminator(_tag)]
 
 
 if TYPE_CHECKING:
@@ -133,9 +130,17 @@ else:
     _designs = (*LAWS, SelfTunedDesign, *(point.load() for point in entry_points(group=GROUP)))
     _valves = (OnOffValveDesign, ClippedValveDesign, PumpWithValveDesign)
     _sections = {SeaModel: LawSea, SystemMatrices: SystemFile}
+    _automatic = Annotated[_as_written(AutoDesign, _sections), BeforeValidator(_without_numbers)]
     # the design within another one is that of a pump, and never code
-    _of_a_pump = tuple(each for each in _designs if each not in (PythonDesign, *_valves))
-    AnyDesign = _one_of(_designs, {**_sections, LawDesign: _one_of(_of_a_pump, _sections)})
+    _of_a_pump = {
+        each: _as_written(each, _sections)
+        for each in _designs
+        if each not in (PythonDesign, *_valves)
+    }
+    _pump = {LawDesign: _one_of(_of_a_pump, _automatic)}
+    _code = {PythonDesign: Annotated[PythonDesign, BeforeValidator(_code_allowed)]}
+    _of_a_valve = {each: _as_written(each, _pump) for each in _valves}
+    AnyDesign = _one_of(_of_a_pump | _code | _of_a_valve, _automatic)
 
 
 def sample_time(law: LawDesign) -> tuple[str, float] | None:
