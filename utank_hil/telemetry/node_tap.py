@@ -22,8 +22,6 @@ _FIELDS: Final = 4
 """Fields of a record, in the order of `LAYOUT`."""
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _RECEIVED, _SENT, _TICK = int(Kind.RECEIVED), int(Kind.SENT), int(Kind.TICK)
-
-
 _PACKING: Final = [
     Struct(f"<{count * LAYOUT.format.lstrip('<')}").pack for count in range(IN_A_SLOT + 1)
 ]
@@ -51,9 +49,8 @@ class NodeTap:
         self._pass_on = node.receive
         self._sink = sink
         self._taps = taps
-        self._fields: list[
-            Any
-        ] = []  # of one record after the other: packing all at once is quicker
+        # fields of one record after the other: packing many at once is quicker
+        self._fields: list[Any] = []
         self._started = False
         self._every = self._ticks_left = every
 
