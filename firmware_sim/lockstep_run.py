@@ -89,7 +89,7 @@ def _lockstep_run(
         side_by_side(log.rows, truth_log.rows),
         lockstep.bus.statistics(lockstep.now_ns).load,
         *ship_figures(ship, truth),
-        retuning=controller.retuning_events,
-        fallbacks=controller.fallbacks,
-        law_error=controller.law_error,
+        retuning=controller.law.events,
+        fallbacks=controller.law.fallbacks,
+        law_error=controller.law.error,
     )

@@ -126,9 +126,9 @@ def _controller_run(
         log.rows,
         controller.start_ns,
         loop,
-        controller.retuning_events,
-        controller.fallbacks,
-        controller.law_error,
+        controller.law.events,
+        controller.law.fallbacks,
+        controller.law.error,
     )
 
 

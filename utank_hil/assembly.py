@@ -14,22 +14,19 @@ from utank_hil.analysis.loop.self_tuning import SelfTunedDesign, sample_time_of
 from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
-from utank_hil.canbus import SensorTank, load_catalogue
+from utank_hil.canbus import load_catalogue
+from utank_hil.canbus.measurements import Measurements, MotionSample
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.control.level_observer import LevelObserver
+from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.commissioning.node import CommissioningNode
 from utank_hil.nodes.commissioning.pulses import PulseLaw, plan_pulses, plan_stroke
-from utank_hil.nodes.controller import (
-    ControllerNode,
-    ControllerSettings,
-    EventSink,
-    Measure,
-)
-from utank_hil.nodes.inbox import MEASURED, Inbox
-from utank_hil.nodes.monitoring import Monitors
+from utank_hil.nodes.controller import ControllerNode, ControllerSettings
+from utank_hil.nodes.running_law import ExchangedLaw, Measure, RunningLaw
+from utank_hil.nodes.signals import EventSink, Telemetry
 from utank_hil.nodes.valve_command import ValveCommander
 from utank_hil.retuning import (
     AdaptiveController,
@@ -47,8 +44,9 @@ from utank_hil.retuning.estimate import MOST_BANDS, EstimateRequest, MotionEstim
 from utank_hil.retuning.estimator import COLUMNS
 from utank_hil.retuning.estimator import SAMPLE_TIME_S as ESTIMATE_SAMPLE_TIME_S
 from utank_hil.runners.statistics import LoopStatistics
+from utank_hil.safety.judge import Safety
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import thresholds_of
-from utank_hil.safety.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from utank_hil.retuning.redesign import RetuningTask
@@ -56,12 +54,14 @@ if TYPE_CHECKING:
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
 
-_ESTIMATED: Final[dict[str, Callable[[Inbox, LevelObserver], float]]] = {
+_GETTERS: Final[dict[str, Callable[[Measurements, MotionSample, LevelObserver], float]]] = {
+    "roll_rad": lambda _, motion, __: motion.roll_rad,
+    "roll_rate_rad_s": lambda _, motion, __: motion.roll_rate_rad_s,
     # the last one measured, held over a gap, looks like water that stands still
-    "level_m": lambda inbox, level: level.level_m if level.alone else inbox.level_m,
-    "level_rate_m_s": lambda _, level: level.rate_m_s,
+    "level_m": lambda measured, _, level: level.level_m if level.alone else measured.level_m,
+    "level_rate_m_s": lambda _, __, level: level.rate_m_s,
 }
-MEASUREMENTS: Final = tuple(dict.fromkeys((*MEASURED, *_ESTIMATED)))
+MEASUREMENTS: Final = tuple(_GETTERS)
 """Signals that a law may measure."""
 
 
@@ -76,14 +76,10 @@ def measure_of(names: tuple[str, ...]) -> Measure:
     for name in names:
         if name not in MEASUREMENTS:
             raise ValueError(f"no measurement {name!r}; there are {', '.join(MEASUREMENTS)}")
+    getters = [_GETTERS[name] for name in names]
 
-    def measure(inbox: Inbox, level: LevelObserver) -> FloatArray:
-        return np.array(
-            [
-                _ESTIMATED[name](inbox, level) if name in _ESTIMATED else getattr(inbox, name)
-                for name in names
-            ]
-        )
+    def measure(measured: Measurements, motion: MotionSample, level: LevelObserver) -> FloatArray:
+        return np.array([get(measured, motion, level) for get in getters])
 
     return measure
 
@@ -175,56 +171,48 @@ def build_controller_node(
         Whether it has monitors.
     """
     law = law or build_law(config)
-    tank, catalogue = config.vessel.tank, load_catalogue()
-    level_period_s = catalogue.codec(SensorTank).cycle_ns * 1e-9
-    retuning: LawExchange | None = None
+    vessel, tank, catalogue = config.vessel, config.vessel.tank, load_catalogue()
+    exchange: LawExchange | None = None
     if retuner is not None and config.retuning is not None:
-        retuning = _adaptive(config, law, retuner)
+        exchange = _adaptive(config, law, retuner)
     elif retuner is not None and config.renews:
-        retuning = _renewing(config, law, retuner)
+        exchange = _renewing(config, law, retuner)
     estimator = None
     if estimating is not None and config.sea_estimate is not None:
-        estimator = Estimator(
-            config.sea_estimate, estimating, config.vessel.ship, tank, config.vessel.least_gm_m
-        )
+        estimator = Estimator(config.sea_estimate, estimating, vessel.ship, tank, vessel.least_gm_m)
     timeout_s = config.command_timeout_ms * 1e-3
     valve = None
-    if config.vessel.valve is not None:
-        valve = ValveCommander(config.vessel.valve, tank, catalogue, timeout_s)
-    return ControllerNode(
-        retuning or law.controller(),
-        measure_of(law.measured),
-        LevelObserver(tank, level_period_s),
-        CommandLimiter(config.limits, tank, TICK_S),
-        Supervisor(config.safety),
-        ControllerSettings(
-            configuration_version=config.vessel.version,
-            command_timeout_s=timeout_s,
-            bit_rate=config.bit_rate,
-            level_limit_m=tank.level_limit_m,
-            redundancy=config.vessel.redundancy,
-            commissioned=commissioned,
-        ),
-        catalogue,
-        commands=law.commands,
-        pump=config.vessel.pump is not None,
-        valve=valve,
-        monitors=Monitors(
+    if vessel.valve is not None:
+        valve = ValveCommander(vessel.valve, tank, catalogue, timeout_s)
+    pump = vessel.pump is not None
+    monitors = None
+    if monitored:
+        monitors = Monitors(
             config.plant,
             config.safety.roll_limit_rad,
             config.sensors,
             config.bit_rate,
             compares=law.closes_loop,
-            second_motion=config.vessel.redundancy.second_motion_sensor,
+            second_motion=vessel.redundancy.second_motion_sensor,
         )
-        if monitored
-        else None,
-        retuning=retuning,
-        estimator=estimator,
-        statistics=statistics,
-        sink=sink,
-        sink_every=sink_every,
-        event_sink=event_sink,
+    thresholds = None if monitors is None else monitors.thresholds
+    measure = measure_of(law.measured)
+    running = (
+        RunningLaw(
+            law.controller(), measure, law.commands, limits=config.safety, thresholds=thresholds
+        )
+        if exchange is None
+        else ExchangedLaw(exchange, measure, limits=config.safety, thresholds=thresholds)
+    )
+    limiter = CommandLimiter(config.limits, tank, TICK_S)
+    return ControllerNode(
+        running,
+        Safety(config.safety, config.bit_rate, monitors, pump=pump),
+        Actuators(limiter, catalogue, timeout_s, pump=pump, valve=valve),
+        Telemetry(statistics, sink, sink_every, event_sink),
+        ControllerSettings(config.vessel.version, commissioned, tank, vessel.redundancy),
+        catalogue,
+        estimator,
     )
 
 

@@ -374,7 +374,7 @@ class Sea:
 
     def _degraded_most(self, bench: FaultyBench) -> tuple[float, int]:
         """What is allowed while the pressure is halved, and the time to come down to it."""
-        monitors, limits = bench.node.monitors, self._setup.config.limits
+        monitors, limits = bench.node.safety.monitors, self._setup.config.limits
         share = 1.0 if monitors is None else monitors.thresholds.degraded_share
         ramp_s = (1 - share) * limits.pressure_pa / limits.rate_pa_s
         return share * limits.pressure_pa, round(ramp_s * SECOND_NS) + COMMANDS_NS

@@ -64,7 +64,7 @@ class BusLog:
         if frame.can_id == _COMMANDS.can_id:
             command = _COMMANDS.decode(frame.data)
             if command is not None:
-                cut = self.node.supervisor.demand is Demand.ZERO
+                cut = self.node.safety.supervisor.demand is Demand.ZERO
                 self.commands.append((time_ns, command.pressure_pa, cut))
         elif frame.can_id == _STATUS.can_id:
             status = _STATUS.decode(frame.data)
@@ -189,9 +189,9 @@ class Watch:
     def _count(self) -> int:
         """All that the controller refused or missed so far."""
         node = self._bench.node
-        inbox, monitors = node.inbox, node.monitors
+        inbox = node.inbox
         streams = sum(sum(each.rejected.values()) + each.lost for each in inbox.watched)
-        return streams + inbox.foreign + (monitors.gates.discarded if monitors else 0)
+        return streams + inbox.foreign + inbox.discarded
 
     def _apart(self, name: str) -> float:
         """How far something is from the truth, or the ship from upright."""
@@ -199,9 +199,11 @@ class Watch:
         if name == "over_roll_rad":
             return abs(plant.roll_rad)
         if name == "pressure_pa":
-            measured_pa = self._bench.node.inbox.pressure_pa
+            measured_pa = self._bench.node.measured.pressure_pa
             return abs(measured_pa - drive.setpoint_pa) if drive is not None else 0.0
-        return abs(float(getattr(self._bench.node.inbox, name)) - float(getattr(plant, name)))
+        node = self._bench.node
+        source = node.motion if name in node.motion.__slots__ else node.measured
+        return abs(float(getattr(source, name)) - float(getattr(plant, name)))
 
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Look."""
@@ -210,7 +212,7 @@ class Watch:
         ship, node, first_ns = self._bench.ship, self._bench.node, self.first_ns
         while self._script and now_ns - self._start_ns >= self._script[0].time_s * 1e9:
             ship.panel.press(self._script.pop(0).action)
-        supervisor = node.supervisor
+        supervisor = node.safety.supervisor
         mode = supervisor.mode
         if mode is Mode.FAULT and "found" not in first_ns:
             first_ns["found"], self.code = now_ns, supervisor.fault
@@ -225,7 +227,7 @@ class Watch:
         self._waited = mode is Mode.INIT  # what it waited for and has now is no fault
         if "noted" not in first_ns and self._count() > self._noted:
             first_ns["noted"] = now_ns
-        if now_ns % (10 * TICK_NS) == 0 and node.alarms.codes & self._codes:
+        if now_ns % (10 * TICK_NS) == 0 and node.safety.alarms.codes & self._codes:
             first_ns.setdefault("alarm", now_ns)
         if (ship.drive is not None and ship.drive.setpoint_pa != 0.0) or (
             ship.valve is not None and ship.valve.following

@@ -18,6 +18,7 @@ import yaml
 from judged_rows import CAMPAIGN, GOOD, ROWS, verdict
 from pydantic import ValidationError
 from typer.testing import CliRunner
+from utank_hil.safety.observations import Observations
 
 from firmware_sim.commands import faults as commands
 from firmware_sim.fault_campaign import live, runner
@@ -39,7 +40,6 @@ from utank_hil.control.limiter import CommandLimiter
 from utank_hil.nodes.controller import ControllerNode
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.monitors.drive import DriveFollowing
-from utank_hil.safety.observations import Observations
 from utank_hil.safety.supervisor import Supervisor
 
 commands_load = commands.load

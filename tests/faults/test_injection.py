@@ -238,8 +238,8 @@ def test_pump_drive_law_and_operator_fail() -> None:
     stalled = Bus({"kind": "pump", "times": 0.0}).bench
     assert stalled.ship.plant.pressure_pa == 0.0 != sound().bench.ship.plant.pressure_pa
     assert not Bus({"kind": "drive", "fault": "OVERCURRENT"}).bench.ship.drive.enabled
-    assert "injected" in Bus({"kind": "law", "fails": "raises"}).bench.node.law_error
-    assert "nan" in Bus({"kind": "law", "fails": "answers_nan"}).bench.node.law_error
+    assert "injected" in Bus({"kind": "law", "fails": "raises"}).bench.node.law.error
+    assert "nan" in Bus({"kind": "law", "fails": "answers_nan"}).bench.node.law.error
     restarted = Bus({"kind": "killed", "for_s": 0.2}).bench
     assert restarted.node.mode in (Mode.INIT, Mode.STANDBY)
     panel = Bus({"kind": "second_panel", "operator": [{"time_s": 0.0, "action": "stop"}]})
@@ -286,7 +286,7 @@ def test_a_law_fails_in_a_controller_that_was_started_anew(fails_s: float) -> No
     killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
     failing = {"kind": "law", "fails": "raises", "at_s": fails_s, "for_s": 3.0}
     bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
-    assert "injected" in bench.node.law_error
+    assert "injected" in bench.node.law.error
     assert bench.node.fault is Fault.INTERNAL
 
 
@@ -294,7 +294,7 @@ def test_a_law_whose_fault_is_over_when_it_is_started_anew_is_sound() -> None:
     killed = {"kind": "killed", "at_s": 0.2, "for_s": 0.2}
     failing = {"kind": "law", "fails": "raises", "at_s": 0.1, "for_s": 0.25}
     bench = placed(killed, failing, arm_s=1.5, until_s=2.5)
-    assert bench.node.law_error == ""
+    assert bench.node.law.error == ""
     assert bench.node.mode is Mode.ACTIVE
 
 

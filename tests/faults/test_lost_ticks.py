@@ -41,7 +41,7 @@ def recorded(seconds: int, one_of: int, script=ARMED) -> tuple[FaultBench, np.nd
     rows = []
     for tenth in range(1, 10 * seconds + 1):
         bench.run(tenth / 10)
-        rows.append((bench.ship.plant.roll_rad, node.twin_roll_rad))
+        rows.append((bench.ship.plant.roll_rad, node.safety.passive_roll_rad))
     bench.controller.node = node
     return bench, np.array(rows)
 
@@ -50,7 +50,7 @@ def recorded(seconds: int, one_of: int, script=ARMED) -> tuple[FaultBench, np.nd
 def test_sensors_look_sound_whatever_share_of_the_ticks_is_lost(one_of: int) -> None:
     bench, _ = recorded(70, one_of)
     assert bench.mode is Mode.ACTIVE, bench.node.fault
-    assert not bench.node.seen.found
+    assert not bench.node.safety.situation.found
 
 
 def test_the_twin_is_the_passive_ship_where_every_tenth_tick_is_lost() -> None:

@@ -96,7 +96,7 @@ def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
     degraded = False
     while bench.lockstep.now_ns < 60 * SECOND:
         bench.run(bench.lockstep.now_ns * 1e-9 + 1.0)
-        degraded |= bench.node.supervisor.degraded
+        degraded |= bench.node.safety.supervisor.degraded
     assert bench.node.mode is Mode.ACTIVE
     assert not degraded
     motions = bench.node.inbox.motions
@@ -111,7 +111,7 @@ def test_one_silent_motion_sensor_leaves_the_other_and_half_the_pressure(first: 
     motions = bench.node.inbox.motions
     assert motions.used is (motions.second if first else motions.first)
     assert bench.node.mode is Mode.ACTIVE
-    assert bench.node.supervisor.degraded
+    assert bench.node.safety.supervisor.degraded
     assert Fault.MOTION_SILENT in {alarm.code for alarm in bench.ship.panel.alarms}
     assert bench.node.inbox.roll_rad == pytest.approx(bench.ship.plant.roll_rad, abs=0.01)
 
@@ -167,7 +167,7 @@ def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> No
     assert motions.used is (motions.second if first else motions.first)
     bench.run(bench.lockstep.now_ns * 1e-9 + 0.5)
     assert bench.node.mode is Mode.ACTIVE, bench.node.fault
-    assert bench.node.supervisor.degraded
+    assert bench.node.safety.supervisor.degraded
     assert Fault.SENSORS_DISAGREE in {alarm.code for alarm in bench.ship.panel.alarms}
 
 
@@ -198,7 +198,7 @@ def test_an_offset_that_nothing_explains_halves_and_then_ends_it() -> None:
     bench = Bench()
     bench.fail("sensors_2", motion(lambda roll, rate: (roll + 0.02, rate), Address.SENSORS_2), MS)
     bench.run(5.0)
-    assert bench.node.supervisor.degraded or bench.node.mode is not Mode.ACTIVE
+    assert bench.node.safety.supervisor.degraded or bench.node.mode is not Mode.ACTIVE
     bench.run_to_fault(60.0)
     assert bench.node.fault is Fault.SENSORS_DISAGREE
 
@@ -209,7 +209,7 @@ def test_a_wrong_sensor_beside_does_not_excuse_the_law_from_her_twin() -> None:
     bench.fail("sensors_2", motion(WRONG["flipped"], Address.SENSORS_2))
     bench.run(T0_S + 12.0)
     assert bench.node.mode is Mode.ACTIVE
-    monitors = bench.node.monitors
+    monitors = bench.node.safety.monitors
     monitors.twin.amplified = True
     monitors.twin._losing_s = 100.0
     monitors.twin._power = 4 * max(monitors.twin._twin_power, 1e-3)
@@ -242,7 +242,7 @@ def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
     plant = bench.ship.plant
     bench.run(T0_S)
     # the water is driven over the switch, whatever the monitors would have said before
-    bench.node.monitors = None
+    bench.node.safety.monitors = None
     assert bench.node.mode is Mode.ACTIVE
     while abs(plant.level_m) <= limit_m and bench.lockstep.now_ns < 600 * SECOND:
         bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
@@ -273,9 +273,9 @@ def test_a_stop_that_is_let_go_before_the_next_look_is_heard() -> None:
     for stop in (Switch.OFF, Switch.ON, Switch.OFF):
         node.receive(transmitter.frame(shut._replace(stop_loop=stop)), 0)
     node.tick(10 * MS)
-    assert node.seen.hardwired_stop
+    assert node.measured.hardwired_stop
     node.tick(20 * MS)
-    assert not node.seen.hardwired_stop
+    assert not node.measured.hardwired_stop
 
 
 @pytest.mark.parametrize("switch", [Switch.ON, Switch.ERROR, None])
@@ -348,7 +348,7 @@ def test_while_the_two_disagree_the_roll_does_not_count_for_the_twin_and_nothing
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     bench = Bench()
-    monitors = bench.node.monitors
+    monitors = bench.node.safety.monitors
     assert monitors is not None
     twin, update = monitors.twin, monitors.twin.update
     counted: list[bool] = []

@@ -92,7 +92,7 @@ class Voyage:
 
     @property
     def states(self) -> list[RetuningState]:
-        return [event.state for event in self.node.retuning_events]
+        return [event.state for event in self.node.law.events]
 
     @property
     def shown(self) -> list[RetuningState | None]:
@@ -114,9 +114,9 @@ def test_hung_or_dead_retuner_is_noticed_in_time_and_changes_nothing() -> None:
     hung = Voyage(Broken(None)).run(90)
     refusing = Voyage(Broken(Refusal(("no",)))).run(90)
     assert hung.states == [IDENTIFY, DESIGN, REFUSED]
-    assert "hangs or is dead" in hung.node.retuning_events[-1].reasons[0]
+    assert "hangs or is dead" in hung.node.law.events[-1].reasons[0]
     assert hung.shown == [IDLE, IDENTIFY, DESIGN, REFUSED]
-    design, refused = (event.time_ns for event in hung.node.retuning_events[1:])
+    design, refused = (event.time_ns for event in hung.node.law.events[1:])
     assert refused - design == pytest.approx(SETTINGS.answer_within_s * SECOND, abs=0.5 * SECOND)
     assert hung.heard.commands == refusing.heard.commands
     assert (hung.node.mode, hung.node.fault) == (Mode.ACTIVE, Fault.NONE)
@@ -181,7 +181,7 @@ def test_law_that_fails_on_trial_is_never_in_charge_again(failing: str) -> None:
 def test_law_that_drives_the_roll_up_is_taken_back_within_its_limits() -> None:
     voyage = Voyage(Broken(law_of(-1e6))).run(140)
     assert voyage.states == [IDENTIFY, DESIGN, TRIAL, REFUSED]
-    assert "roll rose" in voyage.node.retuning_events[-1].reasons[0]
+    assert "roll rose" in voyage.node.law.events[-1].reasons[0]
     config = voyage.config
     pressures = voyage.pressures()
     assert np.abs(pressures).max() <= config.limits.pressure_pa + 8.0

@@ -18,7 +18,7 @@ def recorded(script, controller: str) -> tuple[FaultBench, np.ndarray]:
     rows = []
     for second in range(1, SECONDS + 1):
         bench.run(second)
-        rows.append((bench.ship.plant.roll_rad, bench.node.twin_roll_rad))
+        rows.append((bench.ship.plant.roll_rad, bench.node.safety.passive_roll_rad))
     return bench, np.array(rows)
 
 
@@ -29,7 +29,9 @@ def passive() -> np.ndarray:
     assert bench.mode is Mode.PASSIVE
     # without a pump the twin is the ship, later by the motion sensor's 20 ms and a tick
     assert np.abs(passive[60:, 0] - passive[60:, 1]).max() < math.radians(0.3)
-    assert bench.node.twin_roll_rms_rad == pytest.approx(bench.node.roll_rms_rad, rel=0.02)
+    assert bench.node.safety.passive_roll_rms_rad == pytest.approx(
+        bench.node.safety.roll_rms_rad, rel=0.02
+    )
     return passive
 
 

@@ -72,7 +72,7 @@ def test_valve_law_moves_the_valve_and_the_pump_rests(controller: str) -> None:
     opening = bench.column("valve_opening")
     assert (opening.min(), opening.max()) == pytest.approx((0.0, 1.0), abs=0.02)
     assert not bench.column("pressure_command_pa").any()
-    assert (bench.valve.refused, bench.controller.law_error) == (0, "")
+    assert (bench.valve.refused, bench.controller.law.error) == (0, "")
     assert bench.controller.mode is Mode.ACTIVE
 
 

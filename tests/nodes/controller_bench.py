@@ -33,12 +33,18 @@ from utank_hil.canbus import (
     load_catalogue,
 )
 from utank_hil.configuration import Vessel, load_config
-from utank_hil.control import CommandLimiter, LevelObserver, PumpLimits
+from utank_hil.control import CommandLimiter, PumpLimits
+from utank_hil.control.interface import PRESSURE
+from utank_hil.nodes.actuators import Actuators
 from utank_hil.nodes.controller import ControllerNode, ControllerSettings
-from utank_hil.nodes.redundancy import NO_REDUNDANCY
-from utank_hil.nodes.signals import SIGNALS
-from utank_hil.runners.statistics import LoopStatistics
-from utank_hil.safety.supervisor import SafetyLimits, Supervisor
+from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
+from utank_hil.nodes.running_law import ExchangedLaw, Measure, RunningLaw
+from utank_hil.nodes.signals import SIGNALS, Telemetry
+from utank_hil.nodes.valve_command import ValveCommander
+from utank_hil.retuning import Estimator
+from utank_hil.safety.judge import Safety
+from utank_hil.safety.monitoring import Monitors
+from utank_hil.safety.safety_limits import SafetyLimits
 
 CATALOGUE = load_catalogue()
 VESSEL = load_config(Path("configs/ships/thesis_first.yaml"), Vessel)
@@ -96,31 +102,34 @@ class ControllerBench:
         self,
         start_ns: int = 0,
         law: ToyLaw | None = None,
-        statistics: LoopStatistics | None = None,
-        **more: Any,
+        *,
+        measure: Measure | None = None,
+        commands: tuple[str, ...] = (PRESSURE,),
+        monitors: Monitors | None = None,
+        pump: bool = True,
+        valve: ValveCommander | None = None,
+        estimator: Estimator | None = None,
+        redundancy: Redundancy = NO_REDUNDANCY,
+        **telemetry: Any,
     ) -> None:
         self.law = ToyLaw() if law is None else law
         self.rows: list[FloatArray] = []
-        self.level = LevelObserver(VESSEL.tank, 2 * TICK_S)
+        limits = SafetyLimits()
+        thresholds = None if monitors is None else monitors.thresholds
+        measure = measure or measure_of(("roll_rad", "level_m"))
+        limiter = CommandLimiter(LIMITS, VESSEL.tank, TICK_S)
         self.node = ControllerNode(
-            self.law,
-            measure_of(("roll_rad", "level_m")),
-            self.level,
-            CommandLimiter(LIMITS, VESSEL.tank, TICK_S),
-            Supervisor(SafetyLimits()),
-            ControllerSettings(
-                VERSION,
-                commissioned=True,
-                command_timeout_s=0.05,
-                bit_rate=250_000,
-                level_limit_m=VESSEL.tank.level_limit_m,
-                redundancy=NO_REDUNDANCY,
-            ),
+            ExchangedLaw(self.law, measure, limits=limits, thresholds=thresholds)
+            if hasattr(self.law, "laws")  # that it is exchanged for
+            else RunningLaw(self.law, measure, commands, limits=limits, thresholds=thresholds),
+            Safety(limits, 250_000, monitors, pump=pump),
+            Actuators(limiter, CATALOGUE, 0.05, pump=pump, valve=valve),
+            Telemetry(sink=lambda row: self.rows.append(row.copy()), **telemetry),
+            ControllerSettings(VERSION, True, VESSEL.tank, redundancy),
             CATALOGUE,
-            statistics=statistics,
-            sink=lambda row: self.rows.append(row.copy()),
-            **more,
+            estimator,
         )
+        self.level = self.node.level
         self.start_ns = self.now_ns = start_ns
         self.motion = SensorMotion(0.0, 0.0, Quality.GOOD)
         self.tank = SensorTank(0.0, 0.0, Switch.OFF, Switch.OFF, Quality.GOOD)

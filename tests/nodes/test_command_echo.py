@@ -3,7 +3,7 @@
 import pytest
 
 from utank_hil.nodes.command_echo import CommandEcho
-from utank_hil.nodes.orders import NEVER_HEARD_NS
+from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 
 def longest_silence(late: int, commands: int = 200) -> int:

@@ -42,11 +42,11 @@ from utank_hil.canbus import (
     Switch,
 )
 from utank_hil.control import DesignPlant
-from utank_hil.nodes.monitoring import Monitors
 from utank_hil.nodes.signals import SIGNALS
 from utank_hil.retuning import EstimateFigures, RetuningEvent
 from utank_hil.runners import RealTimeLoop
 from utank_hil.runners.statistics import LoopStatistics
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
 from utank_hil.safety.supervisor import Demand
 
@@ -231,7 +231,7 @@ def test_frames_of_other_kinds_load_the_bus() -> None:
         return loop.statistics.ticks > 250
 
     loop.run(stop)
-    assert bench.node.seen.bus_load > 0.9
+    assert bench.node.safety.situation.bus_load > 0.9
     assert loop.statistics.others_received == port.others - 16
 
 
@@ -302,8 +302,8 @@ def test_a_pressure_that_is_held_is_degraded_where_there_is_a_pump(pump: bool) -
     bench.run(500)
     assert bench.status is not None
     assert bench.status.degraded is False  # nothing is commanded
-    bench.node.supervisor.demand = Demand.CONTROL
-    bench.node.supervisor.update = lambda seen, now_ns: None  # type: ignore[method-assign]
+    bench.node.safety.supervisor.demand = Demand.CONTROL
+    bench.node.safety.supervisor.update = lambda seen, standing: None  # type: ignore[method-assign]
     bench.run(200)
     assert bench.status.degraded is pump
 
@@ -325,11 +325,11 @@ def test_one_late_tick_is_an_alarm_and_no_more() -> None:
     bench = ControllerBench(START_NS)
     bench.drive_at(LEVEL)
     bench.run(200)
-    assert bench.node.alarms.codes == set()
+    assert bench.node.safety.alarms.codes == set()
     bench.tick(late_ticks=1)
     bench.run(100)
-    assert bench.node.alarms.codes == {Fault.OVERRUN}
-    assert (bench.node.mode, bench.node.supervisor.degraded) == (Mode.ACTIVE, False)
+    assert bench.node.safety.alarms.codes == {Fault.OVERRUN}
+    assert (bench.node.mode, bench.node.safety.supervisor.degraded) == (Mode.ACTIVE, False)
     bench.run(1000)
     assert bench.pressure_pa == LEVEL
 
@@ -346,14 +346,15 @@ def test_heartbeat_tells_the_fault() -> None:
     assert VESSEL.version == VERSION == heard[-1].configuration_version
 
 
-class NotedUpdates:
-    """A retuning that does nothing."""
+class NotedUpdates(ToyLaw):
+    """A law that is retuned, with a retuning that does nothing."""
 
     state = RetuningState.IDLE
     excused = False
     events: tuple[RetuningEvent, ...] = ()
 
     def __init__(self) -> None:
+        super().__init__()
         self.fresh: list[bool] = []
         self.engaged: list[bool] = []
         self.laws = SimpleNamespace(active=SimpleNamespace(found=None))
@@ -398,8 +399,8 @@ def test_a_sample_is_fresh_only_if_motion_and_levels_are(
     kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     estimator: Any = NotedSamples()
-    bench, updates = ControllerBench(START_NS, estimator=estimator), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", updates)
+    updates = NotedUpdates()
+    bench = ControllerBench(START_NS, law=updates, estimator=estimator)
     bench.run(1000)
     for noted in (updates, estimator):
         assert all(noted.fresh[1:])
@@ -436,17 +437,17 @@ def test_the_motion_is_sampled_for_its_record_five_times_a_second() -> None:
 def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", noted)
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted)
     bench.run(400)
     assert not any(noted.engaged)
     bench.drive_at(40e3)
     assert noted.engaged[-1]
     bench.law.answer_pa = 0.0
-    monkeypatch.setattr(bench.node._limiter, "ramp_to_zero", lambda: 40e3)
+    monkeypatch.setattr(bench.node.actuators._limiter, "ramp_to_zero", lambda: 40e3)
     bench.order_is(arm=False)
     bench.run(400)
-    assert bench.node.supervisor.demand is Demand.RAMP
+    assert bench.node.safety.supervisor.demand is Demand.RAMP
     assert not noted.engaged[-1]
 
 
@@ -454,8 +455,8 @@ def test_retuning_is_engaged_while_the_law_is_in_charge_and_not_on_the_ramp(
 def test_a_law_is_in_charge_from_the_first_answer_after_arming(
     phase_ms: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", noted)
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted)
     bench.run(400 + phase_ms)
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
     while bench.node.mode is not Mode.ACTIVE:
@@ -470,8 +471,8 @@ def test_whoever_disarms_and_arms_between_two_answers_is_out_of_charge_for_one(
     phase_ms: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A retuning under way has to end, whenever that was."""
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", noted)
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted)
     bench.drive_at(0.0)
     bench.run(400 + phase_ms)
     noted.engaged.clear()
@@ -497,7 +498,7 @@ def test_a_law_that_asks_for_anything_gets_the_limit_and_half_of_it_when_degrade
     assert most_pa == abs(bench.pressure_pa) == LIMITS.pressure_pa
     bench.silent.add(SensorPump)
     bench.run(600)
-    assert bench.node.supervisor.degraded
+    assert bench.node.safety.supervisor.degraded
     assert bench.pressure_pa == sign * LIMITS.pressure_pa / 2
 
 
@@ -507,12 +508,15 @@ def test_degraded_is_what_she_stands_where_half_of_it_could_capsize_her(
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
     monitors.thresholds = replace(monitors.thresholds, degraded_share=0.125)
     monitors.confirmed = True
-    bench = ControllerBench(START_NS)
-    monkeypatch.setattr(bench.node, "monitors", monitors)
-    monkeypatch.setattr(bench.node.supervisor, "degraded", True)
-    assert bench.node._share == 0.125
-    monkeypatch.setattr(bench.node.supervisor, "degraded", False)
-    assert bench.node._share == 1.0
+    monkeypatch.setattr(monitors, "update", lambda *_: 0)
+    bench = ControllerBench(START_NS, monitors=monitors)
+    bench.run(10)
+    supervisor = bench.node.safety.supervisor
+    monkeypatch.setattr(supervisor, "update", lambda *_: None)
+    for degraded, share in ((True, 0.125), (False, 1.0)):
+        monkeypatch.setattr(supervisor, "degraded", degraded)
+        bench.run(10)
+        assert bench.node.law.share(bench.node.judgement) == share
 
 
 def test_without_retuning_nothing_excuses_the_ship_from_her_twin(
@@ -530,8 +534,8 @@ def test_every_law_that_is_not_excused_is_judged_by_the_twin_of_its_own_ship(
     *, excused: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monitors = Monitors(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures(), 250_000)
-    bench, noted = ControllerBench(START_NS, monitors=monitors), NotedUpdates()
-    monkeypatch.setattr(bench.node, "_retuning", noted)
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted, monitors=monitors)
     followed, excuses = [], []
     monkeypatch.setattr(monitors, "follow", followed.append)
     monkeypatch.setattr(monitors.twin, "excuse", lambda: excuses.append(True))
@@ -554,7 +558,7 @@ def test_a_spike_does_not_reach_the_law() -> None:
     bench = monitored()
     bench.motion = SensorMotion(0.3, 0.0, Quality.GOOD)
     bench.tick()
-    assert bench.node.inbox.roll_rad == 0.0
+    assert bench.node.motion.roll_rad == 0.0
 
 
 def test_a_second_sender_of_any_message_is_found() -> None:
@@ -567,10 +571,10 @@ def test_a_second_sender_of_any_message_is_found() -> None:
 def test_a_message_that_is_expected_is_missed() -> None:
     bench = monitored()
     bench.run(1000)
-    assert not bench.node.supervisor.degraded
+    assert not bench.node.safety.supervisor.degraded
     bench.silent.add(DriveStatus2)
     bench.run(1500)
-    assert bench.node.supervisor.degraded
+    assert bench.node.safety.supervisor.degraded
 
 
 def test_frames_of_other_kinds_fill_the_bus_too() -> None:
@@ -580,20 +584,20 @@ def test_frames_of_other_kinds_fill_the_bus_too() -> None:
         bench.tick()
     assert bench.node.fault is Fault.UNKNOWN_IDENTIFIERS
     assert bench.node.inbox.foreign == 600
-    assert bench.node.seen.bus_load > 0.15
+    assert bench.node.safety.situation.bus_load > 0.15
 
 
-def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert ControllerBench(law=PlanningLaw()).node.fallbacks == 3
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
-    assert bench.node.fallbacks is None
+def test_plans_that_were_not_found_and_the_state_of_retuning_are_the_laws() -> None:
+    assert ControllerBench(law=PlanningLaw()).node.law.fallbacks == 3
+    bench = ControllerBench(START_NS)
+    assert bench.node.law.fallbacks is None
     assert bench.node.retuning_state is RetuningState.IDLE
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted)
     noted.state = RetuningState.TRIAL
-    monkeypatch.setattr(bench.node, "_retuning", noted)
     assert bench.node.retuning_state is RetuningState.TRIAL
     bench.run(200)
+    assert bench.status is not None
     assert bench.status.retuning is RetuningState.TRIAL
 
 
@@ -602,20 +606,22 @@ def test_without_a_pump_nothing_is_ever_commanded() -> None:
     bench.arm()
     bench.law.answer_pa = 30e3
     bench.run(300)
-    assert bench.node.supervisor.demand is Demand.CONTROL
+    assert bench.node.safety.supervisor.demand is Demand.CONTROL
     assert bench.node.command_pa == 0.0
     assert not bench.commands
 
 
 def test_events_of_retuning_need_nobody_who_takes_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench, noted = ControllerBench(START_NS), NotedUpdates()
+    noted = NotedUpdates()
+    bench = ControllerBench(START_NS, law=noted)
     event = RetuningEvent(START_NS, RetuningState.IDLE, ())
     monkeypatch.setattr(noted, "take_events", lambda: [event])
-    monkeypatch.setattr(bench.node, "_retuning", noted)
     bench.run(300)
     assert noted.fresh
     heard: list[object] = []
-    monkeypatch.setattr(bench.node, "_event_sink", lambda event, start_ns: heard.append(event))
+    monkeypatch.setattr(
+        bench.node.telemetry, "_event_sink", lambda event, start_ns: heard.append(event)
+    )
     bench.run(300)
     assert event in heard
 
@@ -650,16 +656,16 @@ def test_what_is_awaited_is_no_alarm_for_ten_seconds_unless_it_was_there_before(
     bench = ControllerBench(START_NS)
     bench.silent.add(SensorMotion)
     bench.run(9_900)
-    assert Fault.MOTION_SILENT not in bench.node.alarms.codes
+    assert Fault.MOTION_SILENT not in bench.node.safety.alarms.codes
     bench.run(400)
-    assert Fault.MOTION_SILENT in bench.node.alarms.codes
+    assert Fault.MOTION_SILENT in bench.node.safety.alarms.codes
     bench = ControllerBench(START_NS)
     bench.run(1000)
     assert bench.node.mode is Mode.STANDBY
     bench.silent.add(SensorMotion)
     bench.run(300)
     assert bench.node.mode is Mode.INIT
-    assert Fault.MOTION_SILENT in bench.node.alarms.codes
+    assert Fault.MOTION_SILENT in bench.node.safety.alarms.codes
 
 
 def test_a_high_level_switch_is_an_alarm_from_the_start_however_short() -> None:
@@ -669,10 +675,10 @@ def test_a_high_level_switch_is_an_alarm_from_the_start_however_short() -> None:
     bench.tank = bench.tank._replace(port_high=Switch.ON)
     bench.run(200)
     assert bench.node.mode is Mode.INIT
-    assert bench.node.alarms.codes == {Fault.LEVEL_LIMIT}
+    assert bench.node.safety.alarms.codes == {Fault.LEVEL_LIMIT}
     bench.tank = bench.tank._replace(port_high=Switch.OFF)
     bench.run(3000)
-    assert bench.node.alarms.codes == {Fault.LEVEL_LIMIT}  # nobody has accepted it
+    assert bench.node.safety.alarms.codes == {Fault.LEVEL_LIMIT}  # nobody has accepted it
 
 
 @pytest.mark.parametrize("phase", range(10))
@@ -681,12 +687,12 @@ def test_what_halves_the_pressure_for_a_single_tick_is_an_alarm(phase: int) -> N
     bench.drive_at(20e3)
     bench.run(10 * phase)
     bench.silent.add(SensorTank)
-    while not bench.node.supervisor.degraded:
+    while not bench.node.safety.supervisor.degraded:
         bench.tick()
     bench.silent.clear()
     bench.run(300)
-    assert not bench.node.supervisor.degraded
-    assert bench.node.alarms.codes == {Fault.TANK_SILENT}
+    assert not bench.node.safety.supervisor.degraded
+    assert bench.node.safety.alarms.codes == {Fault.TANK_SILENT}
 
 
 def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -694,7 +700,7 @@ def test_a_refused_reset_is_an_event_and_its_end_is_none(monkeypatch: pytest.Mon
     bench = ControllerBench(START_NS)
     bench.arm()
     monkeypatch.setattr(
-        bench.node.alarms, "reset_refused", lambda code, mode, now_ns: refused.append(code)
+        bench.node.safety.alarms, "reset_refused", lambda code, mode, now_ns: refused.append(code)
     )
     bench.tank = bench.tank._replace(port_high=Switch.ON)
     bench.run(300)

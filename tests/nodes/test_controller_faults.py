@@ -193,7 +193,7 @@ def test_a_second_sender_of_an_own_identifier_stops_until_it_is_silent(
     bench.order_is(arm=True, mode_request=Mode.ACTIVE)
     bench.run(400)
     assert bench.node.mode is Mode.FAULT
-    assert bench.node.supervisor.reset_refused_by is Fault.ADDRESS_CONFLICT
+    assert bench.node.safety.supervisor.reset_refused_by is Fault.ADDRESS_CONFLICT
     bench.order_is(arm=False, reset=False)
     bench.run(9500)
     bench.order_is(reset=True)
@@ -254,9 +254,9 @@ def test_one_overrun_counts_for_every_tick_that_it_missed(late_ticks: int) -> No
     # the loop hands over what arrived meanwhile, so nothing is stale
     bench.tick(late_ticks=late_ticks)
     bench.tick()
-    assert bench.node.seen.overruns_in_ten == min(late_ticks, 9)
+    assert bench.node.safety.situation.overruns_in_ten == min(late_ticks, 9)
     assert bench.node.fault is (Fault.OVERRUN if late_ticks >= 3 else Fault.NONE)
-    stopped = bench.node.supervisor.demand is Demand.ZERO
+    stopped = bench.node.safety.supervisor.demand is Demand.ZERO
     assert stopped == (late_ticks >= 5)  # up to 60 ms late
 
 
@@ -298,7 +298,7 @@ def test_law_that_raises_stops_the_pump_until_the_operator_resets() -> None:
     bench.law.step = fail  # type: ignore[method-assign]
     bench.run(240)
     assert bench.node.fault is Fault.INTERNAL
-    assert bench.node.law_error == "ZeroDivisionError: of what"
+    assert bench.node.law.error == "ZeroDivisionError: of what"
     assert bench.pressure_pa == 0.0
     bench.law.step = step  # type: ignore[method-assign]
     bench.order_is(mode_request=Mode.STANDBY, arm=False)
@@ -395,7 +395,7 @@ def test_a_law_that_fails_gives_no_pressure_in_that_very_tick(
         raise ZeroDivisionError("of what")
 
     monkeypatch.setattr(bench.law, "step", fail)
-    while not bench.node.law_error:
+    while not bench.node.law.error:
         assert bench.node.command_pa == 20e3
         bench.tick()
     assert bench.node.mode is Mode.ACTIVE  # it is seen in the next tick
@@ -410,7 +410,7 @@ def test_an_answer_that_was_no_number_once_keeps_nobody_from_arming() -> None:
     bench.run(400)
     bench.law.answer_pa = 0.0
     bench.arm()
-    assert bench.node.law_error == "its answer is nan Pa"
+    assert bench.node.law.error == "its answer is nan Pa"
 
 
 def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -423,7 +423,7 @@ def test_of_several_errors_of_a_law_the_first_is_said(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(bench.law, "step", fail)
     bench.run(400)
-    assert bench.node.law_error == "its answer is nan Pa"
+    assert bench.node.law.error == "its answer is nan Pa"
 
 
 @pytest.mark.parametrize("answer", [[], [1e3, 2e3]])
@@ -434,4 +434,4 @@ def test_law_that_answers_too_few_or_too_many_commands_stops_the_pump(answer: li
     bench.run(300)
     assert (bench.node.mode, bench.node.fault) == (Mode.FAULT, Fault.INTERNAL)
     assert bench.pressure_pa == 0.0
-    assert bench.node.law_error.startswith("ValueError: zip() argument 2 is ")
+    assert bench.node.law.error.startswith("ValueError: zip() argument 2 is ")

@@ -30,10 +30,10 @@ class Line:
 def test_shut_and_low_stop_nothing() -> None:
     line = Line()
     assert line.heard.heard_ns < 0
-    assert not any((line.heard.stop, line.heard.stop_heard, line.heard.high_level))
+    assert not any((line.heard.take_stop(), line.heard.high_level))
     heard = line.say()
     assert heard.heard_ns == 1
-    assert not any((heard.stop, heard.stop_heard, heard.high_level))
+    assert not any((heard.take_stop(), heard.high_level))
 
 
 @pytest.mark.parametrize("name", ["port_high", "starboard_high"])
@@ -54,11 +54,11 @@ def test_an_open_loop_stops_from_any_intact_frame(switch: Switch, lost: int) -> 
     line.say()
     heard = line.say(lost=lost, stop_loop=switch)
     assert heard.stop
-    assert heard.stop_heard
     for _ in range(3):
         line.say()
     assert not heard.stop
-    assert heard.stop_heard  # the one who looks clears it
+    assert heard.take_stop()  # in a frame since the last look
+    assert not heard.take_stop()
 
 
 @pytest.mark.parametrize("quality", Quality)
@@ -77,4 +77,4 @@ def test_a_damaged_frame_says_nothing() -> None:
     frame = line.sender.frame(SHUT._replace(stop_loop=NOT_OFF[0]))
     damaged = Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,)))
     assert line.heard.accept(damaged) is None
-    assert not line.heard.stop_heard
+    assert not line.heard.take_stop()

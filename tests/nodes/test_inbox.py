@@ -1,6 +1,6 @@
 import math
-from collections.abc import Iterable
-from operator import attrgetter
+from collections.abc import Callable, Iterable
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -36,16 +36,14 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import ControllerConfig, load_config
 from utank_hil.control import LevelObserver
-from utank_hil.nodes.inbox import MEASURED, Inbox
-from utank_hil.nodes.motion_sensors import MotionSensors
-from utank_hil.nodes.observer import Observer
-from utank_hil.nodes.orders import NEVER_HEARD_NS
+from utank_hil.nodes.inbox import Inbox
+from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 from utank_hil.nodes.redundancy import Redundancy
 from utank_hil.runners import Lockstep
-from utank_hil.safety.monitors.spikes import SpikeGates
-from utank_hil.safety.monitors.thresholds import SensorFigures, thresholds_of
+from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
 
 NAN = math.nan
 LEVEL_LIMIT_M = 4.88
@@ -57,12 +55,12 @@ GOOD: dict[type, tuple[object, ...]] = {
     DriveStatus2: DriveStatus2(DriveFault.NONE, 1000.0, 20.0, 40.0, 40.0, *(False,) * 4),
     OperatorCommand: OperatorCommand(Mode.ACTIVE, True, False, False, False),
 }
-TIMES = {
-    SensorMotion: "motion_ns",
-    SensorTank: "tank_ns",
-    SensorPump: "pump_ns",
-    DriveStatus1: "drive_ns",
-    OperatorCommand: "stations.heard_ns",
+AGES: dict[type, Callable[[Measurements], float]] = {
+    SensorMotion: lambda seen: seen.motions[0].age_ms,
+    SensorTank: lambda seen: seen.tank_age_ms,
+    SensorPump: lambda seen: seen.pump_age_ms,
+    DriveStatus1: lambda seen: seen.drive_age_ms,
+    OperatorCommand: lambda seen: seen.panel_age_ms,
 }
 # what a law may measure: attribute of the emulated ship, and how far noise and delay may be off it
 TRUE = {
@@ -77,7 +75,6 @@ class Line:
 
     def __init__(self) -> None:
         self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M)
-        self.inbox.pump_echo.sent(4)
         self.senders = {kind: CATALOGUE.transmitter(kind) for kind in GOOD}
         self.now_ns = 1000
 
@@ -97,26 +94,40 @@ class Line:
         )
         self.hear(CATALOGUE.transmitter(Heartbeat, address).frame(beat))
 
+    @property
+    def seen(self) -> Measurements:
+        return self.inbox.snapshot(self.now_ns)
+
+    @property
+    def protected(self) -> bool:
+        """Whether all that control stands on arrives intact, with the first motion sensor."""
+        seen = self.seen
+        return seen.protection_valid and seen.motions[0].valid
+
     def content(self) -> dict[str, object]:
-        """Everything that the inbox shows but the count of frames."""
-        shown = {name for name in vars(self.inbox) if not name.startswith("_")} - {
+        """Everything that the inbox keeps but counts of frames and cycles."""
+        counts = {
+            "receiver",
+            "rejected",
             "frames",
             "foreign",
-            "watched",
-            "expected",
-            "stations",
-            "pump_echo",
-            "valve_echo",
+            "_tank_lost",
+            "_cycles",
+            "_tank_due_ns",
         }
+        orders = self.inbox.stations.orders[Station.OPERATOR]
         return {
-            "pump_echo": self.inbox.pump_echo.heard_ns,
-            "valve_echo": self.inbox.valve_echo.heard_ns,
-            **{name: getattr(self.inbox, name) for name in shown | {"level_m"}},
             **{
                 name: value
-                for name, value in vars(self.inbox.stations.orders[Station.OPERATOR]).items()
-                if name != "receiver"
+                for name, value in vars(self.inbox).items()
+                if name not in counts and isinstance(value, bool | int | float | Enum | None)
             },
+            **{
+                f"{name}_{place}": getattr(sensor, name)
+                for place, sensor in enumerate(self.inbox.motions)
+                for name in ("roll_rad", "roll_rate_rad_s", "heard_ns")
+            },
+            **{name: value for name, value in vars(orders).items() if name not in counts},
         }
 
 
@@ -124,21 +135,25 @@ def test_good_frames_are_kept_with_the_time_they_came() -> None:
     line = Line()
     for message in GOOD.values():
         line.say(message)
-    inbox = line.inbox
-    assert (inbox.roll_rad, inbox.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
-    assert (inbox.port_level_m, inbox.starboard_level_m) == pytest.approx((-0.5, 0.75))
-    assert inbox.level_m == pytest.approx(0.625)
-    assert inbox.pressure_pa == 8e3
-    assert inbox.power_w == pytest.approx(20e3)
-    assert inbox.drive_state is DriveState.OPERATION_ENABLED
-    assert inbox.stations.requested_mode is Mode.ACTIVE
-    came_ns = {kind: 1010 + 10 * index for index, kind in enumerate(GOOD)}
-    assert {kind: attrgetter(name)(inbox) for kind, name in TIMES.items()} == {
-        kind: came_ns[kind] for kind in TIMES
-    }
-    assert inbox.pump_echo.heard_ns == inbox.drive_ns
-    assert inbox.frames == len(GOOD)
-    assert inbox.protection_valid
+    seen = line.seen
+    motion = seen.motions[0]
+    assert (motion.roll_rad, motion.roll_rate_rad_s) == pytest.approx((0.1, -0.05))
+    assert (seen.port_level_m, seen.starboard_level_m) == pytest.approx((-0.5, 0.75))
+    assert seen.level_m == pytest.approx(0.625)
+    assert seen.pressure_pa == 8e3
+    assert seen.power_w == pytest.approx(20e3)
+    assert seen.drive_state is DriveState.OPERATION_ENABLED
+    assert seen.requested_mode is Mode.ACTIVE
+    ages_ns = {kind: 10 * (len(GOOD) - 1 - index) for index, kind in enumerate(GOOD)}
+    assert {kind: age_ms(seen) * MS for kind, age_ms in AGES.items()} == pytest.approx(
+        {kind: ages_ns[kind] for kind in AGES}
+    )
+    assert (line.now_ns - seen.tank_ns, line.now_ns - seen.drive_ns) == (
+        ages_ns[SensorTank], ages_ns[DriveStatus1],
+    )  # fmt: skip
+    assert seen.drive_echo == 4
+    assert seen.frames == len(GOOD)
+    assert line.protected
 
 
 @pytest.mark.parametrize(
@@ -177,15 +192,15 @@ def test_levels_within_the_margins_of_gauges_and_sloshing_are_measurements(
 ) -> None:
     line = Line()
     line.say(SensorTank(port_m, starboard_m, Switch.OFF, Switch.OFF, Quality.GOOD))
-    assert line.inbox.port_level_m == pytest.approx(port_m)
-    assert line.inbox.starboard_level_m == pytest.approx(starboard_m)
+    assert line.seen.port_level_m == pytest.approx(port_m)
+    assert line.seen.starboard_level_m == pytest.approx(starboard_m)
 
 
 def test_where_no_limit_is_known_any_level_is_a_measurement() -> None:
     line = Line()
     line.inbox = Inbox(CATALOGUE, VERSION)
     line.say(SensorTank(-9.0, 9.0, Switch.OFF, Switch.OFF, Quality.GOOD))
-    assert line.inbox.level_m == pytest.approx(9.0)
+    assert line.seen.level_m == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize("kind", GOOD)
@@ -235,7 +250,7 @@ def test_noise_on_the_bus_is_never_a_measurement(can_id: int, data: bytes, crc_e
         twin = Line()
         twin.hear(frame)
         unchanged += twin.content() == before
-        assert (twin.inbox.conflict_ns > 0) == own
+        assert (twin.seen.address_conflict) == own
     assert unchanged >= 1 or own
 
 
@@ -250,7 +265,7 @@ def test_switches_count_even_when_the_gauges_are_bad_and_broken_ones_are_closed(
         for level_m, quality in ((0.0, Quality.GOOD), (NAN, Quality.GOOD), (0.0, Quality.BAD)):
             line = Line()
             line.say(SensorTank(level_m, 0.0, port, starboard, quality))
-            assert line.inbox.high_level == closed
+            assert line.seen.high_level == closed
 
 
 @pytest.mark.parametrize("kind", [SensorMotion, SensorTank, DriveStatus1])
@@ -258,35 +273,24 @@ def test_every_stream_that_control_stands_on_counts_for_the_protection(kind: typ
     line = Line()
     for message in GOOD.values():
         line.say(message)
-    assert line.inbox.protection_valid
+    assert line.protected
     for _ in range(5):
         frame = line.frame(GOOD[kind])
         line.hear(Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,))))
-    assert not line.inbox.protection_valid
-
-
-def test_an_echo_is_fresh_only_when_it_moves_and_follows_the_commands() -> None:
-    line = Line()
-    echo = line.inbox.pump_echo
-    echo.sent(5)
-    for counter, fresh in ((None, False), (3, True), (3, False), (4, True), (9, False), (2, True)):
-        before = echo.heard_ns
-        line.say(GOOD[DriveStatus1]._replace(command_echo=counter))  # type: ignore[attr-defined]
-        assert (echo.heard_ns == line.now_ns) is (echo.heard_ns != before) is fresh
-        assert line.inbox.drive_ns == line.now_ns
+    assert not line.protected
 
 
 def test_versions_match_only_when_drive_and_sensors_both_say_so() -> None:
     line = Line()
-    assert not line.inbox.versions_match
+    assert not line.seen.versions_match
     line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
-    assert not line.inbox.versions_match
+    assert not line.seen.versions_match
     line.beat(Address.SENSORS, CATALOGUE.version ^ 1, VERSION)
-    assert not line.inbox.versions_match
+    assert not line.seen.versions_match
     line = Line()
     line.beat(Address.DRIVE, CATALOGUE.version, VERSION)
     line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
-    assert line.inbox.versions_match
+    assert line.seen.versions_match
 
 
 @pytest.mark.parametrize("address", [Address.SENSORS, Address.DRIVE, Address.OPERATOR])
@@ -294,35 +298,36 @@ def test_an_address_that_is_claimed_under_another_name_has_two_holders(address: 
     line, claims = Line(), CATALOGUE.transmitter(AddressClaim, address)
     for name, second in ((5, False), (5, False), (6, True)):
         line.hear(claims.frame(AddressClaim(name)))
-        assert (line.inbox.claimed_twice_ns == line.now_ns) is second
+        assert line.seen.claimed_twice is second
+    line.now_ns += 10_000 * MS
+    assert line.seen.claimed_twice
     line.hear(claims.frame(AddressClaim(6)))  # replaced: it is the one there is
-    assert line.inbox.claimed_twice_ns < line.now_ns
+    assert not line.seen.claimed_twice
 
 
 def test_drive_of_an_unknown_fault_is_not_healthy() -> None:
     line = Line()
     line.say(GOOD[DriveStatus2]._replace(fault=None))  # type: ignore[attr-defined]
-    assert line.inbox.drive_fault is None
+    assert line.seen.drive_fault
 
 
 def test_drive_status_without_a_state_is_as_if_it_had_not_come() -> None:
     line, status = Line(), GOOD[DriveStatus1]._replace(power_limited=True)  # type: ignore[attr-defined]
     line.say(status._replace(state=None))
-    assert (line.inbox.drive_state, line.inbox.drive_ns) == (None, NEVER_HEARD_NS)
+    assert (line.seen.drive_state, line.seen.drive_ns) == (None, NEVER_HEARD_NS)
     line.say(status)
-    heard_ns = line.inbox.drive_ns
-    line.inbox.pump_echo.sent(9)
+    heard_ns = line.seen.drive_ns
     line.say(status._replace(state=None, power_limited=False, command_echo=9))
-    inbox = line.inbox
-    assert (inbox.drive_state, inbox.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
-    assert inbox.drive_ns == inbox.pump_echo.heard_ns == heard_ns
+    seen = line.seen
+    assert (seen.drive_state, seen.drive_held_back) == (DriveState.OPERATION_ENABLED, True)
+    assert (seen.drive_ns, seen.drive_echo) == (heard_ns, 4)
 
 
 def test_a_mode_nobody_asked_for_is_standby() -> None:
     line = Line()
-    assert line.inbox.stations.requested_mode is Mode.STANDBY
+    assert line.seen.requested_mode is Mode.STANDBY
     line.say(OperatorCommand(None, True, False, False, False))
-    assert line.inbox.stations.requested_mode is Mode.STANDBY
+    assert line.seen.requested_mode is Mode.STANDBY
 
 
 class Listener:
@@ -342,14 +347,14 @@ class Listener:
 
 
 def test_emulated_sensors_are_what_a_law_measures() -> None:
-    assert list(TRUE) == list(MEASURED)
     scenario = load_config(Path("configs/scenarios/storm.yaml"), Scenario)
     ship, listener = build_ship_side(scenario, 1, ()), Listener()
-    measure, level = measure_of(MEASURED), LevelObserver(VESSEL.tank, 0.02)
-    run, largest = Lockstep([ship.sensors, listener]), dict.fromkeys(MEASURED, 0.0)
+    measure, level = measure_of(tuple(TRUE)), LevelObserver(VESSEL.tank, 0.02)
+    run, largest = Lockstep([ship.sensors, listener]), dict.fromkeys(TRUE, 0.0)
     for time_ms in range(20_000, 60_000, 250):
         run.run_until(time_ms * 1_000_000)
-        for name, value in zip(MEASURED, measure(listener.inbox, level), strict=True):
+        seen = listener.inbox.snapshot(time_ms * 1_000_000)
+        for name, value in zip(TRUE, measure(seen, seen.motions[0], level), strict=True):
             attribute, off = TRUE[name]
             assert value == pytest.approx(getattr(ship.plant, attribute), abs=off), name
             largest[name] = max(largest[name], abs(value))
@@ -372,24 +377,26 @@ def listening(**on_board: bool) -> Line:
 
 def test_new_it_knows_nothing_and_trusts_nothing() -> None:
     for inbox in (Inbox(CATALOGUE, VERSION), Inbox(CATALOGUE, VERSION, pump=False, valve=True)):
-        for name in ("roll_rad", "roll_rate_rad_s", "port_level_m", "starboard_level_m",
-                     "pressure_pa", "power_w", "frames", "foreign", "tank_cycles"):  # fmt: skip
-            assert getattr(inbox, name) == 0, name
-        for name in ("motion_ns", "tank_ns", "valve_ns", "conflict_ns"):
-            assert getattr(inbox, name) == NEVER_HEARD_NS, name
-        assert inbox.valve_opening == 1.0
-        assert inbox.valve_state is None
-        assert inbox.drive_fault is DriveFault.NONE
+        seen = inbox.snapshot(0)
+        (motion,) = seen.motions
+        assert (motion.roll_rad, motion.roll_rate_rad_s, motion.valid) == (0.0, 0.0, False)
+        for name in ("port_level_m", "starboard_level_m", "pressure_pa", "power_w", "frames",
+                     "foreign", "tank_cycles"):  # fmt: skip
+            assert getattr(seen, name) == 0, name
+        assert {motion.heard_ns, seen.tank_ns, seen.valve_heard_ns} == {NEVER_HEARD_NS}
+        assert seen.valve_opening == 1.0
         for name in ("high_level", "drive_held_back", "drive_warns", "versions_match",
-                     "panel_matches", "protection_valid"):  # fmt: skip
-            assert getattr(inbox, name) is False, name
+                     "panel_matches", "protection_valid", "drive_fault", "valve_fault",
+                     "valve_following", "address_conflict", "claimed_twice"):  # fmt: skip
+            assert getattr(seen, name) is False, name
 
 
 def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> None:
     line = listening()
     inbox = line.inbox
-    assert inbox.drive_state is None
-    assert {inbox.pump_ns, inbox.drive_ns, inbox.pump_echo.heard_ns} == {NEVER_HEARD_NS}
+    seen = line.seen
+    assert seen.drive_state is None
+    assert min(seen.pump_age_ms, seen.drive_age_ms) > 1e12
     beats = {address: CATALOGUE.receiver(Heartbeat, address).can_id for address in Address
              if (Heartbeat, address) in CATALOGUE._codecs}  # fmt: skip
     expected = {CATALOGUE.codec(DriveStatus2).can_id, beats[Address.DRIVE], beats[Address.SENSORS]}
@@ -405,42 +412,39 @@ def test_a_ship_with_a_pump_and_no_valve_hears_and_awaits_the_drive_alone() -> N
 def test_without_a_pump_its_drive_is_enabled_never_late_and_not_awaited() -> None:
     line = listening(pump=False, valve=True)
     inbox = line.inbox
-    assert inbox.drive_state is DriveState.OPERATION_ENABLED
     century_ns = 100 * 366 * 86_400 * 1_000_000_000
-    assert min(inbox.pump_ns, inbox.drive_ns, inbox.pump_echo.heard_ns) > century_ns
+    seen = inbox.snapshot(century_ns)
+    assert seen.drive_state is DriveState.OPERATION_ENABLED
+    assert max(seen.pump_age_ms, seen.drive_age_ms) < 0
     line.say(GOOD[SensorMotion])
     line.say(GOOD[SensorTank])
-    assert inbox.protection_valid
+    assert line.protected
     line.beat(Address.SENSORS, CATALOGUE.version, VERSION)
-    assert not inbox.versions_match
+    assert not line.seen.versions_match
     line.beat(Address.VALVE, CATALOGUE.version, VERSION)
-    assert inbox.versions_match
+    assert line.seen.versions_match
     assert CATALOGUE.codec(DriveStatus1).can_id not in {each.can_id for each in inbox.watched}
 
 
-def test_what_the_valve_says_is_kept_and_its_echo_is_fresh_only_when_it_moves() -> None:
+def test_what_the_valve_says_is_kept_with_the_echo_of_the_last_status() -> None:
     line = listening(valve=True)
-    inbox, sender = line.inbox, CATALOGUE.transmitter(ValveStatus)
-    inbox.valve_echo.sent(4)
+    sender = CATALOGUE.transmitter(ValveStatus)
 
-    def say(opening: float, echo: int | None) -> int:
+    def say(opening: float, echo: int | None) -> Measurements:
         flags = [False] * (len(ValveStatus._fields) - 5)
         status = ValveStatus(opening, ValveState.FOLLOWING, ValveFault.NONE, echo, None, *flags)
         line.hear(sender.frame(status))
-        return line.now_ns
+        return line.seen
 
-    first_ns = say(0.4, None)
-    assert inbox.valve_state is ValveState.FOLLOWING
-    assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
-    assert inbox.valve_echo.heard_ns == NEVER_HEARD_NS
-    say(NAN, None)
-    assert (inbox.valve_opening, inbox.valve_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
-    second_ns = say(0.5, 3)
-    assert (inbox.valve_ns, inbox.valve_echo.heard_ns) == (second_ns, second_ns)
-    third_ns = say(0.5, 3)
-    say(0.5, None)
-    assert (inbox.valve_ns > third_ns, inbox.valve_echo.heard_ns) == (True, second_ns)
-    assert say(0.5, 4) == inbox.valve_echo.heard_ns
+    seen = say(0.4, None)
+    first_ns = line.now_ns
+    assert (seen.valve_following, seen.valve_fault) == (True, False)
+    assert (seen.valve_opening, seen.valve_heard_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
+    assert (seen.valve_ns, seen.valve_echo) == (first_ns, None)
+    seen = say(NAN, 3)  # without an opening
+    assert (seen.valve_opening, seen.valve_heard_ns) == (pytest.approx(0.4, abs=0.01), first_ns)
+    assert (seen.valve_ns, seen.valve_echo) == (line.now_ns, 3)
+    assert say(0.5, 3).valve_heard_ns == line.now_ns
 
 
 @pytest.mark.parametrize("limited", ["power_limited", "speed_limited"])
@@ -448,9 +452,9 @@ def test_a_drive_at_its_power_or_speed_is_held_back(limited: str) -> None:
     line, status = Line(), GOOD[DriveStatus1]
     for said in (True, False, True):
         line.say(status._replace(**{limited: said}))  # type: ignore[attr-defined]
-        assert line.inbox.drive_held_back is said
+        assert line.seen.drive_held_back is said
     line.say(status._replace(pressure_limited=True, rate_limited=True))  # type: ignore[attr-defined]
-    assert not line.inbox.drive_held_back
+    assert not line.seen.drive_held_back
 
 
 @pytest.mark.parametrize(
@@ -460,7 +464,7 @@ def test_a_drive_warns_by_any_bit_until_its_next_status(bit: str) -> None:
     line, status = Line(), GOOD[DriveStatus2]
     for said in (True, False, True):
         line.say(status._replace(**{bit: said}))  # type: ignore[attr-defined]
-        assert line.inbox.drive_warns is said
+        assert line.seen.drive_warns is said
 
 
 def test_the_panel_in_command_is_to_match_and_not_the_other() -> None:
@@ -473,7 +477,7 @@ def test_the_panel_in_command_is_to_match_and_not_the_other() -> None:
         (Address.OPERATOR, (CATALOGUE.version + 1, VERSION), False),
     ):
         line.hear(beat_of(address, *versions))
-        assert line.inbox.panel_matches is matches
+        assert line.seen.panel_matches is matches
 
 
 BEATS = {address: CATALOGUE.transmitter(Heartbeat, address)
@@ -513,15 +517,15 @@ def test_cycles_of_the_levels_are_counted_by_the_counter_and_long_gaps_by_the_ti
         line.now_ns += CYCLE_NS
         line.frame(GOOD[SensorTank])
         inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
-    before = inbox.tank_cycles
+    before = line.seen.tank_cycles
     for _ in range(lost):
         line.frame(GOOD[SensorTank])
     line.now_ns += after_ns
     inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
-    assert inbox.tank_cycles - before == cycles
+    assert line.seen.tank_cycles - before == cycles
     line.now_ns += CYCLE_NS
     inbox.receive(line.frame(GOOD[SensorTank]), line.now_ns)
-    assert inbox.tank_cycles - before == cycles + 1
+    assert line.seen.tank_cycles - before == cycles + 1
 
 
 def test_only_what_the_catalogue_does_not_know_is_foreign() -> None:
@@ -544,42 +548,32 @@ BOTH = Redundancy(second_motion_sensor=True, hardwired_inputs=True)
 class RedundantLine(Line):
     """Two motion sensors and hard-wired inputs beside the rest."""
 
-    def __init__(self, gates: SpikeGates | None = None) -> None:
+    def __init__(self, thresholds: MonitorThresholds | None = None) -> None:
         super().__init__()
-        self.inbox = Inbox(CATALOGUE, VERSION, LEVEL_LIMIT_M, gates=gates, redundancy=BOTH)
+        self.inbox = Inbox(
+            CATALOGUE, VERSION, LEVEL_LIMIT_M, thresholds=thresholds, redundancy=BOTH
+        )
         self.second = CATALOGUE.transmitter(SensorMotion, Address.SENSORS_2)
         self.hardwired = CATALOGUE.transmitter(HardwiredInputs)
-
-    def motions(self) -> MotionSensors:
-        assert self.inbox.motions is not None
-        return self.inbox.motions
 
     def say_2(self, motion: SensorMotion) -> None:
         self.hear(self.second.frame(motion))
 
-    def shown(self) -> tuple[float, float, int]:
-        inbox = self.inbox
-        return inbox.roll_rad, inbox.roll_rate_rad_s, inbox.motion_ns
+    def shown(self, place: int) -> tuple[float, float, int]:
+        motion = self.seen.motions[place]
+        return motion.roll_rad, motion.roll_rate_rad_s, motion.heard_ns
 
 
-def test_of_two_motion_sensors_the_one_in_use_is_shown_and_both_are_kept() -> None:
+def test_each_of_two_motion_sensors_is_shown() -> None:
     line = RedundantLine()
-    inbox, motions = line.inbox, line.motions()
-    assert motions.used is motions.first
     line.say(SensorMotion(0.1, -0.05, Quality.GOOD))
-    first_ns, first = line.now_ns, line.shown()
-    assert first == (pytest.approx(0.1), pytest.approx(-0.05), first_ns)
+    first = line.shown(0)
+    assert first == (pytest.approx(0.1), pytest.approx(-0.05), line.now_ns)
     line.say_2(SensorMotion(0.2, 0.025, Quality.DEGRADED))
-    second_ns = line.now_ns
-    assert line.shown() == first
-    assert (motions.second.roll_rad, motions.second.heard_ns) == (pytest.approx(0.2), second_ns)
-    inbox.exchange_motion(motions)
-    assert line.shown() == (pytest.approx(0.2), pytest.approx(0.025), second_ns)
-    line.say(SensorMotion(0.3, 0.0, Quality.GOOD))
-    assert line.shown()[2] == second_ns
-    assert (motions.first.roll_rad, motions.first.heard_ns) == (pytest.approx(0.3), line.now_ns)
-    line.say_2(SensorMotion(0.4, -0.1, Quality.GOOD))
-    assert line.shown() == (pytest.approx(0.4), pytest.approx(-0.1), line.now_ns)
+    assert line.shown(0) == first
+    assert line.shown(1) == (pytest.approx(0.2), pytest.approx(0.025), line.now_ns)
+    line.now_ns += 5 * MS
+    assert line.seen.motions[1].age_ms == 5.0
 
 
 SPIKE = SensorMotion(0.6, -0.05, Quality.GOOD)
@@ -599,30 +593,29 @@ SPIKE = SensorMotion(0.6, -0.05, Quality.GOOD)
 def test_what_is_no_measurement_changes_neither_of_two_motion_sensors(
     wrong: SensorMotion, gated: bool, second: bool
 ) -> None:
-    line = RedundantLine(SpikeGates(THRESHOLDS) if gated else None)
-    say, sensor = line.say, line.motions().first
-    if second:
-        line.inbox.exchange_motion(line.motions())
-        say, sensor = line.say_2, line.motions().second
+    line = RedundantLine(THRESHOLDS if gated else None)
+    say = line.say_2 if second else line.say
     say(SensorMotion(0.1, -0.05, Quality.GOOD))
-    kept = (sensor.roll_rad, sensor.roll_rate_rad_s, sensor.heard_ns)
+    kept = line.shown(second)
     say(wrong)
-    assert (sensor.roll_rad, sensor.roll_rate_rad_s, sensor.heard_ns) == kept == line.shown()
+    assert line.shown(second) == kept
+    assert line.shown(not second) == (0.0, 0.0, NEVER_HEARD_NS)
 
 
 def test_each_of_two_motion_sensors_has_a_gate_of_its_own() -> None:
-    gates = SpikeGates(THRESHOLDS)
-    line = RedundantLine(gates)
+    line = RedundantLine(THRESHOLDS)
     for say in (line.say, line.say_2):
         say(SensorMotion(0.0, -0.05, Quality.GOOD))
     for times, say in ((1, line.say), (3, line.say_2)):
         for _ in range(times):
             say(SPIKE)
-    assert [gate.discarded for gate in gates.motions] == [1, 3]
-    assert gates.levels_discarded == 0
+    seen = line.seen
+    assert [motion.discarded for motion in seen.motions] == [1, 3]
+    assert seen.levels_discarded == 0
+    assert line.inbox.discarded == 4
 
 
-def test_the_stream_of_the_motion_sensor_in_use_counts_for_the_protection() -> None:
+def test_each_motion_sensor_s_stream_counts_for_its_own_protection() -> None:
     line = RedundantLine()
     for message in GOOD.values():
         line.say(message)
@@ -630,9 +623,8 @@ def test_the_stream_of_the_motion_sensor_in_use_counts_for_the_protection() -> N
     for _ in range(5):
         frame = line.second.frame(SensorMotion(0.0, 0.0, Quality.GOOD))
         line.hear(Frame(frame.can_id, frame.data[:-1] + bytes((frame.data[-1] ^ 1,))))
-    assert line.inbox.protection_valid
-    line.inbox.exchange_motion(line.motions())
-    assert not line.inbox.protection_valid
+    assert [motion.valid for motion in line.seen.motions] == [True, False]
+    assert line.protected
 
 
 def test_hard_wired_inputs_are_heard_and_their_stop_acts_out_of_sequence() -> None:
@@ -651,24 +643,20 @@ def test_redundant_nodes_have_to_match_and_the_second_sensor_may_be_missing() ->
     line = RedundantLine()
     for address in (Address.DRIVE, Address.SENSORS):
         line.beat(address, CATALOGUE.version, VERSION)
-    assert not line.inbox.versions_match
+    assert not line.seen.versions_match
     line.beat(Address.HARDWIRED, CATALOGUE.version, VERSION)
-    assert line.inbox.versions_match
+    assert line.seen.versions_match
     beats = CATALOGUE.transmitter(Heartbeat, Address.SENSORS_2)
     beat = Heartbeat(
         NodeState.OPERATIONAL, ResetCause.POWER_ON, 0.0, CATALOGUE.version, VERSION + 1, NAN, NAN
     )
     line.hear(beats.frame(beat))
-    strange_ns = line.inbox.second_strange_ns
-    assert strange_ns == line.now_ns
-    observer = Observer(line.inbox, 250_000, 20 * MS)
+    strange_ns = line.now_ns
     for after_ns, match in ((0, False), (10**9, False), (10**9 + 1, True)):  # silent since
-        observer.observe(strange_ns + after_ns, 0)
-        assert observer.seen.versions_match is match
+        assert line.inbox.snapshot(strange_ns + after_ns).versions_match is match
     line.hear(beats.frame(beat))
     line.hear(beats.frame(beat._replace(configuration_version=VERSION)))
-    observer.observe(line.now_ns, 0)
-    assert observer.seen.versions_match
+    assert line.seen.versions_match
     expected = {CATALOGUE.receiver(Heartbeat, address).can_id
                 for address in (Address.HARDWIRED, Address.SENSORS_2)}  # fmt: skip
     assert expected <= line.inbox.expected
@@ -679,4 +667,19 @@ def test_addresses_of_redundant_nodes_are_held_once_too(address: Address) -> Non
     line, claims = RedundantLine(), CATALOGUE.transmitter(AddressClaim, address)
     for name, second in ((5, False), (6, True)):
         line.hear(claims.frame(AddressClaim(name)))
-        assert (line.inbox.claimed_twice_ns == line.now_ns) is second
+        assert line.seen.claimed_twice is second
+
+
+def test_link_is_lost_for_a_command_cycle_after_an_error() -> None:
+    line = Line()
+    assert not line.seen.link_lost
+    line.inbox.link_error(line.now_ns, 20 * MS)
+    for after_ns, lost in ((0, True), (20 * MS, True), (20 * MS + 1, False)):
+        assert line.inbox.snapshot(line.now_ns + after_ns).link_lost is lost
+
+
+def test_a_second_sender_is_gone_after_ten_seconds() -> None:
+    line = Line()
+    line.hear(Frame(0x18FF7700 | Address.CONTROLLER, bytes(8)))
+    for after_ns, conflict in ((0, True), (10_000 * MS, True), (10_000 * MS + 1, False)):
+        assert line.inbox.snapshot(line.now_ns + after_ns).address_conflict is conflict

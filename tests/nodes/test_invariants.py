@@ -3,8 +3,8 @@
 A controller node with the emulated drive behind it, on a table. A walk, drawn from a seed, brings
 it into each phase, lets each fault and each order begin there and every other fault follow. Each
 tick is judged by the fault table and by the bench's own knowledge of what was ordered. What only
-monitors find, or a valve, a second sensor or hard-wired inputs have, is written into what the
-supervisor looks at: here are none of them to overwrite it. `utank-hil faults` has the real ones.
+monitors find, or a valve, a second sensor or hard-wired inputs have, is put into what is
+judged: here are none of them to say it. `utank-hil faults` has the real ones.
 """
 
 import hashlib
@@ -12,6 +12,7 @@ import math
 import random
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -36,8 +37,12 @@ from utank_hil.canbus import (
     SensorTank,
     Switch,
 )
+from utank_hil.canbus.measurements import Measurements
+from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
+from utank_hil.safety.judge import Judgement
 from utank_hil.safety.safety_limits import SafetyLimits
+from utank_hil.safety.situation import OwnState, Situation, ValveReport
 from utank_hil.safety.supervisor import DISARMED_ZERO_WITHIN_MS, Demand
 
 SEED = 1
@@ -72,6 +77,27 @@ class Table(ControllerBench):
         self._zero_by_ns = 1 << 62
         self.cuts = 0
         self.named: set[Fault] = set()
+        self.measured: dict[str, Any] = {}
+        self.own: dict[str, Any] = {}
+        self.found = 0
+        self.spare_age_ms = 0.0
+        safety = self.node.safety
+        judge, update = safety.judge, safety.supervisor.update
+
+        def judged(measured: Measurements, own: OwnState) -> Judgement:
+            return judge(replace(measured, **self.measured), replace(own, **self.own))
+
+        def updated(situation: Situation, standing: int) -> None:
+            if self.found or self.spare_age_ms:
+                situation = replace(
+                    situation, found=self.found, motion_spare_age_ms=self.spare_age_ms
+                )
+                standing = judging.standing(situation, SAFETY)
+            safety.situation = situation
+            update(situation, standing)
+
+        safety.judge = judged  # type: ignore[method-assign]
+        safety.supervisor.update = updated  # type: ignore[method-assign]
         self.began: Counter[Condition] = Counter()
 
     def order_is(self, **changes: object) -> None:
@@ -97,19 +123,19 @@ class Table(ControllerBench):
         self._judge(before_pa, mode)
 
     def _judge(self, before_pa: float, mode_before: Mode) -> None:
-        node, seen = self.node, self.node.seen
-        self.named |= node.alarms.codes | {node.fault}
+        node, seen = self.node, self.node.safety.situation
+        self.named |= node.safety.alarms.codes | {node.fault}
         pressure_pa, mode = node.command_pa, node.mode
         now_ns = self.now_ns - TICK_NS
         # 1: zero unless armed, fresh and within limits
         assert abs(pressure_pa) <= LIMITS.pressure_pa
         if pressure_pa:
             assert mode in (Mode.ACTIVE, Mode.PASSIVE, Mode.FAULT)
-            assert seen.motion_age_ms <= 250 + TICK_S * 1e3
+            assert seen.motion.age_ms <= 250 + TICK_S * 1e3
         if mode is Mode.ACTIVE:
             assert self.order.arm
             assert not self.order.stop
-            assert seen.motion_age_ms <= SAFETY.motion_age_ms
+            assert seen.motion.age_ms <= SAFETY.motion_age_ms
             assert not any(each.holds(seen, SAFETY) for each in RAMPING)
         # 2: at zero with whatever stops, in its time with what ramps, and no arming by itself
         if any(each.holds(seen, SAFETY) for each in STOPPING):
@@ -124,7 +150,7 @@ class Table(ControllerBench):
         step_pa = abs(pressure_pa - before_pa)
         if step_pa > LIMITS.rate_pa_s * TICK_S * (1 + 1e-9):
             assert pressure_pa == 0.0
-            assert node.supervisor.demand is Demand.ZERO
+            assert node.safety.supervisor.demand is Demand.ZERO
             self.cuts += 1
         # 4: the drive's own limiter never has to refuse
         assert self.drive.refused == 0
@@ -135,7 +161,7 @@ class Table(ControllerBench):
             self._zero_by_ns = now_ns + within_ms * MS
         if mode is Mode.FAULT:
             for each in RAMPING:
-                if each.holds(self.node.seen, SAFETY):
+                if each.holds(self.node.safety.situation, SAFETY):
                     by_ns = now_ns + each.zero_within_ms * MS
                     self._zero_by_ns = min(self._zero_by_ns, by_ns)
         if mode is Mode.ACTIVE:
@@ -146,7 +172,7 @@ class Table(ControllerBench):
     @property
     def phase(self) -> str:
         """Mode, and what is under way in it."""
-        supervisor = self.node.supervisor
+        supervisor = self.node.safety.supervisor
         if supervisor.arming:
             return "ARMING"
         if supervisor._reset_until_ns is not None:
@@ -179,16 +205,17 @@ def field(**values: object) -> tuple[Callable[[Table], None], Callable[[Table], 
     return lambda table: put(table, values), lambda table: put(table, well)
 
 
-def seen(**values: object) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
-    """What the supervisor looks at and nothing on this bench overwrites."""
+def judged(part: str, **values: object) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
+    """What is judged and nothing on this bench says: in the `part` measured or own."""
 
-    def put(table: Table, what: dict[str, Any]) -> None:
-        for name, value in what.items():
-            assert hasattr(table.node.seen, name)
-            setattr(table.node.seen, name, value)
+    def begin(table: Table) -> None:
+        getattr(table, part).update(values)
 
-    well = {name: getattr(Table(random.Random(0)).node.seen, name) for name in values}
-    return lambda table: put(table, values), lambda table: put(table, well)
+    def end(table: Table) -> None:
+        for name in values:
+            getattr(table, part).pop(name, None)
+
+    return begin, end
 
 
 def found(reaction: Reaction) -> tuple[Callable[[Table], None], Callable[[Table], None]]:
@@ -198,10 +225,10 @@ def found(reaction: Reaction) -> tuple[Callable[[Table], None], Callable[[Table]
     def begin(table: Table) -> None:
         its = min(known, key=table.began.__getitem__)
         table.began[its] += 1
-        table.node.seen.found |= table._draw.choice(list(its.findings)).value
+        table.found |= table._draw.choice(list(its.findings)).value
 
     def end(table: Table) -> None:
-        table.node.seen.found = 0
+        table.found = 0
 
     return begin, end
 
@@ -249,14 +276,14 @@ BEGIN_AND_END: dict[str, tuple[Callable[[Table], None], Callable[[Table], None]]
         lambda table: setattr(table.law, "answer_pa", 40e3),
     ),
     "drive warns": field(drive_warns=True),
-    "not commissioned": seen(commissioned=False),
-    "hard-wired stop": seen(hardwired_stop=True),
-    "hard-wired inputs silent": seen(hardwired_age_ms=1e3),
-    "spare sensor silent": seen(motion_spare_age_ms=1e3),
-    "valve silent": seen(valve_age_ms=1e3),
-    "valve fault": seen(valve_fault=True),
-    "valve elsewhere": seen(valve_off_ms=1e3),
-    "little stability": seen(gm_low=True),
+    "not commissioned": judged("own", commissioned=False),
+    "hard-wired stop": judged("measured", hardwired_stop=True),
+    "hard-wired inputs silent": judged("measured", hardwired_age_ms=1e3),
+    "spare sensor silent": field(spare_age_ms=1e3),
+    "valve silent": judged("own", valve=ValveReport(age_ms=1e3)),
+    "valve fault": judged("own", valve=ValveReport(fault=True)),
+    "valve elsewhere": judged("own", valve=ValveReport(off_ms=1e3)),
+    "little stability": judged("own", gm_low=True),
     "found, stops": found(Reaction.STOP),
     "found, ramps": found(Reaction.RAMP),
     "found, halves": found(Reaction.HALVE),
@@ -281,7 +308,7 @@ def restore(table: Table) -> None:
     table.law.answer_pa = table._draw.choice((-1, 1)) * table._draw.uniform(5e3, 60e3)
     table.order_is(mode_request=Mode.STANDBY, arm=False, stop=False, reset=False, acknowledge=False)
     if conflict:  # nor is waiting for it what is tried here
-        table.node.inbox.conflict_ns = -(1 << 62)
+        table.node.inbox._conflict_ns = -(1 << 62)
     table.run(2000 if flood else 120)  # the load is that of the last whole second
     for _ in range(4):
         table.order_is(reset=True)
@@ -289,7 +316,7 @@ def restore(table: Table) -> None:
         table.order_is(reset=False)
         table.run(20)
         if table.node.mode is Mode.STANDBY:
-            table.node.supervisor._rolled_over_ns = -(1 << 62)  # nor is this
+            table.node.safety.supervisor._rolled_over_ns = -(1 << 62)  # nor is this
             return
         table.run(600)
     raise AssertionError(f"no STANDBY: {table.node.mode} {table.node.fault}")

@@ -8,7 +8,7 @@ from controller_bench import VESSEL, ControllerBench, PlanningLaw
 
 from utank_hil.canbus import Mode, SensorMotion, SensorPump, SensorTank
 from utank_hil.control import DesignPlant
-from utank_hil.nodes.monitoring import Monitors
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
 
 START_NS = 7_000_000_123
@@ -45,7 +45,7 @@ def test_a_law_that_plans_may_use_as_much_as_it_has_watched_of_four_roll_periods
     monitors = watching()
     law = PlanningLaw()
     bench = ControllerBench(START_NS, law=law, monitors=monitors)
-    samples = round(4 * monitors.thresholds.roll_period_s / law.sample_time_s)
+    samples = round(4 * monitors.thresholds.tank_period_s / law.sample_time_s)
     sample_ms = round(1e3 * law.sample_time_s)
     bench.silent.update((SensorMotion, SensorTank))
     bench.run(20 * sample_ms)

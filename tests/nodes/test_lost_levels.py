@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import count
 
 import pytest
-from controller_bench import CATALOGUE, VESSEL, ControllerBench, ToyLaw
+from controller_bench import CATALOGUE, MS, VESSEL, ControllerBench, ToyLaw
 
 from utank_hil.base.tick import TICK_NS, TICK_S
 from utank_hil.canbus import Frame, Quality, SensorPump, SensorTank, Switch
@@ -135,7 +136,8 @@ def test_a_pressure_counts_for_a_tenth_of_a_second(
     bench.run(200)
     predicted: list[float] = []
     monkeypatch.setattr(type(bench.level), "predict", lambda _, each: predicted.append(each))
-    later_ns, inbox = bench.now_ns + 10**9, bench.node.inbox
-    inbox.pressure_pa, inbox.pump_ns = 7e3, later_ns - age_ns
-    bench.node._estimate(later_ns)
+    later_ns = bench.now_ns + 10**9
+    bench.node._estimate_level(
+        replace(bench.node.measured, now_ns=later_ns, pressure_pa=7e3, pump_age_ms=age_ns / MS)
+    )
     assert predicted == [pressure_pa]

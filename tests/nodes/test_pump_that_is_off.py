@@ -14,7 +14,7 @@ from utank_hil.canbus import (
     SensorPump,
 )
 from utank_hil.control import DesignPlant
-from utank_hil.nodes.monitoring import Monitors
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
 
 PRESSING = SensorPump(9e3, 0.0, Quality.GOOD)
@@ -34,7 +34,7 @@ def test_in_standby_it_raises_an_alarm_and_refuses_to_arm_while_it_lasts() -> No
     assert table.node.mode is Mode.STANDBY
     table.pump = PRESSING
     table.run(700)
-    assert CODE in table.node.alarms.codes
+    assert CODE in table.node.safety.alarms.codes
     assert table.word is ControlWord.DISABLE_VOLTAGE
     table.order_is(mode_request=Mode.ACTIVE, arm=True)
     table.run(400)
@@ -52,10 +52,10 @@ def test_it_raises_an_alarm_while_the_controller_still_waits_for_something_else(
     table.silent = {SensorMotion}
     table.run(START_MS)
     assert table.node.mode is Mode.INIT
-    assert CODE not in table.node.alarms.codes
+    assert CODE not in table.node.safety.alarms.codes
     table.pump = PRESSING
     table.run(700)
-    assert CODE in table.node.alarms.codes
+    assert CODE in table.node.safety.alarms.codes
 
 
 def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset() -> None:
@@ -67,18 +67,18 @@ def test_after_a_fault_it_is_a_second_one_and_keeps_the_first_from_being_reset()
     table.pump = PRESSING
     table.run(2000)
     assert (table.node.mode, table.node.fault) == (Mode.FAULT, Fault.DRIVE_FAULT)
-    assert CODE in table.node.alarms.codes
+    assert CODE in table.node.safety.alarms.codes
     table.drive_fault = DriveFault.NONE
     table.order_is(reset=True, arm=False)
     table.run(1000)
     assert table.node.mode is Mode.FAULT
-    assert table.node.supervisor.reset_refused_by is CODE
+    assert table.node.safety.supervisor.reset_refused_by is CODE
 
 
 def test_a_ship_without_a_pump_has_no_drive_that_stays_on() -> None:
     table = ControllerBench(pump=False)
     table.run(1500)
-    assert Fault.DRIVE_FAULT not in table.node.alarms.codes
+    assert Fault.DRIVE_FAULT not in table.node.safety.alarms.codes
 
 
 @pytest.mark.parametrize("state", [DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE])
@@ -89,11 +89,11 @@ def test_a_drive_that_no_quick_stop_takes_out_of_operation_is_told_to_be_off(
     table.drive_follows, table.drive_state = False, state
     table.run(100)
     assert table.word is ControlWord.QUICK_STOP
-    assert Fault.DRIVE_FAULT not in table.node.alarms.codes
+    assert Fault.DRIVE_FAULT not in table.node.safety.alarms.codes
     table.run(900)
     assert table.word is ControlWord.DISABLE_VOLTAGE
     # it does not hear that either: nobody can take its pressure away
-    assert Fault.DRIVE_FAULT in table.node.alarms.codes
+    assert Fault.DRIVE_FAULT in table.node.safety.alarms.codes
     table.order_is(mode_request=Mode.ACTIVE, arm=True)
     table.run(400)
     assert (table.node.mode, table.node.fault) == (Mode.STANDBY, Fault.DRIVE_FAULT)

@@ -100,7 +100,7 @@ def test_a_stop_that_is_held_at_the_other_station_keeps_the_one_in_command_from_
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
     for _ in range(100):
         bench.tick()
-        assert not bench.node.supervisor.arming
+        assert not bench.node.safety.supervisor.arming
         assert bench.node.mode is Mode.STANDBY
     bench.second_is(stop=False)
     bench.order_is(arm=False)

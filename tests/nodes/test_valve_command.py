@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +33,8 @@ from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.control.interface import PRESSURE, VALVE
 from utank_hil.dynamics.valves import Valve
-from utank_hil.nodes.monitoring import Monitors
 from utank_hil.nodes.valve_command import ValveCommander
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.thresholds import SensorFigures
 
 VESSEL = load_config(Path("configs/ships/thesis_first_valve.yaml"), Vessel)
@@ -196,7 +196,7 @@ def test_a_valve_that_has_not_been_heard_is_silent_and_not_at_fault() -> None:
     bench = ValveBench()
     bench.reports = False
     bench.run(500)
-    assert not bench.node.seen.valve_fault
+    assert not bench.node.measured.valve_fault
     assert bench.node.fault is Fault.VALVE_SILENT
 
 
@@ -334,7 +334,7 @@ def test_a_loss_that_is_no_number_ends_in_an_internal_fault() -> None:
     valve_law(bench).loss = math.nan
     bench.run(220)
     assert bench.node.fault is Fault.INTERNAL
-    assert bench.node.law_error == "its answer is a valve loss of nan"
+    assert bench.node.law.error == "its answer is a valve loss of nan"
     assert bench.control is ValveControl.FAIL_POSITION
 
 
@@ -351,7 +351,7 @@ def test_the_level_is_observed_with_what_the_valve_holds_back(
     bench = ValveBench()
     bench.pump = SensorPump(3e3, 0.0, Quality.GOOD)
     driven: list[float] = []
-    monkeypatch.setattr(bench.node._valve, "held_pa", lambda *_: 2e3)
+    monkeypatch.setattr(bench.node.actuators.valve, "held_pa", lambda *_: 2e3)
     monkeypatch.setattr(bench.level, "update", lambda level_m, pa, cycles: driven.append(pa))
     bench.run(100)
     assert set(driven) == {1e3}
@@ -362,24 +362,24 @@ def test_it_is_said_which_answer_was_no_number_and_of_several_the_first() -> Non
     valve_law(bench).answer_pa = math.inf
     bench.run(300)
     assert bench.node.fault is Fault.INTERNAL
-    assert bench.node.law_error == "its answer is inf Pa"
+    assert bench.node.law.error == "its answer is inf Pa"
     valve_law(bench).answer_pa, valve_law(bench).loss = 0.0, math.nan
     bench.run(300)
-    assert bench.node.law_error == "its answer is inf Pa"
+    assert bench.node.law.error == "its answer is inf Pa"
 
 
 def test_the_monitors_are_told_what_the_valve_holds_back(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = ValveBench()
     monitors = Monitors(DesignPlant(VESSEL.ship, TANK), 0.35, SensorFigures(), 250_000)
     held: list[float] = []
-    monkeypatch.setattr(monitors, "update", lambda *_, held_pa, **__: held.append(held_pa) or 0)
-    bench.node.monitors = monitors
+    monkeypatch.setattr(monitors, "update", lambda _, own, __: held.append(own.held_pa) or 0)
+    bench.node.safety.monitors = monitors
     bench.opening, bench.moves = 0.2, False
-    monkeypatch.setattr(bench.node, "_estimate", lambda _: None)
+    monkeypatch.setattr(bench.node, "_estimate_level", lambda _: None)
     bench.level.rate_m_s = 0.5
     bench.tick()
     commander = ValveCommander(DUCT, TANK, CATALOGUE, 0.05)
-    assert held == [commander.held_pa(bench.node.inbox, 0.5)]
+    assert held == [commander.held_pa(bench.node.measured, 0.5)]
     assert held[0] > 0.0
 
 
@@ -387,12 +387,13 @@ def test_a_valve_that_is_silent_is_not_one_that_does_not_follow() -> None:
     """Where it is by then nobody knows."""
     bench = ValveBench()
     bench.run(1000)
-    bench.node._valve._told = 0.0  # as if it had been commanded to shut
-    seen, inbox = bench.node.seen, bench.node.inbox
+    valve, measured = bench.node.actuators.valve, bench.node.measured
+    assert valve is not None
+    valve._told = 0.0  # as if it had been commanded to shut
     for late_ms in range(10, 2000, 10):
-        bench.node._valve.observe(inbox, seen, inbox.valve_ns + late_ms * 1_000_000)
-    assert seen.valve_age_ms > 1900
-    assert seen.valve_off_ms == 0.0
+        report = valve.observe(replace(measured, now_ns=measured.valve_ns + late_ms * 1_000_000))
+    assert report.age_ms > 1900
+    assert report.off_ms == 0.0
 
 
 @pytest.mark.parametrize("opening", [0.3, 0.6, 1.0])
@@ -404,8 +405,8 @@ def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
     bench.opening = opening
     for _ in range(100):
         bench.tick()
-        assert bench.node.seen.valve_off_ms == 0.0
-    assert bench.node.alarms.codes == set()
+        assert bench.node.safety.situation.own.valve.off_ms == 0.0
+    assert bench.node.safety.alarms.codes == set()
     # nor is one that reports later
     bench = ValveBench()
     bench.now_ns = bench.start_ns = 1000 * 1_000_000_000
@@ -414,10 +415,10 @@ def test_a_valve_that_stands_anywhere_when_the_controller_starts_is_no_fault(
     bench.opening, bench.reports = opening, True
     for _ in range(100):
         bench.tick()
-        assert bench.node.seen.valve_off_ms == 0.0
+        assert bench.node.safety.situation.own.valve.off_ms == 0.0
     # one that does not move is found
     bench = ValveBench()
     bench.opening, bench.moves = opening, False
     bench.run(1000)
-    off = bench.node.seen.valve_off_ms
+    off = bench.node.safety.situation.own.valve.off_ms
     assert off == 0.0 if opening == 1.0 else off > 300

@@ -14,7 +14,7 @@ from utank_hil.retuning import SimulatedRetuner
 
 config = load_config("configs/controllers/adaptive_gpc.yaml", ControllerConfig)
 node = build_controller_node(config, retuner=SimulatedRetuner(print, 1.0))
-assert node.retuning_events == ()
+assert node.law.events == ()
 print([name for name in ("matplotlib", "numba", "rerun", "control") if name in sys.modules])
 """
 

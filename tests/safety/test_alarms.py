@@ -225,7 +225,7 @@ def test_a_warning_of_the_drive_alarms_within_two_messages_and_changes_no_comman
     bench.drive_at(20e3)
     bench.drive_warns = True
     bench.run(200)
-    assert bench.node.alarms.codes == {Fault.DRIVE_WARNING}
+    assert bench.node.safety.alarms.codes == {Fault.DRIVE_WARNING}
     bench.run(1000)
     assert (bench.node.mode, bench.node.fault) == (Mode.ACTIVE, Fault.NONE)
     assert bench.node.command_pa == 20e3
@@ -257,7 +257,7 @@ def test_second_fault_while_the_first_is_latched_alarms_again(second: Fault) -> 
 def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
     told: list[AlarmEvent] = []
     bench = ControllerBench()
-    bench.node._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
+    bench.node.telemetry._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
     bench.tank = bench.tank._replace(port_high=Switch.ON)
     bench.run(400)
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
@@ -267,7 +267,7 @@ def test_refused_arming_and_refused_reset_are_told_with_their_reasons() -> None:
     bench = ControllerBench()
     told.clear()
     bench.drive_at(20e3)
-    bench.node._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
+    bench.node.telemetry._event_sink = lambda event, _: told.append(event)  # type: ignore[arg-type]
     bench.drive_fault = DriveFault.STALL
     bench.run(300)
     bench.order_is(reset=True)
@@ -328,7 +328,7 @@ class Told(ControllerBench):
     def accept(self) -> None:
         self.order_is(acknowledge=True)
         self.run(200)
-        assert not self.node.alarms.unaccepted
+        assert not self.node.safety.alarms.unaccepted
         self.order_is(acknowledge=False)
         self.told.clear()
 
@@ -376,7 +376,7 @@ def test_a_bus_that_was_off_for_a_moment_alarms_and_the_drive_stays_off(
     bench.run(300)
     assert [(event.code, event.state) for event in bench.told] == [(Fault.BUS_LOST, ACTIVE)]
     assert bench.node.mode is Mode.STANDBY
-    assert not bench.node.supervisor.drive_wanted
+    assert not bench.node.safety.supervisor.drive_wanted
 
 
 def test_a_second_trip_by_the_same_fault_alarms_though_the_first_is_accepted() -> None:
@@ -502,12 +502,12 @@ def test_what_is_latched_and_reset_between_two_statuses_alarms() -> None:
 
 def test_what_refused_an_arming_is_an_alarm_as_long_as_it_would_refuse_another() -> None:
     bench = Told()
-    bench.node.seen.commissioned = False
+    bench.node.commissioned = False
     bench.run(400)
     bench.order_is(mode_request=Mode.ACTIVE, arm=True)
     bench.run(20_000)
     assert codes(bench) == {Fault.NOT_COMMISSIONED}
     assert [event.state for event in bench.told] == [ACTIVE]
-    bench.node.seen.commissioned = True
+    bench.node.commissioned = True
     bench.run(11_000)
     assert [event.state for event in bench.told] == [ACTIVE, RECTIFIED]

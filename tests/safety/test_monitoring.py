@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,42 +12,52 @@ from controller_bench import CATALOGUE, VERSION, VESSEL
 from monitors.moving_ship import MovingShip
 
 from utank_hil.base.tick import TICK_NS, TICK_S
-from utank_hil.canbus import Frame, Quality, SensorMotion, SensorTank, Switch
+from utank_hil.canbus import DriveState, Frame, Quality, SensorMotion, SensorTank, Switch
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import Vessel, load_config
 from utank_hil.control import DesignPlant
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.nodes.inbox import Inbox
-from utank_hil.nodes.monitoring import ROUND_TICKS, Monitors
 from utank_hil.retuning import ModelSummary, ShipFigures
+from utank_hil.safety.monitoring import ROUND_TICKS, Monitors
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.thresholds import SensorFigures
-from utank_hil.safety.observations import Observations
+from utank_hil.safety.situation import OwnState
 
-FRESH = dict.fromkeys(("motion_age_ms", "tank_age_ms", "pump_age_ms"), 0.0)
+OF_MOTION = ("roll_rad", "roll_rate_rad_s", "heard_ns")
 
 
 class Table:
-    """Monitors and inbox without a node."""
+    """Monitors and inbox without a node; `values` stand in for what was received."""
 
     def __init__(self, start_ns: int = 0) -> None:
         plant = DesignPlant(VESSEL.ship, VESSEL.tank)
         self.monitors = Monitors(plant, 0.35, SensorFigures(), 250_000)
-        self.inbox = Inbox(CATALOGUE, VERSION, gates=self.monitors.gates)
+        self.inbox = Inbox(CATALOGUE, VERSION, thresholds=self.monitors.thresholds)
+        self.values: dict[str, Any] = {}
         self.now_ns = start_ns
         self._motion = CATALOGUE.transmitter(SensorMotion)
         self._tank = CATALOGUE.transmitter(SensorTank)
 
-    def tick(self, seconds: float = TICK_S, **seen: object) -> int:
+    def measured(self, motion_age_ms: float = 0.0, **changes: Any) -> Measurements:
+        """What is measured, everything just now."""
+        values = {"tank_age_ms": 0.0, "pump_age_ms": 0.0, **self.values, **changes}
+        motion = {name: values.pop(name) for name in OF_MOTION if name in values}
+        seen = self.inbox.snapshot(self.now_ns)
+        sample = replace(seen.motions[0], age_ms=motion_age_ms, **motion)
+        seen = replace(seen, motions=(sample,), **values)
+        return replace(seen, level_m=(seen.starboard_level_m - seen.port_level_m) / 2)
+
+    @property
+    def roll_rad(self) -> float:
+        return self.measured().motions[0].roll_rad
+
+    def tick(self, seconds: float = TICK_S, command_pa: float = 0.0, **changes: Any) -> int:
         found = 0
         for _ in range(round(seconds / TICK_S)):
             self.now_ns += TICK_NS
-            found = self.monitors.update(
-                self.now_ns,
-                self.inbox,
-                Observations(**{**FRESH, **seen}),  # type: ignore[arg-type]
-                0.0,
-                excused=False,
-            )
+            measured = self.measured(**changes)
+            found = self.monitors.update(measured, OwnState(command_pa=command_pa))
         return found
 
     def say_roll(self, roll_rad: float, rate_rad_s: float = 0.0) -> None:
@@ -79,7 +90,7 @@ def test_spike_of_the_roll_never_reaches_the_law() -> None:
     for roll_rad in (0.01, 0.51, 0.011):
         table.say_roll(roll_rad)
         table.tick()
-        assert table.inbox.roll_rad == pytest.approx(0.01, abs=2e-3)
+        assert table.roll_rad == pytest.approx(0.01, abs=2e-3)
 
 
 def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
@@ -88,8 +99,8 @@ def test_spike_of_a_level_never_reaches_the_law_but_its_switch_does() -> None:
     table.tick()
     levels = SensorTank(3.0, 0.0, Switch.ON, Switch.OFF, Quality.GOOD)
     table.inbox.receive(table._tank.frame(levels), table.now_ns)
-    assert table.inbox.port_level_m == 0.0
-    assert table.inbox.high_level
+    assert table.measured().port_level_m == 0.0
+    assert table.measured().high_level
 
 
 def noisy_table(times: float) -> tuple[Table, int, int]:
@@ -100,7 +111,7 @@ def noisy_table(times: float) -> tuple[Table, int, int]:
         roll_rad, rate_rad_s = random.standard_normal(2) * (2e-4, 5e-4) * noise
         table.say_roll(roll_rad, rate_rad_s)
         found |= table.tick()
-    return table, found, table.monitors.gates.motions[0].discarded
+    return table, found, table.inbox.discarded
 
 
 def test_samples_that_noise_has_discarded_are_no_spikes() -> None:
@@ -131,7 +142,7 @@ def test_a_first_sample_that_waited_in_the_queue_is_no_drift(start_ns: int) -> N
             roll_rad -= 0.0059
         table.say_roll(roll_rad)
         found |= table.tick()
-    assert table.inbox.roll_rad == pytest.approx(0.0341, abs=1e-4)
+    assert table.roll_rad == pytest.approx(0.0341, abs=1e-4)
     assert found == 0
 
 
@@ -148,13 +159,16 @@ def moved(table: Table, ship: MovingShip, seconds: float, **seen: object) -> set
     """What is found of a ship in motion, her inbox filled by hand."""
     found = 0
     for _ in range(round(seconds / TICK_S)):
-        time_s, inbox = table.now_ns * 1e-9, table.inbox
-        inbox.roll_rad, inbox.pressure_pa = ship.roll_rad(time_s), ship.pressure_pa(time_s)
-        inbox.roll_rate_rad_s, inbox.motion_ns = ship.rate_rad_s(time_s), table.now_ns
-        inbox.starboard_level_m = level_m = ship.level_m(time_s)
-        inbox.port_level_m = -level_m
+        time_s = table.now_ns * 1e-9
+        roll_rad, pressure_pa = ship.roll_rad(time_s), ship.pressure_pa(time_s)
+        rate_rad_s, level_m = ship.rate_rad_s(time_s), ship.level_m(time_s)
+        table.values |= {
+            "roll_rad": roll_rad, "roll_rate_rad_s": rate_rad_s, "heard_ns": table.now_ns,
+            "pressure_pa": pressure_pa, "starboard_level_m": level_m, "port_level_m": -level_m,
+            "drive_state": DriveState.OPERATION_ENABLED,
+        }  # fmt: skip
         stale = {name: age(time_s) for name, age in seen.items() if callable(age)}
-        found |= table.tick(command_pa=inbox.pressure_pa, drive_enabled=True, **stale)
+        found |= table.tick(command_pa=pressure_pa, **stale)
     return set(Finding(found))
 
 
@@ -299,9 +313,10 @@ def test_the_equation_of_a_small_model_runs_at_its_pace() -> None:
     tank = replace(VESSEL.tank, width_m=0.57, height_m=0.163, lz_m=0.061)
     assert tank.natural_frequency_rad_s > math.pi
     monitors = Monitors(DesignPlant(VESSEL.ship, tank), 0.35, SensorFigures(), 250_000)
-    inbox, found = Inbox(CATALOGUE, VERSION, gates=monitors.gates), 0
+    table, found = Table(), 0
     for tick in range(1000):
-        found |= monitors.update(tick * TICK_NS, inbox, Observations(**FRESH), 0.0, excused=False)  # type: ignore[arg-type]
+        table.now_ns = tick * TICK_NS
+        found |= monitors.update(table.measured(), OwnState())
     assert monitors.equation.settled
     assert found == 0
 
@@ -323,8 +338,10 @@ def test_samples_that_are_lost_while_she_rolls_fast_are_no_drift(lost: int, phas
     found = 0
     for k in range(300):
         if not 200 + phase <= k < 200 + phase + lost:
-            table.inbox.roll_rad, table.inbox.motion_ns = 0.1 * TICK_S * k, table.now_ns
-            table.inbox.roll_rate_rad_s = 0.1
+            roll_rad = 0.1 * TICK_S * k
+            table.values = {
+                "roll_rad": roll_rad, "roll_rate_rad_s": 0.1, "heard_ns": table.now_ns,
+            }  # fmt: skip
         found |= table.tick()
     assert not found & (Finding.DRIFT | Finding.MOTION_SIGN | Finding.NOISE)
 
@@ -345,9 +362,10 @@ class Freezing(MovingShip):
 
 def test_samples_that_are_all_the_same_are_told_by_the_water_in_half_the_time() -> None:
     table, ship = Table(), Freezing(math.radians(1.0), 5e3)
-    gate, found = table.monitors.gates.motions[0], set()
+    sensor, found = table.inbox.motions[0], set()
     while not found and table.now_ns < 20e9:
-        gate.passes(table.inbox.roll_rad, table.inbox.roll_rate_rad_s, table.now_ns)
+        last = table.measured().motions[0]
+        sensor.take(SensorMotion(last.roll_rad, last.roll_rate_rad_s, Quality.GOOD), table.now_ns)
         found = moved(table, ship, TICK_S)
     assert found == {Finding.ROLL_STUCK}
     assert 1.0 <= table.now_ns * 1e-9 - 3 * math.pi / ship.w <= 2.3
@@ -356,10 +374,10 @@ def test_samples_that_are_all_the_same_are_told_by_the_water_in_half_the_time() 
 def test_a_gauge_that_stands_still_alone_is_found() -> None:
     table = Table()
     moved(table, ROLLING, 12.0)
-    inbox, found = table.inbox, 0
+    found = 0
     for _ in range(500):
         level_m = ROLLING.level_m(table.now_ns * 1e-9)
-        inbox.port_level_m, inbox.starboard_level_m = -0.05, level_m
+        table.values |= {"port_level_m": -0.05, "starboard_level_m": level_m}
         found |= table.tick()
     assert found & Finding.LEVEL_STUCK
 
@@ -397,8 +415,7 @@ def test_everything_is_looked_at_in_a_round() -> None:
     table.say_levels(0.5, 0.5)
     table.say_roll(0.0)
     table.tick(4 * ROUND_TICKS * TICK_S)
-    table.inbox.roll_rad = 0.1
-    table.inbox.foreign = 1000
+    table.values = {"roll_rad": 0.1, "foreign": 1000}
     found = table.tick(2 * ROUND_TICKS * TICK_S)
     for finding in (Finding.DRIFT, Finding.VOLUME, Finding.FLOOD):
         assert found & finding
@@ -429,7 +446,7 @@ def test_frames_of_no_node_are_counted_and_those_of_the_catalogue_are_not() -> N
 def test_twin_of_a_pump_at_rest_rolls_as_the_ship_does() -> None:
     table = Table()
     for k in range(6000):
-        table.inbox.roll_rad = 0.05 * np.sin(0.6 * TICK_S * k)
+        table.values["roll_rad"] = 0.05 * np.sin(0.6 * TICK_S * k)
         table.tick()
     twin = table.monitors.twin
     assert twin.rms_rad == pytest.approx(twin.ship_rms_rad, rel=1e-9)
@@ -463,8 +480,8 @@ def test_twin_of_a_pump_whose_pressure_sensor_is_silent_takes_the_command(
     heard, silent = Table(), Table()
     for k in range(3000):
         for table, last_pa, age_ms in ((heard, command_pa, 0.0), (silent, -10e3, 101.0)):
-            table.inbox.roll_rad = 0.05 * np.sin(0.6 * TICK_S * k)
-            table.inbox.pressure_pa = last_pa
+            table.values["roll_rad"] = 0.05 * np.sin(0.6 * TICK_S * k)
+            table.values["pressure_pa"] = last_pa
             table.tick(pump_age_ms=age_ms, command_pa=command_pa)
     assert silent.monitors.twin.roll_rad == heard.monitors.twin.roll_rad
     assert silent.monitors.twin.rms_rad == heard.monitors.twin.rms_rad
@@ -474,11 +491,11 @@ def test_a_roll_that_is_not_measured_any_more_is_not_compared() -> None:
     """What was compared before is kept: gaps now and then hide no law that loses."""
     table = Table()
     twin = table.monitors.twin
-    table.inbox.roll_rad = 0.05
+    table.values["roll_rad"] = 0.05
     table.tick(120.0)
     before = twin.ship_rms_rad, twin.share
     assert math.isfinite(twin.share)
-    table.inbox.roll_rad = -0.05
+    table.values["roll_rad"] = -0.05
     table.tick(5.0, motion_age_ms=101.0)
     assert (twin.ship_rms_rad, twin.share) == before
     table.tick(0.05, motion_age_ms=100.0)

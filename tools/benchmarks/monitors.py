@@ -28,6 +28,7 @@ from tools.printing import command_line, show
 from tools.studies.monitor_margins import controller_of
 from utank_hil.base.tick import TICK_NS
 from utank_hil.configuration import load_config
+from utank_hil.nodes.plausibility import LevelGates, MotionSensor
 from utank_hil.runners import Lockstep, SimulatedBus
 from utank_hil.runners.process_priority import real_time_scheduling
 from utank_hil.safety.monitors.drive import DriveFollowing, Saturation
@@ -35,7 +36,6 @@ from utank_hil.safety.monitors.level_stuck import GaugeStuck, LevelStuck
 from utank_hil.safety.monitors.motion import RollAgainstRate
 from utank_hil.safety.monitors.motion_watch import MotionWatch
 from utank_hil.safety.monitors.senders import Senders
-from utank_hil.safety.monitors.spikes import MotionGate, SpikeGates
 from utank_hil.safety.monitors.tank_equation import TankEquation
 from utank_hil.safety.monitors.volume import Volume
 from utank_hil.safety.passive_twin import PassiveTwin
@@ -57,8 +57,8 @@ class Empty:
 
 MONITORS: Final[dict[str, tuple[type, str]]] = {
     "passive twin": (PassiveTwin, "update"),
-    "motion samples: spikes, repetition": (MotionGate, "passes"),
-    "gauge samples: spikes, standstill": (SpikeGates, "levels_pass"),
+    "motion samples: spikes, repetition": (MotionSensor, "take"),
+    "gauge samples: spikes, standstill": (LevelGates, "passes"),
     "motion sensor in all": (MotionWatch, "update"),
     "roll against rate (part of it)": (RollAgainstRate, "update"),
     "senders": (Senders, "update"),

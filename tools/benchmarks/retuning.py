@@ -100,11 +100,11 @@ def turn(scenario: Scenario, statistics: LoopStatistics, *, retuning: bool) -> t
             loop.run(duration_ns=round(REAL_TIME_S * SECOND_NS))
     told = np.array(rows)
     steepest = np.abs(np.diff(told[:, 1])) / np.maximum(np.diff(told[:, 0]), 1e-9)
-    for event in node.retuning_events:
+    for event in node.law.events:
         print(
             f"{event.time_ns / SECOND_NS:8.2f} s", event.state.name, *event.reasons, file=sys.stderr
         )
-    swapped = any(event.state is RetuningState.TRIAL for event in node.retuning_events)
+    swapped = any(event.state is RetuningState.TRIAL for event in node.law.events)
     return swapped, float(steepest.max())
 
 

@@ -21,9 +21,10 @@ import time
 import warnings
 from collections import Counter, deque
 from collections.abc import Callable
+from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from cantools.database.can import Database
 
@@ -51,6 +52,11 @@ BURSTS = (2, 4, 6, 8, 4, 30)
 MOST_BURST = max(BURSTS)
 """Only with so many are the controller's own identifiers among them: they end all arming."""
 _POWERED = (Mode.ACTIVE, Mode.PASSIVE, Mode.FAULT)
+
+COUNTERS: Final = frozenset(
+    ("frames", "foreign", "_tank_lost", "_cycles", "_tank_due_ns", "receiver", "rejected")
+)
+"""Attributes of inbox and orders that a frame may change without being believed."""
 
 
 class FuzzError(AssertionError):
@@ -185,7 +191,7 @@ class Session:
         self.drive = side.drive
         self._counts, self._burst, self._hushed = counts, burst, hushed
         if hushed:
-            self.node.monitors = None
+            self.node.safety.monitors = None
         self._limit_pa = config.limits.pressure_pa
         self._draw = random.Random(seed)
         self._commands = load_catalogue().receiver(PumpCommand)
@@ -198,8 +204,12 @@ class Session:
         )
         self._lockstep = Lockstep([*side.nodes, self.node], trace=self._hear)
         inbox = self.node.inbox
-        hidden = {"frames", "foreign", "watched", "expected", "stations"}
-        self._shown = [name for name in vars(inbox) if name[0] != "_" and name not in hidden]
+        kept = (bool, int, float, Enum, type(None))
+        self._shown = [
+            name
+            for name, value in vars(inbox).items()
+            if name not in COUNTERS and isinstance(value, kept)
+        ]
 
     def _hear(self, now_ns: int, sender: str, frame: Frame) -> None:  # noqa: ARG002
         self._noise.heard.append(frame)
@@ -217,9 +227,11 @@ class Session:
     def _content(self) -> list[object]:
         """What the nodes hold that a frame may change."""
         inbox, drive = self.node.inbox, self.drive
-        content = [getattr(inbox, name) for name in self._shown]
+        content: list[object] = [getattr(inbox, name) for name in self._shown]
+        for sensor in inbox.motions:
+            content += (sensor.roll_rad, sensor.roll_rate_rad_s, sensor.heard_ns)
         for orders in inbox.stations.orders.values():
-            content += [value for name, value in vars(orders).items() if name != "receiver"]
+            content += [value for name, value in vars(orders).items() if name not in COUNTERS]
         states = drive._states
         content += (states.state, states.fault, drive._setpoint_pa, drive._echo,
                     drive._accepted_ns, drive._timeout_ns, drive.refused)  # fmt: skip
@@ -246,13 +258,13 @@ class Session:
         inbox = node.inbox
         whole = is_whole(frame)
         before = None if whole or _is_own(frame) else self._content()
-        counted = inbox.frames, inbox.foreign, inbox.conflict_ns, inbox.claimed_twice_ns
+        counted = inbox.frames, inbox.foreign, inbox._conflict_ns, inbox._claimed_twice_ns
         node.receive(frame, now_ns)
         self.drive.receive(frame, now_ns)
         if before is not None and self._content() != before:
             raise FuzzError(f"{frame} ({kind}) is not whole and changed what the nodes hold")
         if self._hushed:
-            inbox.frames, inbox.foreign, inbox.conflict_ns, inbox.claimed_twice_ns = counted
+            inbox.frames, inbox.foreign, inbox._conflict_ns, inbox._claimed_twice_ns = counted
         self._counts[kind] += 1
         self._counts["whole" if whole else "not whole"] += 1
         self._counts[f"in {node.mode.name}"] += 1

@@ -21,9 +21,9 @@ from utank_hil.base.tick import TICK_NS
 from utank_hil.canbus import Frame, Mode
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.nodes.controller import ControllerNode
-from utank_hil.nodes.monitoring import Monitors
 from utank_hil.retuning import SimulatedRetuner
 from utank_hil.runners import Lockstep, SimulatedBus
+from utank_hil.safety.monitoring import Monitors
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion_sign import MOST as SIGN_SUM
 from utank_hil.safety.monitors.tank_equation import STUCK_GAIN
@@ -58,8 +58,8 @@ class Onlooker:
     period_ns = LOOK_TICKS * TICK_NS
 
     def __init__(self, node: ControllerNode) -> None:
-        assert node.monitors is not None
-        self._node, self._monitors = node, node.monitors
+        assert node.safety.monitors is not None
+        self._node, self._monitors = node, node.safety.monitors
         self.largest: dict[str, float] = {}
         self.found_s: dict[str, float] = {}
 

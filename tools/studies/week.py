@@ -189,7 +189,7 @@ def sail(
         if lockstep.now_ns / SECOND_NS >= next_sample_s + sample_s:
             next_sample_s += sample_s
             samples.append(sample(timed, lockstep.now_ns / SECOND_NS / 3600))
-            for event in node.retuning_events[-50:]:
+            for event in node.law.events[-50:]:
                 counts[f"last 50 events: {event.state.name}"] += 1
     return samples, counts
 

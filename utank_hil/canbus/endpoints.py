@@ -81,22 +81,20 @@ class Receiver(Generic[T]):
         Frames so far, accepted or not.
     lost : int
         Frames missing by the counter.
-    changes : int
-        Accepted frames that said something new, as the one who takes them has counted.
     rejected : dict
         Number of rejected frames by `Rejection`.
     """
 
     __slots__ = (
         "_bucket", "_candidate", "_decode", "_expected", "_protected", "_run",
-        "can_id", "changes", "cycle_ns", "heard", "lost", "rejected", "valid",
+        "can_id", "cycle_ns", "heard", "lost", "rejected", "valid",
     )  # fmt: skip
 
     def __init__(self, codec: Codec[T]) -> None:
         self.can_id = codec.can_id
         self.cycle_ns = codec.cycle_ns
         self.valid = False
-        self.heard = self.lost = self.changes = 0
+        self.heard = self.lost = 0
         self.rejected = dict.fromkeys(Rejection, 0)
         self._decode = codec.decode
         self._protected = codec.protected

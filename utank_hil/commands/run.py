@@ -315,9 +315,9 @@ def _as_json(
         "mode": node.mode.name,
         "fault": node.fault.name,
         "not_commissioned": refused,
-        "law_error": node.law_error,
-        "fallbacks": node.fallbacks,
-        "retuning": [event.as_json(node.start_ns) for event in node.retuning_events],
+        "law_error": node.law.error,
+        "fallbacks": node.law.fallbacks,
+        "retuning": [event.as_json(node.start_ns) for event in node.law.events],
         "loop": statistics.summary(),
         "recording": None if recording is None else asdict(recording),
     }
@@ -325,7 +325,7 @@ def _as_json(
 
 def _code(node: ControllerNode) -> ExitCode:
     """The code with which ``run`` ends, by the controller's state after its last tick."""
-    if node.seen.link_lost or node.fault is Fault.BUS_LOST:
+    if node.measured.link_lost or node.fault is Fault.BUS_LOST:
         return ExitCode.BUS_LOST
     return ExitCode.FAULT if node.mode is Mode.FAULT else ExitCode.OK
 
@@ -339,14 +339,14 @@ def _print_summary(
     """What became of a run, for people."""
     console = Terminal()
     console.table(timing_table({name: statistics}))
-    for event in node.retuning_events:
+    for event in node.law.events:
         console.say(f"{(event.time_ns - node.start_ns) * 1e-9:8.1f} s {event_text(event)}")
     what = "waiting for" if node.mode is Mode.INIT else "fault"  # what INIT waits for is no fault
     console.say(f"ended in {node.mode.name}, {what} {fault_text(node.fault)}")
-    if node.law_error:
-        console.say(node.law_error, red="the law failed:")
-    if node.fallbacks:
-        console.say(f"{node.fallbacks} plans were not found in time; the one before went on")
+    if node.law.error:
+        console.say(node.law.error, red="the law failed:")
+    if node.law.fallbacks:
+        console.say(f"{node.law.fallbacks} plans were not found in time; the one before went on")
     if recording is not None:
         _tell(console, recording)
         if recording.file is not None and recording.error is None:

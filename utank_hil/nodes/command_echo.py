@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from utank_hil.nodes.orders import NEVER_HEARD_NS
+from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 MOST_BEHIND: Final = 3
 """Commands that may have left since the one that is echoed; one or two have, if all is well."""
@@ -27,19 +27,23 @@ class CommandEcho:
         When the last echo came that counts.
     """
 
-    __slots__ = ("_counter", "_sent", "heard_ns")
+    __slots__ = ("_counter", "_sent", "_status_ns", "heard_ns")
 
     def __init__(self, heard_ns: int = NEVER_HEARD_NS) -> None:
         self.heard_ns = heard_ns
         self._counter: int | None = None
         self._sent: int | None = None
+        self._status_ns = heard_ns
 
     def sent(self, counter: int) -> None:
         """Note the counter of the command that leaves."""
         self._sent = counter
 
     def heard(self, counter: int | None, now_ns: int) -> None:
-        """Take the counter in a status; None where there is none yet."""
+        """Take the counter in a status that came at `now_ns`; None where there is none yet."""
+        if now_ns == self._status_ns:  # the same status
+            return
+        self._status_ns = now_ns
         if counter is None or counter == self._counter or self._sent is None:
             return
         self._counter = counter

@@ -6,12 +6,11 @@ quality. Only an accepted frame of a healthy node says that it is shut.
 
 from typing import Final
 
-from utank_hil.canbus import Frame, HardwiredInputs, Quality, Receiver, Switch
-from utank_hil.nodes.orders import NEVER_HEARD_NS
+from utank_hil.canbus import Frame, HardwiredInputs, Receiver, Switch
+from utank_hil.nodes.plausibility import NEVER_HEARD_NS, USABLE
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _OFF: Final = Switch.OFF
-_USABLE: Final = (Quality.GOOD, Quality.DEGRADED)
 
 
 class HardwiredHeard:
@@ -25,8 +24,6 @@ class HardwiredHeard:
         When the last accepted frame of good quality came.
     stop : bool
         The stop loop is open or broken.
-    stop_heard : bool
-        It was, in a frame since the last look; the one who looks clears it.
     high_level : bool
         A switch is closed or broken.
     """
@@ -34,20 +31,26 @@ class HardwiredHeard:
     def __init__(self, receiver: Receiver[HardwiredInputs]) -> None:
         self.receiver = receiver
         self.heard_ns = NEVER_HEARD_NS
-        self.stop = self.stop_heard = self.high_level = False
+        self.stop = self._stop_heard = self.high_level = False
 
     def accept(self, frame: Frame) -> HardwiredInputs | None:
         """Return the message of a frame, None if it is rejected; hear its stop."""
         inputs = self.receiver.accept(frame)
         heard = inputs or self.receiver.intact(frame)
         if heard is not None and heard.stop_loop is not _OFF:
-            self.stop = self.stop_heard = True
+            self.stop = self._stop_heard = True
         return inputs
+
+    def take_stop(self) -> bool:
+        """Whether the stop loop is open or broken, or was in a frame since the last call."""
+        stop = self.stop or self._stop_heard
+        self._stop_heard = False
+        return stop
 
     def take(self, inputs: HardwiredInputs, now_ns: int) -> None:
         """Take an accepted message."""
         # a broken switch counts as closed
         self.high_level = not (inputs.port_high is _OFF and inputs.starboard_high is _OFF)
-        if inputs.quality in _USABLE:
+        if inputs.quality in USABLE:
             self.heard_ns = now_ns
             self.stop = inputs.stop_loop is not _OFF

@@ -20,7 +20,6 @@ from utank_hil.canbus import (
     Frame,
     HardwiredInputs,
     Heartbeat,
-    Quality,
     Receiver,
     SensorMotion,
     SensorPump,
@@ -31,32 +30,44 @@ from utank_hil.canbus import (
     ValveState,
     ValveStatus,
 )
-from utank_hil.nodes.command_echo import CommandEcho
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.nodes.hardwired import HardwiredHeard
-from utank_hil.nodes.motion_sensors import MotionSensor, MotionSensors
-from utank_hil.nodes.orders import NEVER_HEARD_NS
+from utank_hil.nodes.plausibility import (
+    MILLISECOND_NS,
+    NEVER_HEARD_NS,
+    USABLE,
+    LevelGates,
+    MotionSensor,
+)
 from utank_hil.nodes.redundancy import NO_REDUNDANCY, Redundancy
 from utank_hil.nodes.stations import ADDRESSES, Stations
-from utank_hil.safety.monitors.spikes import MotionGate, SpikeGates
-
-MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
-"""Attributes of the inbox that a law may measure."""
+from utank_hil.safety.monitors.senders import Heard
+from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
-_USABLE = (Quality.GOOD, Quality.DEGRADED)
-_OPEN = Switch.OFF
-_ENABLED = DriveState.OPERATION_ENABLED
+_OPEN: Final = Switch.OFF
+_ENABLED: Final = DriveState.OPERATION_ENABLED
+_DRIVE_FAULT: Final = DriveState.FAULT
+_DRIVE_BRAKES: Final = DriveState.FAULT_REACTION_ACTIVE
+_NO_DRIVE_FAULT: Final = DriveFault.NONE
+_VALVE_FOLLOWS: Final = ValveState.FOLLOWING
+_VALVE_FAULT: Final = ValveState.FAULT
+_NO_VALVE_FAULT: Final = ValveFault.NONE
 _OWN_ADDRESS: Final = int(Address.CONTROLLER)
 SOURCE_ADDRESS: Final = 0xFF
-"""Of an identifier, by SAE J1939-21."""
+"""Part of an identifier that is the sender's address, by SAE J1939-21."""
 
 LEVEL_MARGIN: Final = 1.1
-"""A level farther beyond full or empty than that, for gauges and sloshing, is no measurement."""
+"""Factor on full and empty beyond which a level is no measurement, for gauges and sloshing."""
 SUM_SHARE: Final = 0.5
-"""Nor are levels whose sum is more than this share of a full reservoir: the water stays."""
+"""Share of a full reservoir beyond which the sum of both levels is none: the water stays."""
+CONFLICT_NS: Final = 10_000_000_000
+"""Silence after which a second sender of an address counts as gone."""
+STRANGE_NS: Final = 1_000_000_000
+"""Silence after which a second motion sensor of another version counts as gone."""
 
 _ABSENT_NS: Final = 1 << 62
-"""Time at which what is not on board was last heard: it is never late."""
+"""Time of receipt of what is not on board: it is never late."""
 
 _M = TypeVar("_M", bound=tuple[Any, ...])
 _Accept = Callable[[Frame], tuple[Any, ...] | None]
@@ -66,62 +77,34 @@ _Handle = Callable[[Any, int], None]
 class Inbox:
     """Latest trusted content of every message the controller listens to.
 
+    Only the inbox writes its attributes; the others get the values of `snapshot`.
+
     Parameters
     ----------
     catalogue : Catalogue
     configuration_version : int
-        Of the controller, to compare with the others'.
+        Hash of the controller's configuration, to compare with the others'.
     level_limit_m : float
         Level at which a reservoir is full or empty; infinite if it is not known.
     pump, valve : bool
         Whether the ship has a pump, and a valve, to be heard.
-    gates : SpikeGates, optional
-        Through which samples of motion sensor and gauges pass.
+    thresholds : MonitorThresholds, optional
+        What no motion of ship and water exceeds; without them no sample is a spike.
     redundancy : Redundancy
-        What else the ship has.
 
     Attributes
     ----------
-    roll_rad, roll_rate_rad_s : float
-        Of the last good motion sample, received at `motion_ns`.
-    motions : MotionSensors or None
-        Where there are two motion sensors: both. The attributes above are those of the one in use.
+    motions : tuple of MotionSensor
+        The one or two motion sensors.
     hardwired : HardwiredHeard or None
-        Where there are hard-wired inputs.
-    port_level_m, starboard_level_m : float
-        Above still water, received at `tank_ns`, `tank_cycles` of the message after the first.
-    high_level : bool
-        A high-level switch is closed or broken.
-    pressure_pa : float
-        Measured across the pump, received at `pump_ns`.
-    drive_state, drive_fault : DriveState or None, DriveFault or None
-        Received at `drive_ns`. Without a pump the drive counts as enabled and is never late.
-    pump_echo, valve_echo : CommandEcho
-        Whether drive and valve get the commands in time.
-    drive_warns : bool
-        A warning bit was set in the last DRIVE_STATUS_2.
-    drive_held_back : bool
-        The drive says that its power or its speed is at the limit.
-    power_w : float
-        Electric power the drive takes.
-    valve_opening : float
-        As the valve last measured it, at `valve_ns`; 1, open, before and where there is none.
-    valve_state, valve_fault : ValveState or None, ValveFault or None
-        As the valve last reported.
+        Hard-wired inputs, where there are such.
+    gates : LevelGates or None
     stations : Stations
-        What the operators want.
-    second_strange_ns : int
-        When a second motion sensor of another version was last heard.
-    versions_match : bool
-        Drive, sensors and valve run the controller's catalogue and configuration.
-    conflict_ns : int
-        When somebody else last sent with the controller's address.
-    claimed_twice_ns : int
-        When a node last claimed another one's address: by another name than it was claimed before.
+        The operators' orders.
     frames, foreign : int
         Frames heard so far, good and bad, of any kind, and those that are none of the catalogue's.
-    watched : list of Receiver
-        Of every message that is heard.
+    watched : list of Heard
+        Counters of every message that is heard.
     expected : frozenset of int
         Identifiers of those whose silence is not judged by their age.
     """
@@ -134,34 +117,30 @@ class Inbox:
         *,
         pump: bool = True,
         valve: bool = False,
-        gates: SpikeGates | None = None,
+        thresholds: MonitorThresholds | None = None,
         redundancy: Redundancy = NO_REDUNDANCY,
     ) -> None:
         self._most_level_m = LEVEL_MARGIN * level_limit_m
         self._most_sum_m = SUM_SHARE * level_limit_m
         self._versions = (catalogue.version, configuration_version)
-        self._gates = gates
         self._known = catalogue.can_ids
-        self.watched: list[Receiver[Any]] = []
+        self.watched: list[Heard] = []
         self._subscriptions: dict[int, tuple[_Accept, _Handle]] = {}
-        self._motion = catalogue.receiver(SensorMotion)
-        self.motions: MotionSensors | None = None
-        if redundancy.second_motion_sensor:
-            second = catalogue.receiver(SensorMotion, Address.SENSORS_2)
-            self.motions = motions = MotionSensors(self._motion, second)
-            for index, sensor in enumerate((motions.first, motions.second)):
-                gate = None if gates is None else gates.motions[index]
-                on_motion = partial(self._on_either_motion, motions, sensor, gate)
-                self._subscribe(sensor.receiver, on_motion)
-        else:
-            self._subscribe(self._motion, self._on_motion)
+        # a second sensor that is silent is missed but not waited for
+        senders = [Address.SENSORS, Address.SENSORS_2][: 1 + redundancy.second_motion_sensor]
+        self.motions = tuple(
+            MotionSensor(catalogue.receiver(SensorMotion, sender), thresholds) for sender in senders
+        )
+        for sensor in self.motions:
+            self._subscribe(sensor.receiver, sensor.take)
+        self.gates = None if thresholds is None else LevelGates(thresholds)
         self._tank = self._subscribe(catalogue.receiver(SensorTank), self._on_tank)
-        self._drive_1: Receiver[DriveStatus1] | None = None
+        self._drive: Receiver[DriveStatus1] | None = None
         matched = [Address.SENSORS]
         if pump:
             matched.append(Address.DRIVE)
             self._subscribe(catalogue.receiver(SensorPump), self._on_pump)
-            self._drive_1 = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
+            self._drive = self._subscribe(catalogue.receiver(DriveStatus1), self._on_drive_1)
             self._subscribe(catalogue.receiver(DriveStatus2), self._on_drive_2)
         if valve:
             matched.append(Address.VALVE)
@@ -175,16 +154,15 @@ class Inbox:
         self.stations = Stations(catalogue)
         for orders in self.stations.orders.values():
             self._subscriptions[orders.can_id] = orders.accept, orders.obey
-            self.watched.append(orders.receiver)
-        if self.motions is not None:
-            matched.append(Address.SENSORS_2)
+            self.watched.append(orders)
+        matched += senders[1:]
         self._matching: dict[int, bool] = {}
         self._second_beat = 0
-        self.second_strange_ns = NEVER_HEARD_NS
+        self._strange_ns = NEVER_HEARD_NS
         for address in matched:
             heartbeat = catalogue.receiver(Heartbeat, address)
             self._matching[heartbeat.can_id] = False
-            if address is Address.SENSORS_2:  # silent, it is missed but not waited for
+            if address is Address.SENSORS_2:
                 self._second_beat = heartbeat.can_id
                 self._matching[heartbeat.can_id] = True
             self._subscribe(heartbeat, partial(self._on_heartbeat, heartbeat.can_id))
@@ -198,51 +176,112 @@ class Inbox:
             claims = catalogue.receiver(AddressClaim, address)
             on_claim = partial(self._on_claim, address, claims.can_id)
             self._subscriptions[claims.can_id] = claims.accept, on_claim
-        self.roll_rad = self.roll_rate_rad_s = 0.0
-        self.port_level_m = self.starboard_level_m = 0.0
-        self.pressure_pa = self.power_w = 0.0
-        self.drive_held_back = self.drive_warns = False
-        self.high_level = False
-        self.valve_opening = 1.0
-        self.valve_state: ValveState | None = None
-        self.valve_fault: ValveFault | None = ValveFault.NONE
-        self.valve_ns = NEVER_HEARD_NS
-        self.valve_echo = CommandEcho()
-        self.drive_state = None if pump else _ENABLED
-        self.drive_fault: DriveFault | None = DriveFault.NONE
-        self.versions_match = False
-        self.motion_ns = self.tank_ns = NEVER_HEARD_NS
-        self.pump_ns = self.drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
-        self.pump_echo = CommandEcho(self.pump_ns)
-        self.tank_cycles = self._cycles = self._tank_lost = 0
+        self._port_level_m = self._starboard_level_m = 0.0
+        self._pressure_pa = self._power_w = 0.0
+        self._drive_held_back = self._drive_warns = False
+        self._high_level = False
+        self._valve_opening = 1.0  # open, before it is known and where there is none
+        self._valve_state: ValveState | None = None
+        self._valve_fault: ValveFault | None = ValveFault.NONE
+        self._valve_ns = self._valve_heard_ns = NEVER_HEARD_NS
+        self._valve_echo: int | None = None
+        self._drive_state = None if pump else _ENABLED
+        self._drive_fault: DriveFault | None = DriveFault.NONE
+        self._drive_echo: int | None = None
+        self._versions_match = False
+        self._tank_ns = NEVER_HEARD_NS
+        self._pump_ns = self._drive_ns = NEVER_HEARD_NS if pump else _ABSENT_NS
+        self._tank_cycles = self._cycles = self._tank_lost = 0
         self._tank_due_ns = NEVER_HEARD_NS  # when the last frame was due by its counter
         self._tank_patience_ns = self._tank.cycle_ns * 3 // 2
-        self.conflict_ns = self.claimed_twice_ns = NEVER_HEARD_NS
+        self._conflict_ns = self._claimed_twice_ns = NEVER_HEARD_NS
+        self._link_lost_until_ns = NEVER_HEARD_NS
         self.frames = self.foreign = 0
 
-    @property
-    def level_m(self) -> float:
-        """Tank level, starboard up: half the difference of the two gauges."""
-        return (self.starboard_level_m - self.port_level_m) / 2
+    def snapshot(self, now_ns: int) -> Measurements:
+        """What is known at a tick; takes the operators' edges, which come once.
+
+        Parameters
+        ----------
+        now_ns : int
+            Time of the tick.
+        """
+        stations, gates, hardwired, drive = self.stations, self.gates, self.hardwired, self._drive
+        wishes = stations.take(now_ns)  # first of all: who is in command may change
+        motions = tuple([sensor.sample(now_ns) for sensor in self.motions])
+        port_m, starboard_m = self._port_level_m, self._starboard_level_m
+        drive_state, valve_state = self._drive_state, self._valve_state
+        high_level, stop, hardwired_age_ms = self._high_level, False, 0.0
+        if hardwired is not None:
+            high_level |= hardwired.high_level
+            stop = hardwired.take_stop()
+            hardwired_age_ms = (now_ns - hardwired.heard_ns) / MILLISECOND_NS
+        return Measurements(
+            *wishes,
+            now_ns,
+            stations.requested_mode,
+            (now_ns - stations.heard_ns) / MILLISECOND_NS,
+            self._panels_match[stations.in_command],
+            motions,
+            port_m,
+            starboard_m,
+            (starboard_m - port_m) / 2,
+            self._tank_ns,
+            self._tank_cycles,
+            (now_ns - self._tank_ns) / MILLISECOND_NS,
+            0 if gates is None else gates.discarded,
+            0 if gates is None else gates.port.still,
+            0 if gates is None else gates.starboard.still,
+            high_level,
+            self._pressure_pa,
+            (now_ns - self._pump_ns) / MILLISECOND_NS,
+            drive_state,
+            (now_ns - self._drive_ns) / MILLISECOND_NS,
+            self._drive_ns,
+            self._drive_echo,
+            drive_state is _DRIVE_FAULT
+            or drive_state is _DRIVE_BRAKES
+            or self._drive_fault is not _NO_DRIVE_FAULT,
+            self._drive_warns,
+            self._drive_held_back,
+            self._power_w,
+            self._valve_opening,
+            valve_state is _VALVE_FOLLOWS,
+            valve_state is _VALVE_FAULT or self._valve_fault is not _NO_VALVE_FAULT,
+            self._valve_ns,
+            self._valve_echo,
+            self._valve_heard_ns,
+            stop,
+            hardwired_age_ms,
+            self._versions_match and now_ns - self._strange_ns > STRANGE_NS,
+            self._tank.valid and (drive is None or drive.valid),
+            now_ns - self._conflict_ns <= CONFLICT_NS,
+            now_ns - self._claimed_twice_ns <= CONFLICT_NS,
+            now_ns <= self._link_lost_until_ns,
+            self.frames,
+            self.foreign,
+        )
 
     @property
-    def panel_matches(self) -> bool:
-        """Whether the station in command runs the controller's catalogue and configuration."""
-        return self._panels_match[self.stations.in_command]
-
-    @property
-    def protection_valid(self) -> bool:
-        """Whether the messages that control stands on keep arriving intact and in order."""
-        drive_valid = self._drive_1 is None or self._drive_1.valid
-        motions = self.motions
-        motion_valid = self._motion.valid if motions is None else motions.used.receiver.valid
-        return motion_valid and self._tank.valid and drive_valid
+    def discarded(self) -> int:
+        """Samples so far of motion sensors and gauges that were discarded as spikes."""
+        levels = 0 if self.gates is None else self.gates.discarded
+        return levels + sum(sensor.discarded for sensor in self.motions)
 
     def _subscribe(self, receiver: Receiver[_M], handle: Callable[[_M, int], None]) -> Receiver[_M]:
         """Hand the accepted messages of a receiver to `handle`, with the time they came."""
         self._subscriptions[receiver.can_id] = receiver.accept, handle
         self.watched.append(receiver)
         return receiver
+
+    def link_error(self, now_ns: int, period_ns: int) -> None:
+        """Take note that the bus could not be read or written; it counts as lost for a period."""
+        self._link_lost_until_ns = now_ns + period_ns
+
+    def other_frames(self, count: int) -> None:
+        """Take note of frames of other kinds on the bus."""
+        self.frames += count
+        self.foreign += count
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take one frame from the bus."""
@@ -254,63 +293,25 @@ class Inbox:
             if message is not None:
                 handle(message, now_ns)
         elif frame.can_id & SOURCE_ADDRESS == _OWN_ADDRESS:
-            self.conflict_ns = now_ns
+            self._conflict_ns = now_ns
         elif frame.can_id not in self._known:
             self.foreign += 1
-
-    def _on_motion(self, motion: SensorMotion, now_ns: int) -> None:
-        if motion.quality not in _USABLE:
-            return
-        # one test for both: the sum is NaN if either is not available
-        if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
-            self._gates is None
-            or self._gates.motions[0].passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
-        ):
-            self.roll_rad, self.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
-            self.motion_ns = now_ns
-
-    def _on_either_motion(
-        self,
-        motions: MotionSensors,
-        sensor: MotionSensor,
-        gate: MotionGate | None,
-        motion: SensorMotion,
-        now_ns: int,
-    ) -> None:
-        if motion.quality not in _USABLE:
-            return
-        if math.isfinite(motion.roll_rad + motion.roll_rate_rad_s) and (
-            gate is None or gate.passes(motion.roll_rad, motion.roll_rate_rad_s, now_ns)
-        ):
-            sensor.roll_rad, sensor.roll_rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
-            sensor.heard_ns = now_ns
-            if sensor is motions.used:
-                self._show_motion(sensor)
-
-    def _show_motion(self, sensor: MotionSensor) -> None:
-        self.roll_rad, self.roll_rate_rad_s = sensor.roll_rad, sensor.roll_rate_rad_s
-        self.motion_ns = sensor.heard_ns
-
-    def exchange_motion(self, motions: MotionSensors) -> None:
-        """Use the other of the two motion sensors from now on."""
-        motions.exchange()
-        self._show_motion(motions.used)
 
     def _on_tank(self, tank: SensorTank, now_ns: int) -> None:
         self._count_cycles(now_ns)
         # the switches count whatever the gauges say, and a broken switch counts as closed
-        self.high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
-        if tank.quality not in _USABLE:
+        self._high_level = not (tank.port_high is _OPEN and tank.starboard_high is _OPEN)
+        if tank.quality not in USABLE:
             return
         port_m, starboard_m = tank.port_level_m, tank.starboard_level_m
         # written so that NaN, not available, fails too; a reservoir fills as the other one empties
         if (
             abs(port_m - starboard_m) <= 2 * self._most_level_m
             and abs(port_m + starboard_m) <= self._most_sum_m
-            and (self._gates is None or self._gates.levels_pass(port_m, starboard_m, now_ns))
+            and (self.gates is None or self.gates.passes(port_m, starboard_m, now_ns))
         ):
-            self.port_level_m, self.starboard_level_m = port_m, starboard_m
-            self.tank_ns, self.tank_cycles = now_ns, self._cycles
+            self._port_level_m, self._starboard_level_m = port_m, starboard_m
+            self._tank_ns, self._tank_cycles = now_ns, self._cycles
 
     def _count_cycles(self, now_ns: int) -> None:
         """Count the cycles since the last frame; by its counter, since time of receipt jitters.
@@ -330,48 +331,48 @@ class Inbox:
         self._tank_due_ns = min(due_ns, now_ns)
 
     def _on_pump(self, pump: SensorPump, now_ns: int) -> None:
-        if pump.quality in _USABLE and math.isfinite(pump.pressure_pa):
-            self.pressure_pa = pump.pressure_pa
-            self.pump_ns = now_ns
+        if pump.quality in USABLE and math.isfinite(pump.pressure_pa):
+            self._pressure_pa = pump.pressure_pa
+            self._pump_ns = now_ns
 
     def _on_drive_1(self, status: DriveStatus1, now_ns: int) -> None:
         if status.state is None:  # as if the frame had not come
             return
-        self.drive_state = status.state
-        self.drive_held_back = status.power_limited or status.speed_limited
-        self.drive_ns = now_ns
-        self.pump_echo.heard(status.command_echo, now_ns)
+        self._drive_state = status.state
+        self._drive_held_back = status.power_limited or status.speed_limited
+        self._drive_ns = now_ns
+        self._drive_echo = status.command_echo
 
     def _on_drive_2(self, status: DriveStatus2, now_ns: int) -> None:  # noqa: ARG002
-        self.drive_fault = status.fault
-        self.drive_warns = (
+        self._drive_fault = status.fault
+        self._drive_warns = (
             status.temperature_warning
             or status.voltage_warning
             or status.command_warning
             or status.sensor_warning
         )
-        self.power_w = status.bus_voltage_v * status.current_a
+        self._power_w = status.bus_voltage_v * status.current_a
 
     def _on_valve(self, status: ValveStatus, now_ns: int) -> None:
-        self.valve_state = status.state
-        self.valve_fault = status.fault
+        self._valve_state = status.state
+        self._valve_fault = status.fault
         if math.isfinite(status.opening):
-            self.valve_opening, self.valve_ns = status.opening, now_ns
-        self.valve_echo.heard(status.command_echo, now_ns)
+            self._valve_opening, self._valve_heard_ns = status.opening, now_ns
+        self._valve_ns, self._valve_echo = now_ns, status.command_echo
 
     def _on_heartbeat(self, can_id: int, beat: Heartbeat, now_ns: int) -> None:
         versions = (beat.catalogue_version, beat.configuration_version)
         matches = versions == self._versions
         if can_id == self._second_beat:  # silent, it is not waited for
-            self.second_strange_ns = NEVER_HEARD_NS if matches else now_ns
+            self._strange_ns = NEVER_HEARD_NS if matches else now_ns
             return
         self._matching[can_id] = matches
-        self.versions_match = all(self._matching.values())
+        self._versions_match = all(self._matching.values())
 
     def _on_claim(self, address: int, can_id: int, claim: AddressClaim, now_ns: int) -> None:
         self.stations.started(address)
         if self._names.setdefault(can_id, claim.name) != claim.name:
-            self.claimed_twice_ns = now_ns
+            self._claimed_twice_ns = now_ns
             self._names[can_id] = claim.name  # of a device that was replaced
 
     def _on_panel_heartbeat(

@@ -5,35 +5,12 @@ frame, in or out of sequence: after a gap the first frames are not accepted, and
 wait for them, nor to be lost with them. What a frame says between two looks is kept for the next.
 """
 
-from typing import Final, NamedTuple
+from typing import Final
 
 from utank_hil.canbus import Frame, Mode, OperatorCommand, Receiver, RetuningOrder
 from utank_hil.canbus.endpoints import MAX_LOST, Rejection
-
-NEVER_HEARD_NS: Final = -(1 << 62)
-
-
-class Wishes(NamedTuple):
-    """What was ordered since the last look.
-
-    Attributes
-    ----------
-    armed : bool
-        The arm bit is set, and no frame since the last look disarmed.
-    stop : bool
-        The stop bit is set, or was in a frame since the last look.
-    arm_edge, reset_edge : bool
-        Rising edges since the last look.
-    passive_edge : bool
-        The mode asked for has changed to PASSIVE since the last look.
-    """
-
-    armed: bool
-    stop: bool
-    arm_edge: bool
-    reset_edge: bool
-    passive_edge: bool
-
+from utank_hil.canbus.measurements import Wishes
+from utank_hil.nodes.plausibility import NEVER_HEARD_NS
 
 _NOTHING: Final = RetuningOrder()
 _ACTIVE: Final = Mode.ACTIVE
@@ -63,6 +40,8 @@ class Orders:
         Latest accepted frame.
     heard_ns : int
         When it came.
+    changes : int
+        Accepted frames so far whose content was new: they come on top of the cycle's.
     news : bool
         Whether a frame has come since the last `take`.
     takes_command : bool
@@ -72,6 +51,9 @@ class Orders:
     def __init__(self, receiver: Receiver[OperatorCommand]) -> None:
         self.can_id = receiver.can_id
         self.receiver = receiver
+        self.cycle_ns = receiver.cycle_ns
+        self.rejected = receiver.rejected
+        self.changes = 0
         self._gap_ns = (MAX_LOST + 1) * receiver.cycle_ns
         self.requested_mode = Mode.STANDBY
         self.last: OperatorCommand | None = None
@@ -83,6 +65,17 @@ class Orders:
         self._retuning = _NOTHING
         self._accepted: list[int | None] = []
         self.news = self.takes_command = False
+        self._lasting = Wishes()  # without edges
+
+    @property
+    def heard(self) -> int:
+        """Accepted frames so far."""
+        return self.receiver.heard
+
+    @property
+    def lost(self) -> int:
+        """Frames so far that are missing by the counter."""
+        return self.receiver.lost
 
     def accept(self, frame: Frame) -> OperatorCommand | None:
         """Return the message of a frame, None if it is rejected; hear its stop or disarm."""
@@ -123,7 +116,7 @@ class Orders:
             undo or (order.undo and not before.undo),
             forbidden or order.forbid_retuning,
         )
-        self.receiver.changes += order != before
+        self.changes += order != before
         self.last, self.heard_ns = order, now_ns
         self.requested_mode = Mode.STANDBY if asked is None else asked
 
@@ -140,14 +133,18 @@ class Orders:
 
     def take(self) -> Wishes:
         """Return what was ordered since the last call."""
+        if not self.news:
+            return self._lasting
         last = self.last
+        armed, stop = last is not None and last.arm, last is not None and last.stop
         wishes = (
-            last is not None and last.arm and not self._disarm_heard,
-            self._stop_heard or (last is not None and last.stop),
+            armed and not self._disarm_heard,
+            self._stop_heard or stop,
             self._arm_edge,
             self._reset_edge,
             self._passive_edge,
         )
+        self._lasting = Wishes(armed, stop)
         self._stop_heard = self._disarm_heard = False
         self._arm_edge = self._reset_edge = self._passive_edge = False
         self.news = self.takes_command = False

@@ -1,31 +1,43 @@
-"""The telemetry signals: what the controller node shows of itself every tick."""
+"""The telemetry: what the controller node shows of itself, and to whom it is handed."""
 
 from collections.abc import Callable
+from operator import attrgetter
 from struct import Struct
-from typing import Any, Final
+from typing import Final
+
+import numpy as np
 
 from utank_hil.base.arrays import FloatArray
+from utank_hil.canbus.events import AlarmEvent, RetuningEvent
+from utank_hil.runners.statistics import LoopStatistics
 
-_SOURCES: Final = {
+_QUICK: Final = {
     "time_s": "time_s",
-    "roll_rad": "inbox.roll_rad",
-    "roll_rate_rad_s": "inbox.roll_rate_rad_s",
-    "port_level_m": "inbox.port_level_m",
-    "starboard_level_m": "inbox.starboard_level_m",
+    "roll_rad": "motion.roll_rad",
+    "roll_rate_rad_s": "motion.roll_rate_rad_s",
+    "port_level_m": "measured.port_level_m",
+    "starboard_level_m": "measured.starboard_level_m",
     "pressure_command_pa": "command_pa",
-    "pressure_actual_pa": "inbox.pressure_pa",
-    "pump_power_w": "inbox.power_w",
-    "valve_opening": "inbox.valve_opening",
-    "mode": "supervisor.mode",
+    "pressure_actual_pa": "measured.pressure_pa",
+    "pump_power_w": "measured.power_w",
+    "valve_opening": "measured.valve_opening",
+    "mode": "mode",
     "fault": "fault",
-    "wakeup_lateness_s": "statistics.lateness.recent_s",
-    "tick_duration_s": "statistics.duration.recent_s",
-    "twin_roll_rad": "twin_roll_rad",
-    "bus_load": "seen.bus_load",
-    "overruns": "statistics.overruns",
+    "wakeup_lateness_s": "telemetry.statistics.lateness.recent_s",
+    "tick_duration_s": "telemetry.statistics.duration.recent_s",
+    "twin_roll_rad": "safety.passive_roll_rad",
+}
+"""Each signal in SI units, its unit in its name, and the attribute of `ControllerNode` it shows.
+
+A new signal is one line here or in `_SLOW`. Its unit gives it its plot, see
+`utank_hil.telemetry.units`.
+"""
+_SLOW: Final = {
+    "bus_load": "safety.situation.bus_load",
+    "overruns": "telemetry.statistics.overruns",
     "retuning": "retuning_state",
-    "roll_rms_rad": "roll_rms_rad",
-    "twin_roll_rms_rad": "twin_roll_rms_rad",
+    "roll_rms_rad": "safety.roll_rms_rad",
+    "twin_roll_rms_rad": "safety.passive_roll_rms_rad",
     "sea_verdict": "estimated.of_sea",
     "significant_height_m": "estimated.hs_m",
     "peak_period_s": "estimated.tp_s",
@@ -39,36 +51,79 @@ _SOURCES: Final = {
     "gm_deviation_m": "estimated.gm_deviation_m",
     "ship_age_s": "estimated.ship_age_s",
 }
-"""Each signal in SI units, its unit in its name, and the attribute of `ControllerNode` it shows.
-
-A new signal is one line here. Its unit gives it its plot, see `utank_hil.telemetry.units`.
-"""
+"""Signals that change little within 100 ms, and are looked at no more often."""
 
 ROW_TICKS: Final = 5
-"""Of the controller's ticks, every fifth has a row: 20 Hz, ample for a ship."""
+"""Ticks of the controller from one row to the next: 20 Hz, ample for a ship."""
 
-SIGNALS: Final = tuple(_SOURCES)
+SIGNALS: Final = (*_QUICK, *_SLOW)
 """Columns of a telemetry row."""
 
-_SLOW: Final = SIGNALS.index("bus_load")
-"""From here on the signals change little within 100 ms, and are looked at no more often."""
+_quick: Final = attrgetter(*_QUICK.values())
+_slow: Final = attrgetter(*_SLOW.values())
+# packed at once: numpy would ask each value for its type first
+_put_quick: Final = Struct(f"{len(_QUICK)}d").pack_into
+_put_slow: Final = Struct(f"{len(_SLOW)}d").pack_into
+_SLOW_AT: Final = 8 * len(_QUICK)
 
-Put = Callable[[FloatArray, Any], None]
+RowSink = Callable[[FloatArray], None]
+EventSink = Callable[[RetuningEvent | AlarmEvent, int], None]
 
 
-def _part(columns: slice) -> Put:
-    """What puts the values of a node into their part of a row.
+class Telemetry:
+    """Takes what the controller shows: rows of numbers, and events.
 
-    Put by `struct`: numpy would ask each value for its type first. Written as source: to follow
-    the names at each tick would take twice as long.
+    Parameters
+    ----------
+    statistics : LoopStatistics, optional
+        Of the loop that drives the node; without any, in lockstep, all zero.
+    sink : callable, optional
+        Takes one telemetry row (columns `SIGNALS`); must copy it and not wait.
+    sink_every : int
+        Ticks from one row to the next; the first tick has one.
+    event_sink : callable, optional
+        Takes each event of retuning and alarms, with the time of the first tick, as it happens;
+        must not wait.
+
+    Attributes
+    ----------
+    statistics : LoopStatistics
     """
-    sources = list(_SOURCES.values())[columns]
-    values = ", ".join(f"node.{source}" for source in sources)
-    put = Struct(f"{len(sources)}d").pack_into
-    at = 8 * (columns.start or 0)
-    part: Put = eval(f"lambda row, node: put(row, {at}, {values})", {"put": put})
-    return part
 
+    def __init__(
+        self,
+        statistics: LoopStatistics | None = None,
+        sink: RowSink | None = None,
+        sink_every: int = 1,
+        event_sink: EventSink | None = None,
+    ) -> None:
+        self.statistics = statistics or LoopStatistics(real_time=True)
+        self._sink, self._sink_every = sink, sink_every
+        self._event_sink = event_sink
+        self._ticks_to_row = 0
+        self._slow_due = True
+        self._row = np.zeros(len(SIGNALS))
+        self._bytes = self._row.data.cast("B")
 
-put_quick: Final = _part(slice(_SLOW))
-put_slow: Final = _part(slice(_SLOW, None))
+    def tell(self, event: RetuningEvent | AlarmEvent, start_ns: int) -> None:
+        """Hand an event on."""
+        if self._event_sink is not None:
+            self._event_sink(event, start_ns)
+
+    def renew_slow(self) -> None:
+        """Look at the slow signals, too, for the next row."""
+        self._slow_due = True
+
+    def show(self, node: object) -> None:
+        """Hand a row of a `ControllerNode` to the sink when one is due, once a tick."""
+        if self._sink is None:
+            return
+        if self._ticks_to_row == 0:
+            self._ticks_to_row = self._sink_every
+            _put_quick(self._bytes, 0, *_quick(node))
+            if self._slow_due:
+                self._slow_due = False
+                _put_slow(self._bytes, _SLOW_AT, *_slow(node))
+            self._sink(self._row)
+            self.statistics.begin_row()
+        self._ticks_to_row -= 1

@@ -9,7 +9,8 @@ the arm bit set, or else it disarms. Alarms can be accepted at both, and retunin
 from typing import Final
 
 from utank_hil.canbus import Address, Catalogue, Mode, OperatorCommand, RetuningOrder, Station
-from utank_hil.nodes.orders import Orders, Wishes
+from utank_hil.canbus.measurements import Wishes
+from utank_hil.nodes.orders import Orders
 
 ADDRESSES: Final = {
     Station.OPERATOR: Address.OPERATOR,

@@ -3,26 +3,15 @@
 from typing import Final
 
 from utank_hil.base.tick import TICK_S
-from utank_hil.canbus import (
-    Catalogue,
-    Frame,
-    SensorTank,
-    ValveCommand,
-    ValveControl,
-    ValveFault,
-    ValveState,
-)
+from utank_hil.canbus import Catalogue, Frame, SensorTank, ValveCommand, ValveControl
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.dynamics.tank import Tank
 from utank_hil.dynamics.valves import Valve
+from utank_hil.nodes.command_echo import CommandEcho
 from utank_hil.nodes.drive_sequence import RESETS
-from utank_hil.nodes.inbox import Inbox
-from utank_hil.nodes.orders import NEVER_HEARD_NS
-from utank_hil.safety.observations import MILLISECOND_NS, VALVE_OFF, Observations
+from utank_hil.nodes.plausibility import MILLISECOND_NS, NEVER_HEARD_NS
+from utank_hil.safety.situation import VALVE_OFF, ValveReport
 
-# read once: in Python 3.11 a member costs eight times as much from its class as from here
-_FOLLOWING: Final = ValveState.FOLLOWING
-_FAULT: Final = ValveState.FAULT
-_NO_FAULT: Final = ValveFault.NONE
 STALE_MS: Final = 100.0
 """Where the valve stands is not known from an older report: VALVE_SILENT, and no more."""
 
@@ -56,22 +45,23 @@ class ValveCommander:
         self._resets_left = 0
         self._followed_ns = self._at_place_ns = 0
         self._heard = False
+        self._echo = CommandEcho()
 
     def ask(self, loss: float) -> None:
         """Take the loss that the law wants, in Pa per (m/s)^2 of dh/dt."""
         self._asked = self._valve.opening(self._tank, max(loss, 0.0))
 
-    def applied_loss(self, inbox: Inbox) -> float:
+    def applied_loss(self, measured: Measurements) -> float:
         """The loss of the valve as it stands."""
-        return self._valve.loss(self._tank, inbox.valve_opening)
+        return self._valve.loss(self._tank, measured.valve_opening)
 
-    def held_pa(self, inbox: Inbox, rate_m_s: float) -> float:
+    def held_pa(self, measured: Measurements, rate_m_s: float) -> float:
         """Pressure that the valve takes from water at a level rate, for the level's observer.
 
         It is that of the rate at the end of a gauge's cycle: a step with the rate at its beginning
         is unstable where a valve slows the water faster than that.
         """
-        damping_pa_s_m = self.applied_loss(inbox) * abs(rate_m_s)
+        damping_pa_s_m = self.applied_loss(measured) * abs(rate_m_s)
         slowed = 1.0 + damping_pa_s_m * self._level_period_s / self._inertia_pa_s2_m
         return damping_pa_s_m * rate_m_s / slowed
 
@@ -79,28 +69,33 @@ class ValveCommander:
         """Reset the valve's fault with the next commands; only ever on an operator's order."""
         self._resets_left = RESETS
 
-    def observe(self, inbox: Inbox, seen: Observations, now_ns: int) -> None:
-        """Set what concerns the valve in `seen`, once a tick."""
-        seen.valve_age_ms = (now_ns - inbox.valve_ns) / MILLISECOND_NS
-        seen.valve_echo_age_ms = (now_ns - inbox.valve_echo.heard_ns) / MILLISECOND_NS
-        seen.valve_fault = _reports_fault(inbox)
-        if not self._following or inbox.valve_state is _FOLLOWING:
+    def observe(self, measured: Measurements) -> ValveReport:
+        """Look at the valve, once a tick."""
+        now_ns, opening = measured.now_ns, measured.valve_opening
+        self._echo.heard(measured.valve_echo, measured.valve_ns)
+        if not self._following or measured.valve_following:
             self._followed_ns = now_ns
-        seen.valve_out_ms = (now_ns - self._followed_ns) / MILLISECOND_NS
         if not self._heard:  # it may stand anywhere at first, and runs from there
-            self._heard = inbox.valve_ns > NEVER_HEARD_NS
-            self._expected = inbox.valve_opening
+            self._heard = measured.valve_heard_ns > NEVER_HEARD_NS
+            self._expected = opening
         step = self._told - self._expected
         self._expected += min(max(step, -self._most_step), self._most_step)
-        unknown = seen.valve_age_ms > STALE_MS  # others judge that
-        if unknown or abs(inbox.valve_opening - self._expected) <= VALVE_OFF:
+        age_ms = (now_ns - measured.valve_heard_ns) / MILLISECOND_NS
+        unknown = age_ms > STALE_MS  # others judge that
+        if unknown or abs(opening - self._expected) <= VALVE_OFF:
             self._at_place_ns = now_ns
-        seen.valve_off_ms = (now_ns - self._at_place_ns) / MILLISECOND_NS
+        return ValveReport(
+            age_ms,
+            (now_ns - self._echo.heard_ns) / MILLISECOND_NS,
+            measured.valve_fault,
+            (now_ns - self._followed_ns) / MILLISECOND_NS,
+            (now_ns - self._at_place_ns) / MILLISECOND_NS,
+        )
 
-    def frame(self, inbox: Inbox, *, follow: bool) -> Frame:
-        """Return the next command."""
+    def frame(self, *, faulted: bool, follow: bool) -> Frame:
+        """Return the next command; `faulted` says whether the valve reports a fault."""
         control = ValveControl.FOLLOW if follow else ValveControl.FAIL_POSITION
-        if self._resets_left and _reports_fault(inbox):
+        if self._resets_left and faulted:
             control = ValveControl.RESET
             self._resets_left -= 1
         else:
@@ -108,9 +103,5 @@ class ValveCommander:
         self._following = control is ValveControl.FOLLOW
         self._told = self._asked if self._following else self._valve.fail_opening
         frame = self._sender.frame(ValveCommand(self._told, control, self._timeout_s))
-        inbox.valve_echo.sent(self._sender.counter)
+        self._echo.sent(self._sender.counter)
         return frame
-
-
-def _reports_fault(inbox: Inbox) -> bool:
-    return inbox.valve_state is _FAULT or inbox.valve_fault is not _NO_FAULT

@@ -22,8 +22,6 @@ from utank_hil.canbus import Alarm, AlarmState, Fault, Mode
 from utank_hil.canbus.events import AlarmEvent
 from utank_hil.safety import judging
 from utank_hil.safety.faults import FAULTS
-from utank_hil.safety.observations import Observations
-from utank_hil.safety.supervisor import Supervisor
 
 GONE_NS: Final = 10_000_000_000
 """A cause that comes back sooner, as with each roll, was never gone."""
@@ -158,32 +156,42 @@ class AlarmList:
 
 
 def active_faults(
-    supervisor: Supervisor, seen: Observations, law_fault: Fault
+    mode: Mode, fault: Fault, standing: int, law_fault: Fault
 ) -> dict[Fault, Gravity]:
     """Faults whose cause is there, or which are latched.
 
     What ends or halves the pressure counts in ACTIVE, and in FAULT, where it is a second fault;
     what cuts it at once counts everywhere, but in INIT of what is awaited the reason alone. Why
     arming was refused counts as long as it would be.
+
+    Parameters
+    ----------
+    mode, fault : Mode, Fault
+        Of the supervisor.
+    standing : int
+        Conditions that hold, see `judging.standing`.
+    law_fault : Fault
+        Limit on which the law ended, or NONE.
     """
-    mode, fault, limits = supervisor.mode, supervisor.fault, supervisor.limits
-    found = dict.fromkeys({law_fault, *judging.all_warning(seen, limits)}, Gravity.NOTHING)
+    found = dict.fromkeys({law_fault, *judging.faults(standing & judging.WARNING)}, Gravity.NOTHING)
     # in STANDBY it says why arming was refused, which may be some time ago
-    if mode is Mode.INIT or fault in judging.all_refusing(seen, limits):
+    refusing = standing & (judging.ENDING | judging.REFUSING)
+    if mode is Mode.INIT or fault in judging.faults(refusing):
         found[fault] = Gravity.NOTHING
     if mode in (Mode.ACTIVE, Mode.FAULT):
-        found |= dict.fromkeys(judging.all_halving(seen, limits), Gravity.HALVES)
-        found |= dict.fromkeys(judging.all_ending(seen, limits), Gravity.ENDS)
+        found |= dict.fromkeys(judging.faults(standing & judging.HALVING), Gravity.HALVES)
+        found |= dict.fromkeys(judging.faults(standing & judging.ENDING), Gravity.ENDS)
     else:
-        found |= dict.fromkeys(all_stopping(supervisor, seen), Gravity.ENDS)
+        found |= dict.fromkeys(stopping_faults(mode, standing), Gravity.ENDS)
     if mode is Mode.FAULT:
         found[fault] = Gravity.ENDS
     found.pop(Fault.NONE, None)
     return found
 
 
-def all_stopping(supervisor: Supervisor, seen: Observations) -> set[Fault]:
+def stopping_faults(mode: Mode, standing: int) -> set[Fault]:
     """What would stop the pump now, in INIT but for what is awaited."""
-    if supervisor.mode is Mode.INIT:
-        return judging.all_stopping_unawaited(seen, supervisor.limits)
-    return judging.all_stopping(seen, supervisor.limits)
+    stopping = standing & judging.STOPPING
+    if mode is Mode.INIT:
+        stopping &= ~judging.AWAITED
+    return judging.faults(stopping)

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from utank_hil.canbus.endpoints import BUCKET_LIMIT
 from utank_hil.canbus.enumerations import Address, Fault
 from utank_hil.safety.monitors.finding import Finding
-from utank_hil.safety.observations import VALVE_OFF, Observations
+from utank_hil.safety.situation import VALVE_OFF
 
 if TYPE_CHECKING:  # who prints the words of a fault needs no ship
     from utank_hil.safety.safety_limits import SafetyLimits
+    from utank_hil.safety.situation import Situation
 
 _NONE: Final = Finding(0)
 ROLL_CALM_S: Final = 10
 """Half the roll period of a ship that rolls slowly: from one greatest roll to the next."""
 
-Judgement: TypeAlias = "Callable[[Observations, SafetyLimits], bool]"
+Holds: TypeAlias = "Callable[[Situation, SafetyLimits], bool]"
 
 
 class Reaction(Enum):
@@ -61,15 +62,18 @@ class Condition:
         Those of the monitors any of which is this condition, if it is one of theirs.
     ends_passive : bool
         With `Reaction.STOP`: it ends PASSIVE, too, where the drive is enabled.
+    of_drive_that_should_be_on : bool
+        It counts only where the drive is to be in operation enabled.
     """
 
     reaction: Reaction
     limit: str
-    holds: Judgement
+    holds: Holds
     zero_within_ms: int = 1000
     awaited: int | None = None
     findings: Finding = _NONE
     ends_passive: bool = False
+    of_drive_that_should_be_on: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +128,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "the stop loop is open, broken or not available, in any intact frame",
-            lambda seen, _: seen.hardwired_stop,
+            lambda seen, _: seen.measured.hardwired_stop,
             ends_passive=True,
         ),
     ),
@@ -135,7 +139,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "last good frame older than {hardwired_age_ms:g} ms",
-            lambda seen, limits: seen.hardwired_age_ms > limits.hardwired_age_ms,
+            lambda seen, limits: seen.measured.hardwired_age_ms > limits.hardwired_age_ms,
             awaited=9,
         ),
     ),
@@ -146,7 +150,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "error on sending or receiving within the last command cycle",
-            lambda seen, _: seen.link_lost,
+            lambda seen, _: seen.measured.link_lost,
             awaited=1,
         ),
     ),
@@ -158,7 +162,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "an identifier of the controller was received within 10 s, whatever came with it",
-            lambda seen, _: seen.address_conflict,
+            lambda seen, _: seen.measured.address_conflict,
             awaited=2,
         ),
     ),
@@ -170,13 +174,13 @@ FAULTS: Final = (
             Reaction.STOP,
             "a version in the heartbeats of drive, sensors, valve or hard-wired inputs differs, or "
             "none was received",
-            lambda seen, _: not seen.versions_match,
+            lambda seen, _: not seen.measured.versions_match,
             awaited=8,
         ),
         Condition(
             Reaction.REFUSE,
             "a version in the panel's heartbeat differs, or none was received",
-            lambda seen, _: not seen.panel_matches,
+            lambda seen, _: not seen.measured.panel_matches,
         ),
     ),
     _row(
@@ -186,17 +190,20 @@ FAULTS: Final = (
         "off, cut its power (hard-wired stop, main switch).",
         Condition(
             Reaction.STOP,
-            "drive reports a fault, or is out of operation enabled for over "
-            "{drive_enabled_within_ms:g} ms, or from its third departure on (the count falls by "
-            "one each second)",
-            lambda seen, limits: (
-                seen.drive_fault or seen.drive_out_ms > limits.drive_enabled_within_ms
-            ),
+            "drive reports a fault",
+            lambda seen, _: seen.measured.drive_fault,
+        ),
+        Condition(
+            Reaction.STOP,
+            "drive out of operation enabled for over {drive_enabled_within_ms:g} ms, or from its "
+            "third departure on (the count falls by one each second)",
+            lambda seen, limits: seen.drive_out_ms > limits.drive_enabled_within_ms,
+            of_drive_that_should_be_on=True,
         ),
         Condition(
             Reaction.STOP,
             "still in operation, or braking, 0.2 s after *disable voltage*",
-            lambda seen, _: seen.drive_stays_on,
+            lambda seen, _: seen.own.drive_stays_on,
         ),
         Condition(
             Reaction.GIVE_UP,
@@ -215,7 +222,8 @@ FAULTS: Final = (
             "status older than {drive_age_ms:g} ms, or no new command echo, at most three commands "
             "behind, for over {echo_age_ms:g} ms",
             lambda seen, limits: (
-                seen.drive_age_ms > limits.drive_age_ms or seen.echo_age_ms > limits.echo_age_ms
+                seen.measured.drive_age_ms > limits.drive_age_ms
+                or seen.own.echo_age_ms > limits.echo_age_ms
             ),
             awaited=6,
         ),
@@ -243,8 +251,8 @@ FAULTS: Final = (
             "status older than {valve_age_ms:g} ms, or no new command echo, at most three commands "
             "behind, for over {valve_echo_age_ms:g} ms",
             lambda seen, limits: (
-                seen.valve_age_ms > limits.valve_age_ms
-                or seen.valve_echo_age_ms > limits.valve_echo_age_ms
+                seen.own.valve.age_ms > limits.valve_age_ms
+                or seen.own.valve.echo_age_ms > limits.valve_echo_age_ms
             ),
             awaited=7,
         ),
@@ -257,7 +265,7 @@ FAULTS: Final = (
             Reaction.STOP,
             "valve reports a fault, or is not following for over {valve_follows_within_ms:g} ms",
             lambda seen, limits: (
-                seen.valve_fault or seen.valve_out_ms > limits.valve_follows_within_ms
+                seen.own.valve.fault or seen.own.valve.out_ms > limits.valve_follows_within_ms
             ),
         ),
     ),
@@ -268,7 +276,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             f"more than {VALVE_OFF:.0%} of its way off for over {{valve_off_within_ms:g}} ms",
-            lambda seen, limits: seen.valve_off_ms > limits.valve_off_within_ms,
+            lambda seen, limits: seen.own.valve.off_ms > limits.valve_off_within_ms,
         ),
     ),
     _row(
@@ -278,7 +286,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "the law raises, or its answer is not finite",
-            lambda seen, _: seen.law_failed,
+            lambda seen, _: seen.own.law_failed,
         ),
     ),
     _row(
@@ -289,7 +297,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "a high-level switch is closed, broken or not available",
-            lambda seen, _: seen.high_level,
+            lambda seen, _: seen.measured.high_level,
         ),
         law_limit="level_m",
     ),
@@ -337,7 +345,7 @@ FAULTS: Final = (
         Condition(
             Reaction.STOP,
             "the address of another node was claimed under another name in the last 10 s",
-            lambda seen, _: seen.claimed_twice,
+            lambda seen, _: seen.measured.claimed_twice,
         ),
     ),
     _row(
@@ -358,7 +366,7 @@ FAULTS: Final = (
         Condition(
             Reaction.RAMP,
             "last good sample older than {motion_age_ms:g} ms",
-            lambda seen, limits: seen.motion_age_ms > limits.motion_age_ms,
+            lambda seen, limits: seen.motion.age_ms > limits.motion_age_ms,
             zero_within_ms=200,  # 250 after the sample, whose first 40 ms of age are allowed
             awaited=3,
         ),
@@ -390,13 +398,13 @@ FAULTS: Final = (
         Condition(
             Reaction.HALVE,
             "last good sample older than {tank_degraded_age_ms:g} ms",
-            lambda seen, limits: seen.tank_age_ms > limits.tank_degraded_age_ms,
+            lambda seen, limits: seen.measured.tank_age_ms > limits.tank_degraded_age_ms,
             awaited=4,
         ),
         Condition(
             Reaction.RAMP,
             "last good sample older than {tank_age_ms:g} ms",
-            lambda seen, limits: seen.tank_age_ms > limits.tank_age_ms,
+            lambda seen, limits: seen.measured.tank_age_ms > limits.tank_age_ms,
         ),
     ),
     _row(
@@ -406,12 +414,12 @@ FAULTS: Final = (
         Condition(
             Reaction.HALVE,
             "last good sample older than {pump_degraded_age_ms:g} ms",
-            lambda seen, limits: seen.pump_age_ms > limits.pump_degraded_age_ms,
+            lambda seen, limits: seen.measured.pump_age_ms > limits.pump_degraded_age_ms,
         ),
         Condition(
             Reaction.RAMP,
             "last good sample older than {pump_age_ms:g} ms",
-            lambda seen, limits: seen.pump_age_ms > limits.pump_age_ms,
+            lambda seen, limits: seen.measured.pump_age_ms > limits.pump_age_ms,
             awaited=5,
         ),
     ),
@@ -423,7 +431,7 @@ FAULTS: Final = (
         Condition(
             Reaction.RAMP,
             f"leaky bucket of rejected frames at {BUCKET_LIMIT}",
-            lambda seen, _: not seen.protection_valid,
+            lambda seen, _: not (seen.motion.valid and seen.measured.protection_valid),
         ),
         _found(Reaction.RAMP, "three frames a second with a wrong CRC or data ID", Finding.DAMAGED),
     ),
@@ -531,7 +539,7 @@ FAULTS: Final = (
             "roll over {roll_limit_rad:g} rad, or its mean over a minute over "
             "{heel_limit_rad:g} rad",
             lambda seen, limits: (
-                abs(seen.roll_rad) > limits.roll_limit_rad
+                abs(seen.motion.roll_rad) > limits.roll_limit_rad
                 or abs(seen.heel_rad) > limits.heel_limit_rad
             ),
         ),
@@ -552,7 +560,7 @@ FAULTS: Final = (
             Reaction.WARN,
             "interval of the estimated GM, two standard deviations, reaches below the vessel's "
             "least_gm_m, or no estimate for three intervals",
-            lambda seen, _: seen.gm_low,
+            lambda seen, _: seen.own.gm_low,
         ),
     ),
     _row(
@@ -563,7 +571,7 @@ FAULTS: Final = (
         Condition(
             Reaction.WARN,
             "a warning bit in the last DRIVE_STATUS_2",
-            lambda seen, _: seen.drive_warns,
+            lambda seen, _: seen.measured.drive_warns,
         ),
     ),
     _row(
@@ -613,7 +621,7 @@ FAULTS: Final = (
         Condition(
             Reaction.REFUSE,
             "no record of a passed commissioning with this vessel and these sensors",
-            lambda seen, _: not seen.commissioned,
+            lambda seen, _: not seen.own.commissioned,
         ),
     ),
     _row(
@@ -623,12 +631,12 @@ FAULTS: Final = (
         Condition(
             Reaction.REFUSE,
             "silent for over {panel_age_to_arm_ms:g} ms",
-            lambda seen, limits: seen.panel_age_ms > limits.panel_age_to_arm_ms,
+            lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_to_arm_ms,
         ),
         Condition(
             Reaction.RAMP,
             "silent for over {panel_age_armed_ms:g} ms",
-            lambda seen, limits: seen.panel_age_ms > limits.panel_age_armed_ms,
+            lambda seen, limits: seen.measured.panel_age_ms > limits.panel_age_armed_ms,
         ),
     ),
 )

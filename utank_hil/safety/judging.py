@@ -1,76 +1,119 @@
-"""The order in which the conditions of the fault table are judged."""
+"""Which conditions of the fault table hold, as one number: bit n is the table's n-th condition.
 
-from collections.abc import Callable
-from functools import reduce
-from operator import or_
+Each condition is judged once a tick, in `standing`. Supervisor and alarms read its answer by groups
+of conditions; among those with the same reaction the first of the table names the fault.
+"""
+
+from collections.abc import Iterable
 from typing import Final, TypeAlias
 
 from utank_hil.canbus.enumerations import Fault
 from utank_hil.safety.faults import FAULTS, Condition, Reaction
-from utank_hil.safety.observations import Observations
 from utank_hil.safety.safety_limits import SafetyLimits
+from utank_hil.safety.situation import Situation
 
 Coded: TypeAlias = tuple[Fault, Condition]
-First: TypeAlias = Callable[[Observations, SafetyLimits], Coded | None]
-"""Finds the first condition that holds."""
-All: TypeAlias = Callable[[Observations, SafetyLimits], set[Fault]]
-"""Finds the faults of all conditions that hold; slower, for now and then."""
 
-_ALL: Final = tuple((row.code, condition) for row in FAULTS for condition in row.conditions)
-
-
-def _with(reaction: Reaction) -> tuple[Coded, ...]:
-    return tuple(coded for coded in _ALL if coded[1].reaction is reaction)
-
-
-def _to_look_at(conditions: tuple[Coded, ...]) -> Callable[[Observations], tuple[Coded, ...]]:
-    """Leave out what monitors may find while they find none of it: nearly always, half of all."""
-    mask = int(reduce(or_, (condition.findings for _, condition in conditions)))
-    states = tuple(coded for coded in conditions if not coded[1].findings)
-    return lambda seen: conditions if seen.found & mask else states
+CONDITIONS: Final = tuple((row.code, condition) for row in FAULTS for condition in row.conditions)
+"""All conditions in the order of their bits."""
+_STATES: Final = tuple(
+    (1 << place, condition.holds)
+    for place, (_, condition) in enumerate(CONDITIONS)
+    if not condition.findings
+)
+_FINDINGS: Final = tuple(
+    (1 << place, int(condition.findings))
+    for place, (_, condition) in enumerate(CONDITIONS)
+    if condition.findings
+)
 
 
-def _first_of(conditions: tuple[Coded, ...]) -> First:
-    to_look_at = _to_look_at(conditions)
-
-    def first(seen: Observations, limits: SafetyLimits) -> Coded | None:
-        for coded in to_look_at(seen):
-            if coded[1].holds(seen, limits):
-                return coded
-        return None
-
-    return first
+def _bits(conditions: Iterable[Condition]) -> int:
+    chosen = list(conditions)
+    return sum(1 << place for place, (_, each) in enumerate(CONDITIONS) if each in chosen)
 
 
-def _all_of(conditions: tuple[Coded, ...]) -> All:
-    to_look_at = _to_look_at(conditions)
-    return lambda seen, limits: {
-        code for code, condition in to_look_at(seen) if condition.holds(seen, limits)
-    }
+def _with(reaction: Reaction) -> int:
+    return _bits(condition for _, condition in CONDITIONS if condition.reaction is reaction)
 
 
-_STOPPING: Final = _with(Reaction.STOP)
-_ENDING: Final = _STOPPING + _with(Reaction.RAMP)
 _AWAITED: Final = sorted(
-    (coded for coded in _ALL if coded[1].awaited is not None),
-    key=lambda coded: coded[1].awaited or 0,
+    (condition.awaited, 1 << place)
+    for place, (_, condition) in enumerate(CONDITIONS)
+    if condition.awaited is not None
+)
+_RAMPS: Final = sorted(
+    (condition.zero_within_ms, 1 << place)
+    for place, (_, condition) in enumerate(CONDITIONS)
+    if condition.reaction is Reaction.RAMP
 )
 
-first_stopping: Final = _first_of(_STOPPING)
-first_ending_passive: Final = _first_of(tuple(c for c in _STOPPING if c[1].ends_passive))
-first_ending: Final = _first_of(_ENDING)
-soonest_ramp: Final = _first_of(
-    tuple(sorted(_with(Reaction.RAMP), key=lambda coded: coded[1].zero_within_ms))
-)
-first_refusing: Final = _first_of(_ENDING + _with(Reaction.REFUSE))
-first_lasting: Final = _first_of(_ENDING + tuple(c for c in _AWAITED if c not in _ENDING))
-"""What keeps a fault from being reset."""
-first_giving_up: Final = _first_of(_with(Reaction.GIVE_UP))
-first_halving: Final = _first_of(_with(Reaction.HALVE))
-first_awaited: Final = _first_of(tuple(_AWAITED))
-all_stopping: Final = _all_of(_STOPPING)
-all_stopping_unawaited: Final = _all_of(tuple(c for c in _STOPPING if c[1].awaited is None))
-all_halving: Final = _all_of(_with(Reaction.HALVE))
-all_warning: Final = _all_of(_with(Reaction.WARN))
-all_refusing: Final = _all_of(_ENDING + _with(Reaction.REFUSE))
-all_ending: Final = _all_of(_ENDING)
+STOPPING: Final = _with(Reaction.STOP)
+RAMPING: Final = _with(Reaction.RAMP)
+ENDING: Final = STOPPING | RAMPING
+HALVING: Final = _with(Reaction.HALVE)
+REFUSING: Final = _with(Reaction.REFUSE)
+GIVING_UP: Final = _with(Reaction.GIVE_UP)
+WARNING: Final = _with(Reaction.WARN)
+AWAITED: Final = sum(bit for _, bit in _AWAITED)
+ENDING_PASSIVE: Final = STOPPING & _bits(each for _, each in CONDITIONS if each.ends_passive)
+DRIVE_OUT: Final = _bits(each for _, each in CONDITIONS if each.of_drive_that_should_be_on)
+"""What is no fault of a drive that is to be off."""
+
+
+def standing(situation: Situation, limits: SafetyLimits) -> int:
+    """Judge every condition of the table once; return the bits of those that hold."""
+    bits = 0
+    for bit, holds in _STATES:
+        if holds(situation, limits):
+            bits |= bit
+    found = situation.found
+    if found:
+        for bit, mask in _FINDINGS:
+            if found & mask:
+                bits |= bit
+    return bits
+
+
+def first(bits: int) -> Coded | None:
+    """The first condition of the table among these bits."""
+    return CONDITIONS[(bits & -bits).bit_length() - 1] if bits else None
+
+
+def first_ending(bits: int) -> Coded | None:
+    """What ends ACTIVE: what stops the pump goes before what lets the pressure fall."""
+    return first(bits & STOPPING or bits & RAMPING)
+
+
+def first_refusing(bits: int) -> Coded | None:
+    """What refuses arming."""
+    return first_ending(bits) or first(bits & REFUSING)
+
+
+def first_lasting(bits: int) -> Coded | None:
+    """What keeps a fault from being reset."""
+    return first_ending(bits) or first(bits & AWAITED)
+
+
+def first_awaited(bits: int) -> Coded | None:
+    """What the controller waits for in INIT, in the order in which it waits."""
+    if not bits & AWAITED:
+        return None
+    return next(first(bit) for _, bit in _AWAITED if bits & bit)
+
+
+def soonest_ramp(bits: int) -> Coded | None:
+    """What lets the pressure fall to zero in the shortest time."""
+    if not bits & RAMPING:
+        return None
+    return next(first(bit) for _, bit in _RAMPS if bits & bit)
+
+
+def faults(bits: int) -> set[Fault]:
+    """Faults of all these conditions."""
+    found = set()
+    while bits:
+        bit = bits & -bits
+        bits ^= bit
+        found.add(CONDITIONS[bit.bit_length() - 1][0])
+    return found

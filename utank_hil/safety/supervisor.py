@@ -8,17 +8,21 @@ ready, so neither a restart nor a fault is ever followed by pressure on its own.
 What counts as a fault, and what it does, is the table in `utank_hil.safety.faults`.
 """
 
+import math
 from enum import Enum
 from typing import Final
 
-from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.enumerations import DriveState, Fault, Mode
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.safety import judging
 from utank_hil.safety.faults import Condition, Reaction
-from utank_hil.safety.observations import MILLISECOND_NS, Observations
 from utank_hil.safety.safety_limits import SafetyLimits
+from utank_hil.safety.situation import MILLISECOND_NS, Situation
 
 # read once: in Python 3.11 a member costs eight times as much from its class as from here
 _ACTIVE: Final = Mode.ACTIVE
+_FAULT: Final = Mode.FAULT
+_ENABLED: Final = DriveState.OPERATION_ENABLED
 _NO_FAULT: Final = Fault.NONE
 DISARMED_ZERO_WITHIN_MS: Final = 1000
 """When the pressure is cut after disarming, even if the ramp has not come to its end."""
@@ -59,6 +63,11 @@ class Supervisor:
         What was latched in this tick, or refused arming in it; else NONE.
     reset_refused_by : Fault
         What lasts, in FAULT after a reset was refused; else NONE.
+    rolled_over_ms, drive_out_ms, arming_ms : float
+        Its timers, as `Situation` has them.
+    standing : int
+        Conditions that hold, bits of `judging.standing`; without those of a drive that is to be
+        off.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -69,6 +78,9 @@ class Supervisor:
         self.drive_wanted = False
         self.degraded = False
         self.raised = self.reset_refused_by = Fault.NONE
+        self.rolled_over_ms = math.inf
+        self.drive_out_ms = self.arming_ms = 0.0
+        self.standing = 0
         self._arming_since_ns: int | None = None
         self._reset_until_ns: int | None = None
         self._passive_until_ns = 0
@@ -82,135 +94,164 @@ class Supervisor:
         """Whether arming was accepted and the drive is being enabled."""
         return self._arming_since_ns is not None
 
-    def update(self, seen: Observations, now_ns: int) -> None:
-        """Take one tick's observations and set `mode`, `fault`, `demand` and `drive_wanted`."""
-        self.raised = _NO_FAULT
-        if abs(seen.roll_rad) > self.limits.roll_limit_rad:
+    def count(self, measured: Measurements, roll_rad: float, command_pa: float) -> None:
+        """Advance the timers, before the tick's conditions are judged.
+
+        Parameters
+        ----------
+        measured : Measurements
+        roll_rad : float
+            Of the motion sensor in use.
+        command_pa : float
+            Pressure last commanded.
+        """
+        now_ns = measured.now_ns
+        if abs(roll_rad) > self.limits.roll_limit_rad:
             self._rolled_over_ns = now_ns
+        self.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
+        since_ns = self._arming_since_ns
+        self.arming_ms = 0.0 if since_ns is None else (now_ns - since_ns) / MILLISECOND_NS
+        enabled = measured.drive_state is _ENABLED
+        if self.mode is _ACTIVE or (self.mode is _FAULT and self.demand is Demand.RAMP):
+            self._note_drive(now_ns, enabled=enabled)
+        elif self.mode is not _FAULT:
+            self.drive_out_ms = 0.0  # off, as it should be
+            if self.mode is Mode.PASSIVE:
+                # while the pressure falls, what ends ACTIVE ends this
+                if command_pa != 0.0 or now_ns >= self._enabling_until_ns:
+                    self._note_drive(now_ns, enabled=enabled)
+                else:  # it gets its time to get there
+                    self._begin_noting(now_ns)
+                    if enabled:
+                        self._enabling_until_ns = 0
+
+    def update(self, seen: Situation, standing: int) -> None:
+        """Take one tick's situation and set `mode`, `fault`, `demand` and `drive_wanted`.
+
+        Parameters
+        ----------
+        seen : Situation
+        standing : int
+            Conditions that hold in it, see `judging.standing`.
+        """
+        now_ns, measured = seen.measured.now_ns, seen.measured
+        self.raised = _NO_FAULT
+        self.standing = standing
         if self.mode is _ACTIVE:
-            self._while_active(seen, now_ns)
+            self._while_active(measured, now_ns)
             return
-        seen.rolled_over_ms = (now_ns - self._rolled_over_ns) / MILLISECOND_NS
         # asked for once, it is due until it is there, or something else is asked for, or it is old
-        if seen.passive_edge:
+        if measured.passive_edge:
             self._passive_until_ns = now_ns + PASSIVE_WITHIN_NS
         asked = now_ns < self._passive_until_ns and self.mode is not Mode.PASSIVE
-        if not asked or seen.requested_mode is not Mode.PASSIVE or seen.stop:
+        if not asked or measured.requested_mode is not Mode.PASSIVE or measured.stop:
             self._passive_until_ns = 0
-        if self.mode is Mode.FAULT:
-            self._while_faulted(seen, now_ns)
+        if self.mode is _FAULT:
+            self._while_faulted(measured, now_ns)
         else:
-            self._while_disarmed(seen, now_ns)
+            self._while_disarmed(measured, now_ns, ramping=seen.own.command_pa != 0.0)
 
-    def _while_active(self, seen: Observations, now_ns: int) -> None:
-        self._note_drive(seen, now_ns)
-        self.degraded = judging.first_halving(seen, self.limits) is not None
-        found = judging.first_ending(seen, self.limits)
+    def _while_active(self, measured: Measurements, now_ns: int) -> None:
+        self.degraded = self.standing & judging.HALVING != 0
+        found = judging.first_ending(self.standing)
         if found is not None:
-            self._latch(*found, seen, now_ns)
-        elif seen.stop:
+            self._latch(*found, now_ns, stop=measured.stop)
+        elif measured.stop:
             self._disarm(Mode.STANDBY)
-        elif not seen.armed or seen.requested_mode is not _ACTIVE:
+        elif not measured.armed or measured.requested_mode is not _ACTIVE:
             # through PASSIVE even on the way to STANDBY: there the pressure ramps down
             self._disarm(Mode.PASSIVE)
             self._zero_at_ns = now_ns + DISARMED_ZERO_WITHIN_MS * MILLISECOND_NS
 
-    def _while_faulted(self, seen: Observations, now_ns: int) -> None:
+    def _while_faulted(self, measured: Measurements, now_ns: int) -> None:
         if self.demand is Demand.RAMP:
-            self._note_drive(seen, now_ns)
-            self._ramp(seen, now_ns)
-            if now_ns >= self._zero_at_ns or seen.stop or judging.first_stopping(seen, self.limits):
+            self._ramp(now_ns)
+            if now_ns >= self._zero_at_ns or measured.stop or self.standing & judging.STOPPING:
                 self.demand = Demand.ZERO
                 self.drive_wanted = False
-        if seen.reset_edge:
+        if measured.reset_edge:
             ramping = self.demand is Demand.RAMP
             self.reset_refused_by = self.fault if ramping else _NO_FAULT
             if not ramping:
                 self._reset_until_ns = now_ns + RESET_WITHIN_MS * MILLISECOND_NS
         if self._reset_until_ns is not None:
-            self._continue_reset(seen, now_ns, self._reset_until_ns)
+            self._continue_reset(now_ns, self._reset_until_ns)
 
-    def _continue_reset(self, seen: Observations, now_ns: int, until_ns: int) -> None:
-        seen.drive_out_ms = 0.0  # off, as it should be
-        lasts = judging.first_lasting(seen, self.limits)
+    def _continue_reset(self, now_ns: int, until_ns: int) -> None:
+        self._excuse_drive()
+        lasts = judging.first_lasting(self.standing)
         if lasts is None:
             self._disarm(Mode.STANDBY)
         elif now_ns >= until_ns:
             self._reset_until_ns = None
             self.reset_refused_by = lasts[0]
 
-    def _while_disarmed(self, seen: Observations, now_ns: int) -> None:
-        ramping = seen.command_pa != 0.0
-        seen.drive_out_ms = 0.0  # off, as it should be
+    def _while_disarmed(self, measured: Measurements, now_ns: int, *, ramping: bool) -> None:
         if self.mode is Mode.PASSIVE:
             if ramping:
                 # so what ends ACTIVE ends this
-                self._note_drive(seen, now_ns)
-                found = judging.first_ending(seen, self.limits)
+                found = judging.first_ending(self.standing)
                 if now_ns >= self._zero_at_ns:
                     self.demand = Demand.ZERO
             else:
-                self._note_passive_drive(seen, now_ns)
-                found = judging.first_ending_passive(seen, self.limits)
+                found = judging.first(self.standing & judging.ENDING_PASSIVE)
             if found is not None:
-                self._latch(*found, seen, now_ns)
+                self._latch(*found, now_ns, stop=measured.stop)
                 return
         # INIT cuts the pressure: what would not end ACTIVE waits for the end of the ramp
-        missing = None if ramping else judging.first_awaited(seen, self.limits)
+        missing = None if ramping else judging.first_awaited(self.standing)
         if missing is not None:
             self._disarm(Mode.INIT, missing[0])
             return
-        if seen.stop:
+        if measured.stop:
             self._disarm(Mode.STANDBY)
             return
         if self.mode is Mode.INIT:
             self._disarm(Mode.STANDBY)
-        if self._arming_since_ns is not None:
-            self._continue_arming(seen, now_ns, self._arming_since_ns)
-        elif seen.requested_mode is Mode.ACTIVE and seen.arm_edge and seen.armed:
-            self._begin_arming(seen, now_ns)
-        elif seen.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
+        if self.arming:
+            self._continue_arming(measured, now_ns, ramping=ramping)
+        elif measured.requested_mode is _ACTIVE and measured.arm_edge and measured.armed:
+            self._begin_arming(now_ns)
+        elif measured.requested_mode is Mode.STANDBY and self.mode is Mode.PASSIVE:
             if not ramping:
                 self._disarm(Mode.STANDBY)
         # an old order says nothing of now
-        elif self._passive_until_ns and seen.panel_age_ms <= self.limits.panel_age_to_arm_ms:
+        elif self._passive_until_ns and measured.panel_age_ms <= self.limits.panel_age_to_arm_ms:
             self._disarm(Mode.PASSIVE)
             within_ms = self.limits.arming_timeout_ms
             self._enabling_until_ns = now_ns + round(within_ms * MILLISECOND_NS)
 
-    def _begin_arming(self, seen: Observations, now_ns: int) -> None:
-        seen.drive_out_ms = 0.0  # off, as it should be
-        refusal = judging.first_refusing(seen, self.limits)
+    def _begin_arming(self, now_ns: int) -> None:
+        self._excuse_drive()
+        refusal = judging.first_refusing(self.standing)
         if refusal is not None:
             self.fault = self.raised = refusal[0]
         else:
             self._arming_since_ns = now_ns
             self.drive_wanted = True
 
-    def _continue_arming(self, seen: Observations, now_ns: int, since_ns: int) -> None:
-        seen.arming_ms = (now_ns - since_ns) / MILLISECOND_NS
-        if not seen.armed or seen.requested_mode is not Mode.ACTIVE:
-            self._end_arming(seen, _NO_FAULT)
-            return
+    def _continue_arming(self, measured: Measurements, now_ns: int, *, ramping: bool) -> None:
         # being out of operation enabled does not count yet; all else counts until ACTIVE
-        refusal = judging.first_refusing(seen, self.limits)
-        if refusal is not None:
-            self._end_arming(seen, refusal[0])
-        elif seen.drive_enabled:
+        refusal = judging.first_refusing(self.standing)
+        if not measured.armed or measured.requested_mode is not _ACTIVE:
+            self._end_arming(_NO_FAULT, ramping=ramping)
+        elif refusal is not None:
+            self._end_arming(refusal[0], ramping=ramping)
+        elif measured.drive_state is _ENABLED:
             self._arming_since_ns = None
             self._begin_noting(now_ns)
-            self.mode = Mode.ACTIVE
+            self.mode = _ACTIVE
             self.demand = Demand.CONTROL
             self.fault = Fault.NONE
             self._zero_at_ns = _NEVER_NS
         else:
-            found = judging.first_giving_up(seen, self.limits)
+            found = judging.first(self.standing & judging.GIVING_UP)
             if found is not None:
-                self._end_arming(seen, found[0])
+                self._end_arming(found[0], ramping=ramping)
 
-    def _end_arming(self, seen: Observations, fault: Fault) -> None:
+    def _end_arming(self, fault: Fault, *, ramping: bool) -> None:
         """Give arming up; a ramp that it began in goes on to its end."""
-        self._disarm(Mode.STANDBY if seen.command_pa == 0.0 else Mode.PASSIVE, fault)
+        self._disarm(Mode.PASSIVE if ramping else Mode.STANDBY, fault)
         self.raised = fault
 
     def _disarm(self, mode: Mode, fault: Fault = Fault.NONE) -> None:
@@ -223,38 +264,33 @@ class Supervisor:
         self.demand = Demand.RAMP if mode is Mode.PASSIVE else Demand.ZERO
         self._reset_until_ns = None
 
-    def _latch(self, fault: Fault, condition: Condition, seen: Observations, now_ns: int) -> None:
-        self.mode = Mode.FAULT
+    def _latch(self, fault: Fault, condition: Condition, now_ns: int, *, stop: bool) -> None:
+        self.mode = _FAULT
         self.fault = self.raised = fault
         self._arming_since_ns = None
-        stop = condition.reaction is Reaction.STOP or seen.stop
+        stop |= condition.reaction is Reaction.STOP
         self.demand = Demand.ZERO if stop else Demand.RAMP
         self.drive_wanted = not stop
-        self._ramp(seen, now_ns)
+        self._ramp(now_ns)
 
-    def _ramp(self, seen: Observations, now_ns: int) -> None:
+    def _ramp(self, now_ns: int) -> None:
         """Shorten the ramp to the earliest end that a condition asks for."""
-        found = judging.soonest_ramp(seen, self.limits)
+        found = judging.soonest_ramp(self.standing)
         if found is not None:
             zero_at_ns = now_ns + found[1].zero_within_ms * MILLISECOND_NS
             self._zero_at_ns = min(self._zero_at_ns, zero_at_ns)
 
-    def _note_passive_drive(self, seen: Observations, now_ns: int) -> None:
-        """Count how long it is out of operation enabled; it gets its time to get there."""
-        if now_ns < self._enabling_until_ns:
-            self._begin_noting(now_ns)
-            if seen.drive_enabled:
-                self._enabling_until_ns = 0
-        else:
-            self._note_drive(seen, now_ns)
+    def _excuse_drive(self) -> None:
+        """Leave out that the drive is off: it should be."""
+        self.drive_out_ms = 0.0
+        self.standing &= ~judging.DRIVE_OUT
 
     def _begin_noting(self, now_ns: int) -> None:
         self._drive_enabled_ns = self._noted_ns = now_ns
         self._was_enabled = True
         self._departures = 0.0
 
-    def _note_drive(self, seen: Observations, now_ns: int) -> None:
-        enabled = seen.drive_enabled
+    def _note_drive(self, now_ns: int, *, enabled: bool) -> None:
         departures = max(self._departures - (now_ns - self._noted_ns) * 1e-9, 0.0)
         self._noted_ns = now_ns
         if self._was_enabled and not enabled:
@@ -263,4 +299,4 @@ class Supervisor:
         self._was_enabled = enabled
         if enabled and departures <= DEPARTURES:
             self._drive_enabled_ns = now_ns
-        seen.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS
+        self.drive_out_ms = (now_ns - self._drive_enabled_ns) / MILLISECOND_NS

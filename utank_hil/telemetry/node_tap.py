@@ -73,7 +73,7 @@ class NodeTap:
         """Do one tick."""
         if not self._started:
             self._started = True
-            self._note(Kind.STARTED, now_ns, bytes([self._node.statistics.real_time]))
+            self._note(Kind.STARTED, now_ns, bytes([self._node.telemetry.statistics.real_time]))
         frames = list(self._node.tick(now_ns))
         for tap in self._taps:
             self._fields += tap.take(now_ns)

@@ -9,7 +9,6 @@ from moving_ship import SHIP, TANK, THRESHOLDS, MovingShip
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion_pair import MotionPair, SensorEvidence
 from utank_hil.safety.monitors.motion_watch import MotionWatch
-from utank_hil.safety.monitors.spikes import MotionGate
 from utank_hil.safety.monitors.tank_equation import TankEquation
 
 PERIOD_S = 10.0
@@ -17,7 +16,7 @@ MOUNTED_RAD = math.radians(0.5)
 # the noise of a sample takes as much of each limit as the mounting
 BOUNDS = replace(
     THRESHOLDS,
-    roll_period_s=PERIOD_S,
+    tank_period_s=PERIOD_S,
     roll_noise_rad=5 * MOUNTED_RAD / 3,
     rate_noise_rad_s=5 * 2 * (2 * math.pi / PERIOD_S) * MOUNTED_RAD / 3,
 )
@@ -35,9 +34,7 @@ class Pair:
         self.pair = MotionPair(BOUNDS, step_s)
         assert self.pair.unclear is False
         self.used, self.spare = (
-            SensorEvidence(
-                MotionWatch(BOUNDS, MotionGate(BOUNDS)), TankEquation(SHIP, TANK, BOUNDS, 0.1)
-            )
+            SensorEvidence(MotionWatch(BOUNDS), TankEquation(SHIP, TANK, BOUNDS, 0.1))
             for _ in range(2)
         )
 

@@ -7,9 +7,9 @@ import pytest
 from moving_ship import THRESHOLDS
 
 from utank_hil.base.tick import TICK_S
+from utank_hil.canbus.measurements import MotionSample
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion_watch import MotionWatch
-from utank_hil.safety.monitors.spikes import MotionGate
 
 STEP_S = 0.05
 LOOSE = replace(THRESHOLDS, drift_rad=100.0, roll_noise_rad=100.0, rate_noise_rad_s=100.0)
@@ -19,25 +19,24 @@ def turn(watch: MotionWatch, t: float, jerk: float = 0.0) -> float:
     """Hold each rate of a roll that turns faster and faster for a tick; the roll at the end."""
     for k in range(1, 6):
         rate_rad_s = 0.1 + 0.02 * (t + k * TICK_S)
-        watch.turned_rad += rate_rad_s * TICK_S
+        watch.turn(MotionSample(0.0, rate_rad_s, round(1e9 * (t + k * TICK_S))), TICK_S)
     end_s = t + STEP_S
     roll_rad = 0.1 * end_s + 0.01 * end_s**2
-    watch.update(roll_rad, 0.1 + 0.02 * end_s + jerk, STEP_S, stale=False)
+    watch.update(MotionSample(roll_rad, 0.1 + 0.02 * end_s + jerk), STEP_S, stale=False)
     return roll_rad
 
 
 def test_rates_held_for_a_tick_each_make_the_trapezoid_of_a_rate_that_grows_evenly() -> None:
-    watch, last_rad = MotionWatch(LOOSE, MotionGate(THRESHOLDS)), 0.0
-    assert (watch.turned_rad, watch.found) == (0.0, 0)
-    watch.update(0.0, 0.1, STEP_S, stale=False)
+    watch, last_rad = MotionWatch(LOOSE), 0.0
+    assert watch.found == 0
+    watch.update(MotionSample(0.0, 0.1), STEP_S, stale=False)
     for k in range(40):
         last_rad = turn(watch, k * STEP_S)
-        assert watch.turned_rad == 0.0
         assert watch.motion.unexplained_rad == pytest.approx(0.0, abs=1e-12)
     # what came while it was late is no part of the next step
-    watch.turned_rad = 77.0
-    watch.update(-9.0, 0.1 + 0.02 * 40 * STEP_S, STEP_S, stale=True)
-    watch.update(last_rad, 0.1 + 0.02 * 40 * STEP_S, STEP_S, stale=False)
+    watch.turn(MotionSample(0.0, 77.0, -1), 1.0)
+    watch.update(MotionSample(-9.0, 0.1 + 0.02 * 40 * STEP_S), STEP_S, stale=True)
+    watch.update(MotionSample(last_rad, 0.1 + 0.02 * 40 * STEP_S), STEP_S, stale=False)
     turn(watch, 40 * STEP_S)
     assert watch.motion.unexplained_rad == pytest.approx(0.0, abs=1e-12)
 
@@ -47,29 +46,25 @@ def test_noise_of_the_rate_is_its_second_difference_over_the_square_root_of_six(
     share: float, found: int
 ) -> None:
     """Of a rate that goes to and fro by a it is 4 a."""
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1), MotionGate(THRESHOLDS))
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1))
     a = share * math.sqrt(6) * 0.1 / 4
     for k in range(10):
-        watch.update(0.0, a * (-1) ** k, 0.7, stale=False)
+        watch.update(MotionSample(0.0, a * (-1) ** k), 0.7, stale=False)
     assert watch.found == found
     assert watch.rate_noise.power == pytest.approx((4 * a) ** 2)
     # a gap is no noise, and found is only what is
-    watch.update(0.0, 99.0, 0.7, stale=True)
+    watch.update(MotionSample(0.0, 99.0), 0.7, stale=True)
     assert watch.found == 0
     for _ in range(2):
-        watch.update(0.0, 50.0, 0.7, stale=False)
+        watch.update(MotionSample(0.0, 50.0), 0.7, stale=False)
         assert watch.rate_noise.power == 0.0
 
 
 def spiked(spikes: int, rate_noise_rad_s: float) -> int:
-    gate = MotionGate(THRESHOLDS)
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=rate_noise_rad_s), gate)
-    gate.passes(0.0, 0.0, 0)
-    for k in range(spikes):
-        gate.passes(0.0, 9.0, k)
-        gate.passes(0.0, 0.0, k)
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=rate_noise_rad_s))
     for k in range(4):
-        watch.update(0.0, 0.1 * (-1) ** k, 0.1, stale=False)
+        sample = MotionSample(0.0, 0.1 * (-1) ** k, discarded=spikes)
+        watch.update(sample, 0.1, stale=False)
     return watch.found
 
 
@@ -80,26 +75,22 @@ def test_spikes_of_its_gate_are_found_unless_they_are_noise() -> None:
 
 
 def test_samples_that_repeat_are_found_beside_the_noise() -> None:
-    gate = MotionGate(THRESHOLDS)
-    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1), gate)
+    watch = MotionWatch(replace(LOOSE, rate_noise_rad_s=0.1))
     for k in range(60):
-        gate.passes(1e-3 * (k % 16), 0.0, 0)
-        watch.update(0.0, (-1) ** k, 0.7, stale=False)
-        assert watch.found & ~Finding.NOISE == (Finding.MOTION_REPEATS if k >= 16 + 32 else 0)
+        watch.update(MotionSample(0.0, (-1) ** k, repeats=k >= 48), 0.7, stale=False)
+        assert watch.found & ~Finding.NOISE == (Finding.MOTION_REPEATS if k >= 48 else 0)
     assert watch.found & Finding.NOISE
-    watch.update(0.0, 0.0, 0.7, stale=True)
+    watch.update(MotionSample(0.0, 0.0), 0.7, stale=True)
     assert watch.found == 0
 
 
 def test_what_the_roll_says_against_the_rate_is_found_beside_the_noise() -> None:
-    watch = MotionWatch(
-        replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1), MotionGate(THRESHOLDS)
-    )
+    watch = MotionWatch(replace(LOOSE, drift_rad=0.01, rate_noise_rad_s=0.1))
     for k in range(10):
-        watch.update(0.1 * k, (-1) ** k, 0.7, stale=False)
+        watch.update(MotionSample(0.1 * k, (-1) ** k), 0.7, stale=False)
     assert watch.found & Finding.DRIFT
     assert watch.found & Finding.NOISE
-    watch.update(0.0, 0.0, 0.7, stale=True)
-    watch.update(0.5, 0.0, 0.7, stale=False)
-    watch.update(0.5, 0.0, 0.7, stale=False)
+    watch.update(MotionSample(0.0, 0.0), 0.7, stale=True)
+    watch.update(MotionSample(0.5, 0.0), 0.7, stale=False)
+    watch.update(MotionSample(0.5, 0.0), 0.7, stale=False)
     assert not watch.found & Finding.DRIFT

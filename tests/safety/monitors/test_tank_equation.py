@@ -10,7 +10,7 @@ from utank_hil.safety.monitors.tank_equation import TankEquation, roll_push_at_n
 
 STEP_S = 0.1
 FAULT_S = 60.0
-T = THRESHOLDS.roll_period_s
+T = THRESHOLDS.tank_period_s
 
 
 def found_after(ship: MovingShip, fault, until_s: float = 60.0) -> dict[Finding, float]:

@@ -28,7 +28,7 @@ PLANT = replace(CONFIG.plant, ship=SHIP, tank=TANK, limits=LIMITS)
 def test_every_threshold_is_what_the_documents_say_of_ship_and_sensors() -> None:
     found = thresholds_of(PLANT, 0.35, SensorFigures(1e-4, 4e-4, 0.003))
     expected = {
-        "roll_period_s": 2 * math.pi / 0.6,
+        "tank_period_s": 2 * math.pi / 0.6,
         # nothing moves faster than a roll of 0.35 at twice w0, or the level at its limit
         "roll_spike_rad": 3e-3,
         "roll_most_rad_s": 0.42,

@@ -10,7 +10,7 @@ from utank_hil.control.design_plant import DesignPlant
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.nodes.commissioning.pulses import PulsePlan, ValveStroke
 from utank_hil.safety.monitors.thresholds import ZERO_HEEL_DEG
-from utank_hil.safety.observations import VALVE_OFF
+from utank_hil.safety.situation import VALVE_OFF
 
 ROLL_ZERO_DEG: Final = 1.0
 RATE_ZERO_DEG_S: Final = 0.03

@@ -1,8 +1,7 @@
 """The commissioning as a node: a controller node whose law gives pulses, and what looks on."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
-from operator import attrgetter
 from typing import Final
 
 import numpy as np
@@ -34,22 +33,26 @@ STALE_MS: Final = 100.0
 MOST_OVER_PLAN: Final = 3.0
 """A level so many times the plan's ends the pulses."""
 
-_ALWAYS: Final = {
-    "roll_rad": "inbox.roll_rad",
-    "roll_rate_rad_s": "inbox.roll_rate_rad_s",
-    "port_level_m": "inbox.port_level_m",
-    "starboard_level_m": "inbox.starboard_level_m",
-    "high_level": "seen.high_level",
+_Get = Callable[[ControllerNode], float]
+_ALWAYS: Final[dict[str, _Get]] = {
+    # each sensor by itself, whichever is in use
+    "roll_rad": lambda node: node.measured.motions[0].roll_rad,
+    "roll_rate_rad_s": lambda node: node.measured.motions[0].roll_rate_rad_s,
+    "port_level_m": lambda node: node.measured.port_level_m,
+    "starboard_level_m": lambda node: node.measured.starboard_level_m,
+    "high_level": lambda node: node.measured.high_level,
 }
-_OF_PUMP: Final = {"pressure_pa": "inbox.pressure_pa", "command_pa": "command_pa"}
-# each sensor by itself, whichever is in use
-_OF_PAIR: Final = {
-    "roll_rad": "inbox.motions.first.roll_rad",
-    "roll_rate_rad_s": "inbox.motions.first.roll_rate_rad_s",
-    "roll_2_rad": "inbox.motions.second.roll_rad",
-    "roll_rate_2_rad_s": "inbox.motions.second.roll_rate_rad_s",
+_OF_PUMP: Final[dict[str, _Get]] = {
+    "pressure_pa": lambda node: node.measured.pressure_pa,
+    "command_pa": lambda node: node.command_pa,
 }
-_OF_VALVE: Final = {"valve_opening": "inbox.valve_opening"}
+_OF_PAIR: Final[dict[str, _Get]] = {
+    "roll_2_rad": lambda node: node.measured.motions[1].roll_rad,
+    "roll_rate_2_rad_s": lambda node: node.measured.motions[1].roll_rate_rad_s,
+}
+_OF_VALVE: Final[dict[str, _Get]] = {
+    "valve_opening": lambda node: node.measured.valve_opening,
+}
 
 
 class Stage(Enum):
@@ -113,12 +116,12 @@ class CommissioningNode:
         sources = dict(_ALWAYS)
         if plan is not None:
             sources |= _OF_PUMP
-        if node.inbox.motions is not None:
+        if len(node.inbox.motions) == 2:
             sources |= _OF_PAIR
         if stroke is not None:
             sources |= _OF_VALVE
         self._names = tuple(sources)
-        self._values = attrgetter(*sources.values())
+        self._getters = tuple(sources.values())
         self.stage = Stage.WAITING
         self.ended = ""
         self._since_ns = 0
@@ -174,7 +177,7 @@ class CommissioningNode:
     def tick(self, now_ns: int) -> Iterable[Frame]:
         """Let the controller do its tick, and look at what came of it."""
         # whoever arms sooner would have the pump move without having been asked to
-        self.node.seen.commissioned = self.stage in (Stage.ARM, Stage.MOVING)
+        self.node.commissioned = self.stage in (Stage.ARM, Stage.MOVING)
         frames = self.node.tick(now_ns)
         if self.stage in (Stage.REST, Stage.MOVING):
             self._note(now_ns)
@@ -185,13 +188,13 @@ class CommissioningNode:
     @property
     def missing(self) -> str:
         """What is not heard that the controller could do without, in words; else empty."""
-        motions, seen = self.node.inbox.motions, self.node.seen
-        if motions is None or max(seen.motion_age_ms, seen.motion_spare_age_ms) <= STALE_MS:
+        motions = self.node.measured.motions
+        if len(motions) == 1 or max(sample.age_ms for sample in motions) <= STALE_MS:
             return ""
         return "A motion sensor is silent. Check the supply and bus connection of both."
 
     def _note(self, now_ns: int) -> None:
-        self._sum += self._values(self.node)
+        self._sum += [get(self.node) for get in self._getters]
         self._ticks += 1
         # a loop held up for more than two rows lost the echo of drive or valve, and begins anew
         missing = (now_ns - self._since_ns) // (ROW_TICKS * TICK_NS) - len(self._rows)
@@ -259,6 +262,6 @@ class CommissioningNode:
 
     def _level_m(self) -> float:
         """How far the level is from where it was at rest."""
-        inbox, rest = self.node.inbox, self.rest
+        rest = self.rest
         at_rest_m = float(rest["starboard_level_m"].mean() - rest["port_level_m"].mean()) / 2
-        return abs(inbox.level_m - at_rest_m)
+        return abs(self.node.measured.level_m - at_rest_m)

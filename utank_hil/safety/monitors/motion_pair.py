@@ -103,14 +103,14 @@ class MotionPair:
     """
 
     def __init__(self, thresholds: MonitorThresholds, period_s: float) -> None:
-        frequency_rad_s = 2 * math.pi / thresholds.roll_period_s
+        frequency_rad_s = 2 * math.pi / thresholds.tank_period_s
         # the thresholds of noise are five times the noise of a sample
         self._roll_limit_rad = MOUNTED_RAD + NOISES / 5 * thresholds.roll_noise_rad
         self._rate_limit_rad_s = (
             2 * frequency_rad_s * MOUNTED_RAD + NOISES / 5 * thresholds.rate_noise_rad_s
         )
         self._period_s = period_s
-        self._roll_period_s = thresholds.roll_period_s
+        self._roll_period_s = thresholds.tank_period_s
         self._share = period_s / SMOOTH_S
         self._roll_rad = self._rate_rad_s = 0.0
         self._over_s = self._unclear_s = 0.0

@@ -4,10 +4,11 @@ import math
 from typing import Final
 
 from utank_hil.base.tick import TICK_S
+from utank_hil.canbus.measurements import MotionSample
 from utank_hil.safety.monitors.finding import Finding
 from utank_hil.safety.monitors.motion import RollAgainstRate
 from utank_hil.safety.monitors.noise import Noise, SecondDifference
-from utank_hil.safety.monitors.spikes import MotionGate, SpikeCount
+from utank_hil.safety.monitors.spikes import SpikeCount
 from utank_hil.safety.monitors.thresholds import MonitorThresholds
 
 _REPEATS: Final = int(Finding.MOTION_REPEATS)
@@ -21,39 +22,43 @@ class MotionWatch:
     Parameters
     ----------
     thresholds : MonitorThresholds
-    gate : MotionGate
-        Through which its samples pass.
 
     Attributes
     ----------
     motion : RollAgainstRate
     rate_noise : Noise
-    heard_ns, waited_s, turned_rad : int, float, float
-        When the newest sample came, the time since then, and the integral of the rate since the
-        last update, each rate for the time from the sample before it: kept by the caller.
     found : int
         Bits of `Finding`.
-    repetition : Repetition
-        Of its samples.
     """
 
-    def __init__(self, thresholds: MonitorThresholds, gate: MotionGate) -> None:
+    def __init__(self, thresholds: MonitorThresholds) -> None:
         self.motion = RollAgainstRate(thresholds)
         self.rate_noise = Noise(math.sqrt(6) * thresholds.rate_noise_rad_s)
         self._rate_bend = SecondDifference()
-        self._gate = gate
-        self.repetition = gate.repetition
         self._spikes = SpikeCount()
         self._last_rate_rad_s = 0.0
-        self.heard_ns = 0
-        self.waited_s = self.turned_rad = 0.0
+        self._heard_ns = 0
+        self._waited_s = self._turned_rad = 0.0
         self.found = 0
 
-    def update(self, roll_rad: float, rate_rad_s: float, elapsed_s: float, *, stale: bool) -> None:
+    def turn(self, sample: MotionSample, elapsed_s: float) -> None:
+        """Integrate the rate up to the newest sample, once a tick.
+
+        Each rate counts for the time from the sample before it: where some were lost, the roll is
+        as old.
+        """
+        self._waited_s += elapsed_s
+        if sample.heard_ns != self._heard_ns:
+            self._heard_ns = sample.heard_ns
+            self._turned_rad += sample.roll_rate_rad_s * self._waited_s
+            self._waited_s = 0.0
+
+    def update(self, sample: MotionSample, elapsed_s: float, *, stale: bool) -> None:
         """Take a sample, and set `found`; one that is `stale` begins anew."""
+        roll_rad, rate_rad_s = sample.roll_rad, sample.roll_rate_rad_s
         # half a tick of the ends makes a trapezoid of the sum, where no sample was lost
-        turned_rad = self.turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
-        self.turned_rad = 0.0
+        turned_rad = self._turned_rad - 0.5 * TICK_S * (rate_rad_s - self._last_rate_rad_s)
+        self._turned_rad = 0.0
         self._last_rate_rad_s = rate_rad_s
         if stale:
             self.motion.restart()
@@ -63,10 +68,9 @@ class MotionWatch:
         found = self.motion.update(roll_rad, rate_rad_s, turned_rad, elapsed_s)
         if self.rate_noise.update(self._rate_bend.update(rate_rad_s), elapsed_s):
             found |= _NOISE
-        gate = self._gate
         # the largest samples of noise are discarded, too
-        if self._spikes.update(gate.discarded, elapsed_s) and not found & _NOISE:
+        if self._spikes.update(sample.discarded, elapsed_s) and not found & _NOISE:
             found |= _SPIKES
-        if self.repetition.found:
+        if sample.repeats:
             found |= _REPEATS
         self.found = found

@@ -20,7 +20,7 @@ frames is summed; with five too many people are to know. So they are of a node t
 
 import math
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from utank_hil.canbus.endpoints import Rejection
 from utank_hil.safety.monitors.finding import Finding
@@ -51,14 +51,26 @@ _CRC: Final = Rejection.CRC
 
 
 class Heard(Protocol):
-    """What a receiver counts."""
+    """What a receiver counts: frames accepted or not, missing by the counter, and rejected."""
 
     can_id: int
     cycle_ns: int
-    heard: int
-    lost: int
-    changes: int
     rejected: dict[Rejection, int]
+
+    @property
+    def heard(self) -> int:
+        """Frames so far, accepted or not."""
+
+    @property
+    def lost(self) -> int:
+        """Frames missing by the counter."""
+
+
+@runtime_checkable
+class Changing(Heard, Protocol):
+    """The same for a message that is also sent on a change: `changes` counts new contents."""
+
+    changes: int
 
 
 class Stream:
@@ -79,6 +91,7 @@ class Stream:
 
     def __init__(self, receiver: Heard, silent_s: float = float("inf")) -> None:
         self._receiver = receiver
+        self._changing = receiver if isinstance(receiver, Changing) else None
         self._cycles_per_s = 1e9 / receiver.cycle_ns
         self._silent_limit_s = silent_s
         self.begin()
@@ -92,7 +105,8 @@ class Stream:
         receiver = self._receiver
         self._heard, self._lost = receiver.heard, receiver.lost
         self._damaged = receiver.rejected[_CRC]
-        self._changes, self._rejected = receiver.changes, sum(receiver.rejected.values())
+        self._changes = 0 if self._changing is None else self._changing.changes
+        self._rejected = sum(receiver.rejected.values())
 
     def update(self, elapsed_s: float) -> int:
         """Judge what came since the last call; return what was found."""
@@ -107,8 +121,8 @@ class Stream:
         self._damaged = damaged
         cycles = self._cycles_per_s * elapsed_s
         excess = self.excess + came - MOST_PER_CYCLE * cycles
-        if receiver.changes:
-            excess -= self._on_change(elapsed_s)
+        if self._changing is not None and self._changing.changes:
+            excess -= self._on_change(self._changing, elapsed_s)
         # twice what is too many: it is forgotten soon after
         self.excess = excess = min(max(excess, 0.0), 2 * MOST_FRAMES)
         self._silent_s = 0.0 if heard else self._silent_s + elapsed_s
@@ -128,9 +142,8 @@ class Stream:
             found |= _LOST
         return found | _SILENT if self._silent_s > self._silent_limit_s else found
 
-    def _on_change(self, elapsed_s: float) -> float:
+    def _on_change(self, receiver: Changing, elapsed_s: float) -> float:
         """Frames since the last call that may come on top of the cycle's."""
-        receiver = self._receiver
         rejected = sum(receiver.rejected.values())
         extra = (receiver.changes - self._changes) - (rejected - self._rejected)
         self._changes, self._rejected = receiver.changes, rejected

@@ -53,7 +53,6 @@ class Standstill:
             self.still = self._same
 
 
-def gauges_stand_still(port: Standstill, starboard: Standstill) -> bool:
-    """Whether both do, or one for so long that it is no chance."""
-    one, other = port.still, starboard.still
-    return (one > 0 and other > 0) or one >= STILL_ALONE or other >= STILL_ALONE
+def gauges_stand_still(port: int, starboard: int) -> bool:
+    """Whether both gauges do, by `Standstill.still`, or one for so long that it is no chance."""
+    return (port > 0 and starboard > 0) or port >= STILL_ALONE or starboard >= STILL_ALONE

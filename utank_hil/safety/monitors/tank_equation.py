@@ -179,8 +179,8 @@ class TankEquation:
         self._pump = DerivativeFilter(2 * frequency_rad_s, period_s)
         self._held = DerivativeFilter(2 * frequency_rad_s, period_s) if valve else None
         self._settle = math.ceil(SETTLED / (2 * frequency_rad_s * period_s))
-        self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.roll_period_s))
-        self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.roll_period_s))
+        self._keep = math.exp(-period_s / (MEMORY_PERIODS * thresholds.tank_period_s))
+        self._late_keep = math.exp(-period_s / (LATE_PERIODS * thresholds.tank_period_s))
         # sums of so many squares of the least push
         self._least_xx = thresholds.least_roll_push_m2_s2**2 / (1 - self._keep)
         self._least_pp = thresholds.least_pump_push_m2_s2**2 / (1 - self._keep)
@@ -188,13 +188,13 @@ class TankEquation:
         self._least_dd = late_share**2 / (1 - self._late_keep)
         self._zero = thresholds.zero_push_m2_s2
         self._still_rad = thresholds.roll_still_rad
-        self._still_samples = round(STILL_PERIODS * thresholds.roll_period_s / period_s)
+        self._still_samples = round(STILL_PERIODS * thresholds.tank_period_s / period_s)
         self._most_unmoved = STILL_PUSHES**2 * self._least_xx
         self._most_frozen = FROZEN_PUSHES**2 * self._least_xx
         self._late_limit_s = thresholds.motion_late_s
         self._spike_m = thresholds.level_spike_m
         self._most_step_m = thresholds.level_most_m_s * period_s
-        self._late_samples = round(thresholds.roll_period_s / period_s)
+        self._late_samples = round(thresholds.tank_period_s / period_s)
         self.restart()
 
     def restart(self) -> None:

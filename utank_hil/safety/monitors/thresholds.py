@@ -61,7 +61,7 @@ class MonitorThresholds:
 
     Attributes
     ----------
-    roll_period_s : float
+    tank_period_s : float
         T, in which the tank's equation is judged.
     roll_spike_rad, roll_most_rad_s, rate_spike_rad_s, rate_most_rad_s2 : float
         A sample further than the first from the last one, and than the second a second more, is
@@ -99,7 +99,7 @@ class MonitorThresholds:
         Root mean square of the roll below which it is not compared with the twin's.
     """
 
-    roll_period_s: float
+    tank_period_s: float
     roll_spike_rad: float
     roll_most_rad_s: float
     rate_spike_rad_s: float
@@ -149,7 +149,7 @@ def thresholds_of(
     # the noise of 15 s of integrated rate, and of the roll itself
     drift_s = math.hypot(roll_s, rate_s * math.sqrt(0.01 * 7.5))
     return MonitorThresholds(
-        roll_period_s=2 * math.pi / frequency_rad_s,
+        tank_period_s=2 * math.pi / frequency_rad_s,
         roll_spike_rad=30 * roll_s,
         roll_most_rad_s=roll_limit_rad * fastest_rad_s,
         rate_spike_rad_s=30 * rate_s,

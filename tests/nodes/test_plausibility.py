@@ -1,0 +1,108 @@
+"""A sample that nothing on board can have moved to is discarded."""
+
+from dataclasses import replace
+
+import pytest
+from controller_bench import CATALOGUE, VESSEL
+from hypothesis import given
+from hypothesis import strategies as st
+
+from utank_hil.canbus import Quality, SensorMotion
+from utank_hil.control import DesignPlant
+from utank_hil.nodes.plausibility import LevelGates, MotionSensor, SpikeGate
+from utank_hil.safety.monitors.thresholds import MonitorThresholds, SensorFigures, thresholds_of
+
+MS, S = 1_000_000, 1_000_000_000
+APART = replace(
+    thresholds_of(DesignPlant(VESSEL.ship, VESSEL.tank), 0.35, SensorFigures()),
+    roll_spike_rad=1.0, roll_most_rad_s=2.0,
+    rate_spike_rad_s=4.0, rate_most_rad_s2=8.0,
+    level_spike_m=16.0, level_most_m_s=32.0,
+)  # fmt: skip
+
+
+def sensor(thresholds: MonitorThresholds = APART) -> MotionSensor:
+    return MotionSensor(CATALOGUE.receiver(SensorMotion), thresholds)
+
+
+def taken(motion: MotionSensor, roll_rad: float, rate_rad_s: float, now_ns: int) -> bool:
+    """Whether a sample is taken."""
+    before = motion.discarded
+    motion.take(SensorMotion(roll_rad, rate_rad_s, Quality.GOOD), now_ns)
+    return motion.discarded == before
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_what_is_near_enough_grows_with_the_time_since_the_last_that_passed(way: int) -> None:
+    for moved, after_s, passes in (
+        (0.25, 0.0, True), (0.26, 0.0, False),
+        (0.74, 1.0, True), (0.76, 1.0, False),
+        (1.24, 2.0, True), (1.26, 2.0, False),
+    ):  # fmt: skip
+        gate = SpikeGate(0.25, 0.5)
+        assert gate.passes(3.0 * way, 5 * S)
+        assert not gate.passes(100.0, 5 * S)
+        assert gate.passes((3.0 + moved) * way, 5 * S + round(after_s * S)) is passes
+        # from what passed last, and its time
+        last = 3.0 + moved if passes else 3.0
+        since_s = 1.0 if passes else 1.0 + after_s
+        at_ns = 5 * S + round((after_s + 1.0) * S)
+        assert not gate.passes((last - 0.26 - 0.5 * since_s) * way, at_ns)
+        assert gate.passes((last - 0.24 - 0.5 * since_s) * way, at_ns)
+
+
+def test_each_step_has_to_come_five_times_in_a_row_to_be_taken() -> None:
+    gate = SpikeGate(0.25, 0.0)
+    assert gate.passes(0.0, 0)
+    for _ in range(2):
+        assert [gate.passes(9.0, 0) for _ in range(4)] == [False] * 4
+        assert gate.passes(0.0, 0)
+    assert [gate.passes(9.0, 0) for _ in range(5)] == [False] * 4 + [True]
+    assert [gate.passes(0.0, 0) for _ in range(5)] == [False] * 4 + [True]
+
+
+def test_roll_and_rate_each_have_their_own_bounds_and_both_see_every_sample() -> None:
+    for roll_rad, rate_rad_s, after_ns, discarded in (
+        (1.0, 4.0, 0, 0), (1.01, 4.0, 0, 1), (1.0, 4.01, 0, 1), (-1.01, -4.01, 0, 1),
+        (2.9, 11.9, S, 0), (3.1, 11.9, S, 1), (2.9, 12.1, S, 1), (3.1, 12.1, S, 1),
+    ):  # fmt: skip
+        motion = sensor()
+        assert taken(motion, 0.0, 0.0, 0)
+        assert taken(motion, roll_rad, rate_rad_s, after_ns) is (discarded == 0)
+        assert motion.discarded == motion.sample(0).discarded == discarded
+
+
+def test_samples_that_repeat_within_a_third_of_a_roll_period_are_found() -> None:
+    for length, found in ((333, True), (334, False)):
+        motion = sensor(replace(APART, tank_period_s=10.0))
+        for k in range(3 * length):
+            taken(motion, 1e-3 * (k % length), 0.0, 0)
+        assert motion.sample(0).repeats is found
+
+
+def test_levels_each_have_a_gate_and_what_they_discard_is_counted() -> None:
+    for port_m, starboard_m, after_ns, discarded in (
+        (16.0, -16.0, 0, 0), (16.5, 0.0, 0, 1), (0.0, 16.5, 0, 1), (17.0, 17.0, 0, 1),
+        (47.0, -47.0, S, 0), (49.0, 0.0, S, 1), (0.0, -49.0, S, 1), (49.0, 49.0, S, 1),
+    ):  # fmt: skip
+        gates = LevelGates(APART)
+        assert gates.passes(0.0, 0.0, 0) is True
+        assert gates.passes(port_m, starboard_m, after_ns) is (discarded == 0)
+        assert gates.discarded == discarded
+
+
+def test_one_spike_is_discarded_and_the_next_sample_is_taken() -> None:
+    gate = SpikeGate(0.01, 0.5)
+    assert gate.passes(0.1, 0)
+    assert not gate.passes(0.6, 10 * MS)
+    assert gate.passes(0.1, 20 * MS)
+
+
+@given(st.floats(-1, 1), st.integers(1, 1000), st.floats(0, 1))
+def test_what_moves_no_faster_than_it_can_always_passes(
+    start: float, elapsed_ms: int, share: float
+) -> None:
+    gate = SpikeGate(0.01, 0.5)
+    gate.passes(start, 0)
+    move = share * (0.01 + 0.5 * elapsed_ms * 1e-3) * 0.999
+    assert gate.passes(start + move, elapsed_ms * MS)

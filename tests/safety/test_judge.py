@@ -1,0 +1,120 @@
+"""What is judged beside measurements: load, heel, lateness; and which motion sensor is used."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from situations import MEASURED, OWN
+
+from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus.measurements import MotionSample
+from utank_hil.safety.bus_load import BusLoad
+from utank_hil.safety.judge import HEEL_TIME_CONSTANT_S, Lateness, Safety
+from utank_hil.safety.safety_limits import SafetyLimits
+
+MS = 1_000_000
+
+
+@pytest.mark.parametrize("begins", range(0, 100, 7))
+def test_load_of_the_bus_is_that_of_the_last_second_whenever_a_flood_begins(begins: int) -> None:
+    load, frames, now_ns = BusLoad(250_000), 0, 0
+    for _ in range(300 + begins):
+        now_ns += TICK_NS
+        assert load.update(now_ns, frames) == 0.0
+    for tick in range(1, 201):
+        now_ns += TICK_NS
+        frames += 15  # 15 x 143 bits in 10 ms at 250 kbit/s: 0.858
+        share = load.update(now_ns, frames)
+        assert share <= 0.858 * min(tick + 1, 100) / 100 + 1e-9
+        assert share >= 0.858 * min(tick - 9, 100) / 100 - 1e-9
+
+
+def test_a_late_tick_counts_for_ten_ticks() -> None:
+    lateness, now_ns = Lateness(), TICK_NS
+    lateness.update(now_ns)
+    now_ns += 2 * TICK_NS
+    for _ in range(10):
+        lateness.update(now_ns)
+        assert lateness.in_ten == 1
+        now_ns += TICK_NS
+    lateness.update(now_ns)
+    assert lateness.in_ten == 0
+
+
+class Table:
+    """A safety without monitors, and one motion sensor."""
+
+    def __init__(self) -> None:
+        self.safety = Safety(SafetyLimits(), 250_000)
+        self.now_ns = 0
+        self.sample = MotionSample(heard_ns=-(1 << 62))
+
+    @property
+    def heel_rad(self) -> float:
+        return self.safety.situation.heel_rad
+
+    def tick(self) -> None:
+        self.now_ns += TICK_NS
+        age_ms = (self.now_ns - self.sample.heard_ns) / MS
+        motions = (replace(self.sample, age_ms=age_ms),)
+        self.safety.judge(replace(MEASURED, now_ns=self.now_ns, motions=motions), OWN)
+
+    def measure(self, roll_rad: float, seconds: float = TICK_S) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.sample = MotionSample(roll_rad, heard_ns=self.now_ns)
+            self.tick()
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_heel_is_the_low_pass_of_the_roll_over_a_minute_with_its_sign(sign: float) -> None:
+    table = Table()
+    table.measure(0.0, 60.0)
+    table.measure(sign * 0.1, 60.0)
+    assert HEEL_TIME_CONSTANT_S == 60.0
+    assert table.heel_rad == pytest.approx(sign * 0.1 * (1 - math.exp(-1)), rel=1e-3)
+
+
+def test_in_the_first_minute_heel_is_the_mean_of_what_was_measured_and_of_ten_seconds_of_zeros():
+    table = Table()
+    table.sample = MotionSample(0.3, heard_ns=-(1 << 62))  # nobody measured it
+    table.tick()
+    assert table.heel_rad == 0.0
+    rolls = [0.3 + 0.2 * math.sin(0.005 * k) for k in range(round(50.0 / TICK_S) + 1)]
+    for count, roll_rad in enumerate(rolls, 1):
+        table.measure(roll_rad)
+        mean_rad = sum(rolls[:count]) / (count + 10.0 / TICK_S - 1)
+        assert table.heel_rad == pytest.approx(mean_rad, rel=1e-9)
+    # and from then on each sample has the same share
+    roll_rad = table.heel_rad + 1.0
+    table.measure(roll_rad)
+    assert roll_rad - table.heel_rad == pytest.approx(1.0 - TICK_S / 60.0)
+
+
+def test_a_roll_that_is_not_measured_any_more_is_no_heel() -> None:
+    table = Table()
+    table.measure(0.0, 60.0)
+    table.measure(0.2)
+    for _ in range(9):
+        table.tick()
+    counted_rad = table.heel_rad
+    assert table.safety.situation.motion.age_ms == 100.0
+    for _ in range(12_000):
+        table.tick()
+    assert table.heel_rad == counted_rad
+    table.measure(0.0)
+    assert table.heel_rad < counted_rad
+
+
+@pytest.mark.parametrize(
+    ("first_ms", "second_ms", "used"),
+    [(25.0, 0.0, 0), (26.0, 0.0, 1), (26.0, 25.0, 1), (26.0, 26.0, 0), (1e9, 1e9, 0)],
+)
+def test_a_motion_sensor_that_is_silent_is_left_for_one_that_is_not(
+    first_ms: float, second_ms: float, used: int
+) -> None:
+    safety = Safety(SafetyLimits(), 250_000)
+    motions = MotionSample(0.1, age_ms=first_ms), MotionSample(0.2, age_ms=second_ms)
+    judgement = safety.judge(replace(MEASURED, motions=motions), OWN)
+    assert judgement.motion == used
+    assert safety.situation.motion.roll_rad == motions[used].roll_rad
+    assert safety.situation.motion_spare_age_ms == motions[1 - used].age_ms

@@ -1,0 +1,141 @@
+"""Plausibility: a sample that nothing on board can have moved to since the last is discarded."""
+
+import math
+from typing import Final
+
+from utank_hil.base.tick import TICK_S
+from utank_hil.canbus import Quality, Receiver, SensorMotion
+from utank_hil.canbus.measurements import MotionSample
+from utank_hil.safety.monitors.repetition import Repetition
+from utank_hil.safety.monitors.standstill import Standstill
+from utank_hil.safety.monitors.thresholds import MonitorThresholds
+
+NEVER_HEARD_NS: Final = -(1 << 62)
+"""Time of receipt of what was never heard."""
+MILLISECOND_NS: Final = 1_000_000
+USABLE: Final = (Quality.GOOD, Quality.DEGRADED)
+STEP_SAMPLES: Final = 5
+"""So many in a row are no spike but a step, which is taken."""
+REPEATS_WITHIN_PERIODS: Final = 1 / 3
+"""Of the roll's. No motion of a ship worth mentioning comes again so soon, even without noise."""
+
+
+class SpikeGate:
+    """Passes the samples of a signal that are near enough to the last one that passed.
+
+    Parameters
+    ----------
+    spike : float
+        Distance from the last sample, noise included, that is always near enough.
+    most_per_s : float
+        So much more for each second since then.
+    """
+
+    def __init__(self, spike: float, most_per_s: float) -> None:
+        self._spike = spike
+        self._most_per_ns = most_per_s * 1e-9
+        self._value = 0.0
+        self._value_ns = -(1 << 62)
+        self._in_a_row = 0
+
+    def passes(self, value: float, now_ns: int) -> bool:
+        """Take a sample; return whether it may be used."""
+        moved = value - self._value
+        near = self._spike + self._most_per_ns * (now_ns - self._value_ns)
+        if -near <= moved <= near or self._in_a_row == STEP_SAMPLES - 1:
+            self._value = value
+            self._value_ns = now_ns
+            self._in_a_row = 0
+            return True
+        self._in_a_row += 1
+        return False
+
+
+class MotionSensor:
+    """What is heard of one motion sensor.
+
+    Parameters
+    ----------
+    receiver : Receiver of SensorMotion
+    thresholds : MonitorThresholds, optional
+        Of what no ship can do; without them every finite sample is taken.
+
+    Attributes
+    ----------
+    receiver : Receiver of SensorMotion
+        As given.
+    roll_rad, roll_rate_rad_s : float
+        Of the last plausible sample, received at `heard_ns`.
+    discarded : int
+        Samples so far that did not pass, by their roll or by their rate.
+    """
+
+    def __init__(
+        self, receiver: Receiver[SensorMotion], thresholds: MonitorThresholds | None
+    ) -> None:
+        self.receiver = receiver
+        self.roll_rad = self.roll_rate_rad_s = 0.0
+        self.heard_ns = NEVER_HEARD_NS
+        self.discarded = 0
+        self._repetition: Repetition | None = None
+        if thresholds is not None:
+            remembered_s = REPEATS_WITHIN_PERIODS * thresholds.tank_period_s
+            self._repetition = Repetition(round(remembered_s / TICK_S))
+            self._roll = SpikeGate(thresholds.roll_spike_rad, thresholds.roll_most_rad_s)
+            self._rate = SpikeGate(thresholds.rate_spike_rad_s, thresholds.rate_most_rad_s2)
+
+    def take(self, motion: SensorMotion, now_ns: int) -> None:
+        """Take an accepted message; keep its sample if it is one."""
+        roll_rad, rate_rad_s = motion.roll_rad, motion.roll_rate_rad_s
+        # one test for both: the sum is NaN if either is not available
+        if motion.quality not in USABLE or not math.isfinite(roll_rad + rate_rad_s):
+            return
+        repetition = self._repetition
+        if repetition is not None:
+            repetition.take(roll_rad, rate_rad_s)
+            # both see every sample
+            passes = self._roll.passes(roll_rad, now_ns) & self._rate.passes(rate_rad_s, now_ns)
+            if not passes:
+                self.discarded += 1
+                return
+        self.roll_rad, self.roll_rate_rad_s, self.heard_ns = roll_rad, rate_rad_s, now_ns
+
+    def sample(self, now_ns: int) -> MotionSample:
+        """The last plausible sample, with its age."""
+        repetition, heard_ns = self._repetition, self.heard_ns
+        return MotionSample(
+            self.roll_rad,
+            self.roll_rate_rad_s,
+            heard_ns,
+            (now_ns - heard_ns) / MILLISECOND_NS,
+            self.receiver.valid,
+            self.discarded,
+            repetition is not None and repetition.found,
+            repetition is not None and repetition.frozen,
+        )
+
+
+class LevelGates:
+    """The gates of both level gauges.
+
+    Attributes
+    ----------
+    port, starboard : Standstill
+        Of every sample of the gauges.
+    discarded : int
+        Samples so far that did not pass, by either level.
+    """
+
+    def __init__(self, thresholds: MonitorThresholds) -> None:
+        self._port = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self._starboard = SpikeGate(thresholds.level_spike_m, thresholds.level_most_m_s)
+        self.port, self.starboard = Standstill(), Standstill()
+        self.discarded = 0
+
+    def passes(self, port_m: float, starboard_m: float, now_ns: int) -> bool:
+        """Whether a sample of the level gauges may be used."""
+        self.port.take(port_m)
+        self.starboard.take(starboard_m)
+        passes = self._port.passes(port_m, now_ns) & self._starboard.passes(starboard_m, now_ns)
+        self.discarded += not passes
+        return passes

@@ -1,0 +1,302 @@
+"""From measurements to judgement: what the controller may do with the pump, and why not."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from utank_hil.base.tick import TICK_NS, TICK_S
+from utank_hil.canbus.enumerations import Fault, Mode
+from utank_hil.canbus.events import AlarmEvent
+from utank_hil.canbus.measurements import Measurements
+from utank_hil.safety import judging
+from utank_hil.safety.alarms import (
+    AlarmList,
+    Gravity,
+    active_faults,
+    stopping_faults,
+)
+from utank_hil.safety.bus_load import BusLoad
+from utank_hil.safety.monitoring import Monitors
+from utank_hil.safety.monitors.thresholds import DEGRADED_SHARE
+from utank_hil.safety.safety_limits import SafetyLimits
+from utank_hil.safety.situation import MILLISECOND_NS, OwnState, Situation
+from utank_hil.safety.supervisor import Demand, Supervisor
+
+HEEL_TIME_CONSTANT_S: Final = 60.0
+"""Three roll periods of a ship that rolls slowly: waves are gone from the mean, a list is not."""
+HEEL_SHARE: Final = TICK_S / HEEL_TIME_CONSTANT_S
+FIRST_HEEL_S: Final = 10.0
+"""Time for which the heel counts as measured, as zero, at the start: no first roll is a heel."""
+HEEL_AGE_MS: Final = 100.0
+"""An older roll says nothing of the heel."""
+SILENT_MS: Final = 25.0
+"""Two samples of a motion sensor are missing: the other sensor is used, before the first one counts
+as silent."""
+QUIET_START_NS: Final = 10_000_000_000
+"""What is awaited at the start is an alarm only when it has not come by then."""
+_ALL_LATE: Final = 0x3FF
+
+# read once: in Python 3.11 a member costs eight times as much from its class as from here
+_INIT: Final = Mode.INIT
+_ACTIVE: Final = Mode.ACTIVE
+_NO_FAULT: Final = Fault.NONE
+
+
+@dataclass(slots=True, eq=False)
+class Judgement:
+    """What the controller obeys in one tick.
+
+    Attributes
+    ----------
+    mode, fault : Mode, Fault
+        As `Supervisor` has them.
+    demand : Demand
+    drive_wanted : bool
+        Whether the drive should be in operation enabled.
+    motion : int
+        Place of the motion sensor that is to be used.
+    share : float
+        Share of the greatest pressure that is allowed by what is degraded.
+    unconfirmed_share : float or None
+        Share that is allowed in its place until the water was seen to move as roll and pressure
+        push it; None from then on.
+    standing : int
+        Conditions of the fault table that hold, bits of `judging.standing`.
+    passive_roll_rad : float
+        What the ship would roll without the pump; NaN if that is not known.
+    """
+
+    mode: Final[Mode]
+    fault: Final[Fault]
+    demand: Final[Demand]
+    drive_wanted: Final[bool]
+    motion: Final[int]
+    share: Final[float]
+    unconfirmed_share: Final[float | None]
+    standing: Final[int]
+    passive_roll_rad: Final[float]
+
+
+class Lateness:
+    """Late ticks.
+
+    Attributes
+    ----------
+    late_ms : float
+        Lateness of this tick.
+    in_ten : int
+        Late ticks among the last ten; one that is late by three counts three times.
+    """
+
+    def __init__(self) -> None:
+        self._last_ns: int | None = None
+        self._history = 0
+        self.late_ms = 0.0
+        self.in_ten = 0
+
+    def update(self, now_ns: int) -> None:
+        """Take the time of a tick."""
+        last_ns = now_ns if self._last_ns is None else self._last_ns
+        self._last_ns = now_ns
+        late_ns = max(0, now_ns - last_ns - TICK_NS)
+        missed = -(-late_ns // TICK_NS)  # grid points, each of which counts
+        late = (1 << missed) - 1 if missed < 10 else _ALL_LATE
+        self._history = (self._history << max(1, missed) | late) & _ALL_LATE
+        self.late_ms = late_ns / MILLISECOND_NS
+        self.in_ten = self._history.bit_count()
+
+
+class Heel:
+    """Low-pass of the roll over `HEEL_TIME_CONSTANT_S`.
+
+    Attributes
+    ----------
+    heel_rad : float
+    """
+
+    def __init__(self) -> None:
+        self.heel_rad = 0.0
+        self._share = TICK_S / FIRST_HEEL_S
+
+    def update(self, roll_rad: float) -> None:
+        """Take the roll of a tick."""
+        # at first the mean of all that was measured, and of zeros: a heel is soon known
+        self.heel_rad += self._share * (roll_rad - self.heel_rad)
+        self._share = max(self._share / (1.0 + self._share), HEEL_SHARE)
+
+
+class Safety:
+    """Judges each tick what was measured; keeps its own timers and writes to nobody else.
+
+    Parameters
+    ----------
+    limits : SafetyLimits
+    bit_rate : int
+        Of the bus.
+    monitors : Monitors, optional
+        Of sensors, pump and bus; without them the fault table has ages, states and limits only.
+    pump : bool
+        Whether the tank has a pump to be watched.
+
+    Attributes
+    ----------
+    supervisor : Supervisor
+    monitors : Monitors or None
+    alarms : AlarmList
+    situation : Situation
+        What was judged last.
+    """
+
+    situation: Situation
+
+    def __init__(
+        self,
+        limits: SafetyLimits,
+        bit_rate: int,
+        monitors: Monitors | None = None,
+        *,
+        pump: bool = True,
+    ) -> None:
+        self.supervisor = Supervisor(limits)
+        self.monitors = monitors
+        self.alarms = AlarmList()
+        self._pump = pump
+        self._degraded_share = DEGRADED_SHARE
+        if monitors is not None:
+            self._degraded_share = monitors.thresholds.degraded_share
+        self._lateness, self._heel, self._load = Lateness(), Heel(), BusLoad(bit_rate)
+        self._motion = 0
+        self._start_ns: int | None = None
+        self._alarming = False
+        self._passing: dict[Fault, Gravity] = {}
+        self._mode_before = _INIT
+        self._refused_by = _NO_FAULT
+
+    @property
+    def passive_roll_rad(self) -> float:
+        """Roll of the passive twin; NaN without monitors."""
+        return math.nan if self.monitors is None else self.monitors.twin.roll_rad
+
+    @property
+    def passive_roll_rms_rad(self) -> float:
+        """Root mean square of it over some roll periods."""
+        return math.nan if self.monitors is None else self.monitors.twin.rms_rad
+
+    @property
+    def roll_rms_rad(self) -> float:
+        """Root mean square of the measured roll over some roll periods."""
+        return math.nan if self.monitors is None else self.monitors.twin.ship_rms_rad
+
+    def judge(self, measured: Measurements, own: OwnState) -> Judgement:
+        """Judge one tick.
+
+        Parameters
+        ----------
+        measured : Measurements
+        own : OwnState
+            What the controller knows of itself.
+        """
+        now_ns, supervisor, monitors = measured.now_ns, self.supervisor, self.monitors
+        self._lateness.update(now_ns)
+        load = self._load.update(now_ns, measured.frames + own.frames_sent)
+        if len(measured.motions) == 2:
+            self._leave_silent_sensor(measured)
+        motion = measured.motions[self._motion]
+        if motion.age_ms <= HEEL_AGE_MS:
+            self._heel.update(motion.roll_rad)
+        found = 0
+        if monitors is not None:
+            found = monitors.update(measured, own, self._motion)
+            self._motion = monitors.used
+            motion = measured.motions[self._motion]
+        supervisor.count(measured, motion.roll_rad, own.command_pa)
+        self.situation = situation = Situation(
+            measured,
+            own,
+            motion,
+            0.0 if len(measured.motions) == 1 else measured.motions[1 - self._motion].age_ms,
+            found,
+            self._heel.heel_rad,
+            self._lateness.late_ms,
+            self._lateness.in_ten,
+            load,
+            supervisor.rolled_over_ms,
+            supervisor.drive_out_ms,
+            supervisor.arming_ms,
+        )
+        supervisor.update(situation, judging.standing(situation, supervisor.limits))
+        self._note_causes(now_ns)
+        unconfirmed_share, passive_roll_rad = None, math.nan
+        if monitors is not None:
+            passive_roll_rad = monitors.twin.roll_rad
+            if self._pump and not monitors.confirmed:
+                unconfirmed_share = monitors.thresholds.unconfirmed_share
+        return Judgement(
+            supervisor.mode,
+            supervisor.fault,
+            supervisor.demand,
+            supervisor.drive_wanted,
+            self._motion,
+            self._degraded_share if supervisor.degraded else 1.0,
+            unconfirmed_share,
+            supervisor.standing,
+            passive_roll_rad,
+        )
+
+    def _leave_silent_sensor(self, measured: Measurements) -> None:
+        """Use the other motion sensor if this one is silent, and that one neither nor accused."""
+        motions, used = measured.motions, self._motion
+        spare = 1 - used
+        accused = self.monitors is not None and self.monitors.sensors[spare].accused
+        if motions[used].age_ms > SILENT_MS >= motions[spare].age_ms and not accused:
+            self._motion = spare
+
+    def _note_causes(self, now_ns: int) -> None:
+        """Keep what may be gone before alarms are looked at, ten times a second."""
+        supervisor = self.supervisor
+        mode, standing = supervisor.mode, supervisor.standing
+        if mode is _INIT and self._mode_before is not _INIT:
+            # what it waits for from now on may be back before alarms are looked at
+            self._passing[supervisor.fault] = Gravity.ENDS
+        self._mode_before = mode
+        if mode is not _ACTIVE:
+            if standing & judging.STOPPING:
+                self._passing |= dict.fromkeys(stopping_faults(mode, standing), Gravity.ENDS)
+        elif supervisor.degraded:  # what stops it is latched
+            halving = judging.faults(standing & judging.HALVING)
+            self._passing |= dict.fromkeys(halving, Gravity.HALVES)
+        if supervisor.raised is not _NO_FAULT:
+            self.alarms.raise_anew(supervisor.raised, mode, now_ns)
+        if self._start_ns is None:
+            self._start_ns = now_ns
+
+    def update_alarms(
+        self, accepted: list[int | None], law_fault: Fault, now_ns: int
+    ) -> list[AlarmEvent]:
+        """Raise, accept and rectify alarms; return what became of them.
+
+        Parameters
+        ----------
+        accepted : list of int or None
+            Codes that an operator has accepted; None stands for all.
+        law_fault : Fault
+            Limit on which the law ended, or NONE.
+        """
+        supervisor, alarms = self.supervisor, self.alarms
+        mode = supervisor.mode
+        quiet = self._start_ns is None or now_ns - self._start_ns < QUIET_START_NS
+        self._alarming = self._alarming or mode is not _INIT or not quiet
+        for code in accepted:
+            alarms.accept(code, mode, now_ns)
+        active = self._passing
+        if self._alarming:
+            now = active_faults(mode, supervisor.fault, supervisor.standing, law_fault)
+            active |= {code: max(each, active.get(code, each)) for code, each in now.items()}
+        alarms.update(active, mode, now_ns)
+        self._passing.clear()
+        refused_by = supervisor.reset_refused_by
+        if refused_by is not self._refused_by:
+            self._refused_by = refused_by
+            if refused_by is not _NO_FAULT:
+                alarms.reset_refused(refused_by, mode, now_ns)
+        return alarms.take_events()
