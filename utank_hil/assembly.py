@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from utank_hil.base.arrays import FloatArray
 from utank_hil.base.parameters import ParameterError
 from utank_hil.base.tick import TICK_S, is_whole_ticks
 from utank_hil.canbus import load_catalogue
-from utank_hil.canbus.measurements import Measurements, MotionSample
+from utank_hil.canbus.measurements import MEASURED, Measurements, MotionSample
 from utank_hil.configuration import ControllerConfig
 from utank_hil.control import BuiltLaw, CommandLimiter, PredictiveDesign
 from utank_hil.control.constrained.law import ConstrainedLaw
@@ -54,9 +55,19 @@ if TYPE_CHECKING:
 _STEPPING_S = 20.0
 """For all steps of a law whose impulse response is to be found."""
 
-_GETTERS: Final[dict[str, Callable[[Measurements, MotionSample, LevelObserver], float]]] = {
-    "roll_rad": lambda _, motion, __: motion.roll_rad,
-    "roll_rate_rad_s": lambda _, motion, __: motion.roll_rate_rad_s,
+_Get = Callable[[Measurements, MotionSample, LevelObserver], float]
+
+
+def _received(name: str) -> _Get:
+    """Getter of a signal as it was received, of the motion sensor in use if it is one of its."""
+    get: Callable[[object], float] = attrgetter(name)
+    if name in MotionSample.__slots__:
+        return lambda _, motion, __: get(motion)
+    return lambda measured, _, __: get(measured)
+
+
+_GETTERS: Final[dict[str, _Get]] = {
+    **{name: _received(name) for name in MEASURED},
     # the last one measured, held over a gap, looks like water that stands still
     "level_m": lambda measured, _, level: level.level_m if level.alone else measured.level_m,
     "level_rate_m_s": lambda _, __, level: level.rate_m_s,

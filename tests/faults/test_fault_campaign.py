@@ -18,7 +18,6 @@ import yaml
 from judged_rows import CAMPAIGN, GOOD, ROWS, verdict
 from pydantic import ValidationError
 from typer.testing import CliRunner
-from utank_hil.safety.observations import Observations
 
 from firmware_sim.commands import faults as commands
 from firmware_sim.fault_campaign import live, runner
@@ -31,13 +30,14 @@ from firmware_sim.fault_campaign.watch import BusLog, Heard, Watch, first_differ
 from firmware_sim.faulty_bench import FaultyBench
 from utank_hil.assembly import build_law
 from utank_hil.canbus import Fault, Mode
+from utank_hil.canbus.measurements import Measurements
 from utank_hil.configuration import ConfigError, load_config
 from utank_hil.configuration.files import problems_in_words
 from utank_hil.console.exit_codes import ExitCode
 from utank_hil.console.failures import KILLED
 from utank_hil.control import BuiltLaw
 from utank_hil.control.limiter import CommandLimiter
-from utank_hil.nodes.controller import ControllerNode
+from utank_hil.nodes.running_law import RunningLaw
 from utank_hil.safety.faults import FAULTS
 from utank_hil.safety.monitors.drive import DriveFollowing
 from utank_hil.safety.supervisor import Supervisor
@@ -227,12 +227,12 @@ def test_of_a_row_with_several_faults_each_is_on_the_bus(name: str) -> None:
         assert seen, f"without fault {index} nothing is different"
 
 
-def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Observations, int], None]:
+def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Measurements, int], None]:
     """What a supervisor does in FAULT that leaves it by itself."""
     since: dict[int, int] = {}
     sound = Supervisor._while_faulted
 
-    def while_faulted(self: Supervisor, seen: Observations, now_ns: int) -> None:
+    def while_faulted(self: Supervisor, seen: Measurements, now_ns: int) -> None:
         sound(self, seen, now_ns)
         if now_ns - since.setdefault(id(self), now_ns) >= seconds * 1e9:
             self.mode = mode
@@ -246,7 +246,7 @@ def _after(seconds: float, mode: Mode) -> Callable[[Supervisor, Observations, in
     [
         (Supervisor, "_while_faulted", _after(2.0, Mode.STANDBY), "levels-stuck", "not latched"),
         (Supervisor, "_while_faulted", _after(15.0, Mode.ACTIVE), "levels-stuck", "armed again"),
-        (ControllerNode, "_degraded_share", 1.0, "noise-10-fold", "more than it may"),
+        (RunningLaw, "share", lambda *_: 1.0, "noise-10-fold", "more than it may"),
         (DriveFollowing, "update", lambda *_, **__: 0, "pump-stalled", "was not found"),
     ],
 )
@@ -263,9 +263,13 @@ def test_a_pump_that_was_wrong_for_long_was_to_be_found_then() -> None:
     """The count does not begin anew with each time that the command crosses the pressure."""
     bench: Any = SimpleNamespace(
         node=SimpleNamespace(
-            mode=Mode.ACTIVE, fault=Fault.NONE, monitors=None, alarms=SimpleNamespace(codes=set()),
-            supervisor=SimpleNamespace(mode=Mode.ACTIVE, fault=Fault.NONE, degraded=False),
-            inbox=SimpleNamespace(watched=(), foreign=0, pressure_pa=0.0),
+            mode=Mode.ACTIVE, fault=Fault.NONE,
+            safety=SimpleNamespace(
+                alarms=SimpleNamespace(codes=set()),
+                supervisor=SimpleNamespace(mode=Mode.ACTIVE, fault=Fault.NONE, degraded=False),
+            ),
+            inbox=SimpleNamespace(watched=(), foreign=0, discarded=0),
+            measured=SimpleNamespace(pressure_pa=0.0),
         ),
         ship=SimpleNamespace(
             drive=SimpleNamespace(setpoint_pa=0.0), valve=None,

@@ -60,6 +60,16 @@ class Bench:
         self.lockstep = Lockstep([*self.failing.values()])
         self.degraded: set[Fault] = set()
 
+    @property
+    def used(self) -> int:
+        """Place of the motion sensor in use."""
+        return self.node.safety._motion
+
+    def accused(self, place: int) -> bool:
+        """Whether anything has spoken against a motion sensor."""
+        assert self.node.safety.monitors is not None
+        return self.node.safety.monitors.sensors[place].accused
+
     def fail(self, name: str, spoil: Callable[[Frame], object], begin_ns: int = T0) -> None:
         self.failing[name].begin_ns = begin_ns
         self.failing[name].spoil = spoil  # type: ignore[assignment]
@@ -99,8 +109,7 @@ def test_in_health_the_first_sensor_is_used_and_nothing_is_degraded() -> None:
         degraded |= bench.node.safety.supervisor.degraded
     assert bench.node.mode is Mode.ACTIVE
     assert not degraded
-    motions = bench.node.inbox.motions
-    assert motions.used is motions.first
+    assert bench.used == 0
 
 
 @pytest.mark.parametrize("first", [True, False])
@@ -108,12 +117,11 @@ def test_one_silent_motion_sensor_leaves_the_other_and_half_the_pressure(first: 
     bench = Bench()
     bench.fail("sensors" if first else "sensors_2", dropped(SensorMotion) if first else dropped())
     bench.run(T0_S + 5.0)
-    motions = bench.node.inbox.motions
-    assert motions.used is (motions.second if first else motions.first)
+    assert bench.used == int(first)
     assert bench.node.mode is Mode.ACTIVE
     assert bench.node.safety.supervisor.degraded
     assert Fault.MOTION_SILENT in {alarm.code for alarm in bench.ship.panel.alarms}
-    assert bench.node.inbox.roll_rad == pytest.approx(bench.ship.plant.roll_rad, abs=0.01)
+    assert bench.node.motion.roll_rad == pytest.approx(bench.ship.plant.roll_rad, abs=0.01)
 
 
 def test_both_silent_end_it_in_time() -> None:
@@ -160,11 +168,10 @@ def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> No
     address = None if first else Address.SENSORS_2
     name = "sensors" if first else "sensors_2"
     bench.fail(name, motion(WRONG.get(wrong) or held(), address))
-    motions = bench.node.inbox.motions
     end_ns = T0 + round(1.5 * PERIOD_S * SECOND)
-    while bench.lockstep.now_ns < end_ns and (not first or motions.used is motions.first):
+    while bench.lockstep.now_ns < end_ns and (not first or bench.used == 0):
         bench.run(bench.lockstep.now_ns * 1e-9 + 0.1)
-    assert motions.used is (motions.second if first else motions.first)
+    assert bench.used == int(first)
     bench.run(bench.lockstep.now_ns * 1e-9 + 0.5)
     assert bench.node.mode is Mode.ACTIVE, bench.node.fault
     assert bench.node.safety.supervisor.degraded
@@ -175,19 +182,18 @@ def test_a_wrong_sensor_is_left_for_the_other_one(wrong: str, first: bool) -> No
 def test_a_sensor_found_wrong_is_not_gone_back_to_while_the_other_is_silent(gap_ms: int) -> None:
     bench = Bench()
     bench.fail("sensors", motion(lambda roll, rate: (roll + 0.015, rate)))
-    motions = bench.node.inbox.motions
     bench.run(T0_S + 20)
-    assert motions.used is motions.second
+    assert bench.used == 1
     # its evidence is gone by now, and the two are still apart
     bench.run(T0_S + 40)
-    assert (motions.first.accused, bench.node.mode) == (True, Mode.ACTIVE)
+    assert (bench.accused(0), bench.node.mode) == (True, Mode.ACTIVE)
     gap = bench.failing["sensors_2"]
     gap.spoil, gap.begin_ns = dropped(), bench.lockstep.now_ns
     gap.end_ns = gap.begin_ns + gap_ms * MS
     for _ in range(1500):
         bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
-        assert motions.used is motions.second
-        assert motions.first.accused
+        assert bench.used == 1
+        assert bench.accused(0)
     if gap_ms == 30:
         assert bench.node.mode is Mode.ACTIVE
     else:
@@ -228,8 +234,7 @@ def test_gauges_that_are_swapped_are_no_reason_to_change_the_motion_sensor() -> 
     bench.fail("sensors", altered(SensorTank, swap), 0)
     bench.run_to_fault(40.0)
     assert bench.node.fault in (Fault.MOTION_SIGN_FLIP, Fault.SIGN_FLIP, Fault.STUCK_SIGNAL)
-    motions = bench.node.inbox.motions
-    assert motions.used is motions.first
+    assert bench.used == 0
 
 
 def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
@@ -247,7 +252,7 @@ def test_one_broken_node_cannot_hide_both_gauge_and_switch() -> None:
     while abs(plant.level_m) <= limit_m and bench.lockstep.now_ns < 600 * SECOND:
         bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
     high_ns = bench.lockstep.now_ns
-    assert not bench.node.inbox.high_level  # the gauges' node hides it
+    assert not bench.node.measured.high_level  # the gauges' node hides it
     bench.run_to_fault(high_ns * 1e-9 + 1.0)
     assert bench.node.fault is Fault.LEVEL_LIMIT
     assert bench.lockstep.now_ns - high_ns <= 120 * MS
@@ -418,12 +423,10 @@ def test_commissioning_ends_where_the_level_goes_too_far_to_either_side(sign: fl
 def test_a_sensor_that_is_left_is_accused_from_then_on() -> None:
     bench = Bench()
     bench.fail("sensors", motion(lambda roll, rate: (-roll, rate)))
-    motions = bench.node.inbox.motions
-    assert motions is not None
     left = 0
     while bench.lockstep.now_ns < (T0_S + 5.0) * SECOND:
         bench.lockstep.run_until(bench.lockstep.now_ns + 10 * MS)
-        if motions.used is motions.second:
+        if bench.used == 1:
             left += 1
-            assert motions.first.accused
+            assert bench.accused(0)
     assert left > 400

@@ -9,6 +9,9 @@ from typing import Final, NamedTuple
 
 from utank_hil.canbus.enumerations import DriveState, Mode
 
+MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
+"""Names of what a law may measure, of `MotionSample` or of `Measurements`."""
+
 
 @dataclass(slots=True, eq=False)
 class MotionSample:
