@@ -38,7 +38,7 @@ without a default is required.
 """
 
 FILES = (
-    (Vessel, "Ship files", "`configs/ships`: a ship, her tank and its actuators. How to write one: "
+    (Vessel, "Ship files", "`configs/ships`: a ship, its tank and its actuators. How to write one: "
      "[how-to/ship.md](how-to/ship.md)."),
     (ControllerConfig, "Controller files", "`configs/controllers`: what `utank-hil run` takes."),
     (Scenario, "Scenario files", "`configs/scenarios`: what `utank-hil bench` takes."),
@@ -69,7 +69,7 @@ GENERAL = {
     "sample_time_s": "Time between two answers of the law, a whole number of ticks of 10 ms.",
     "seed": "Of waves and sensor noise: the same seed gives the same run.",
     "signals": "Names of signals of the message.",
-    "speed_m_s": "Of the ship ahead, which shifts the periods that she meets the waves with.",
+    "speed_m_s": "Of the ship ahead, which shifts the periods that it meets the waves with.",
     "threshold_rad_m_s2": "Of the switching function, within which the valve stays as it is.",
     "time_s": "Since the start of the run.",
     "tp_s": "Peak period.",

@@ -52,7 +52,7 @@ RIGHTLY_FOUND = {
 """Laws that roll the ship more than the passive tank in a sea, or on purpose: none of `by_monitor`.
 
 `self_tuned` is made for the storm's sea; in the short waves at the beginning of the voyage it rolls
-her 1.3 to 1.9 times as much for the first minutes.
+it 1.3 to 1.9 times as much for the first minutes.
 """
 
 

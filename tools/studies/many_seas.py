@@ -4,7 +4,7 @@
 
 The first ship, linear, with the sensors, delay, lag and limiters of the bench, in sixteen seas of
 ordinary weather, storm and formulas, and in more: swell from afar, two systems at once, short and
-steep seas; the storm on other headings at speed, and with the ship loaded for 0.7 to 1.3 of her
+steep seas; the storm on other headings at speed, and with the ship loaded for 0.7 to 1.3 of its
 roll period. The self-tuned law is given the waves as they meet the ship, and the ship; "no sea
 known" is the same law without the waves. Share is the part of the way from the passive tank to the
 clairvoyant bound; no law that does not know the waves to come exceeds that of the causal bound.
@@ -48,7 +48,7 @@ HOURS: Final = (
 )  # of February 2019, significant heights of 0.65 to 1.4 m
 SIXTEEN: Final = 16
 PERIODS: Final = (0.7, 0.85, 1.15, 1.3)
-"""Of the ship's roll period, by her loading."""
+"""Of the ship's roll period, by its loading."""
 HEADINGS_DEG: Final = {"nearly following": 20.0, "quartering": 45.0, "bow": 135.0}
 SPEED_M_S: Final = 6.0
 CAUSAL: Final = "causal bound"

@@ -120,7 +120,7 @@ def parts_of(sea: str, period_s: float, hours: int, minutes: list[float]) -> Ite
                     level,
                 ]
             )
-            # with a passive tank the ship is known, under GPC she is not
+            # with a passive tank the ship is known, under GPC it is not
             known = actual if job.name == "passive" else plant.ship
             figures = ShipFigures.of(known)
             for length in minutes:

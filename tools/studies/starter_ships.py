@@ -2,8 +2,8 @@
 
     python -m tools.studies.starter_ships
 
-Each ship of the table goes from her dimensions to a bench of `--duration` seconds, as the commands
-would take her; those for which no tank can be are listed with the reason.
+Each ship of the table goes from its dimensions to a bench of `--duration` seconds, as the commands
+would take it; those for which no tank can be are listed with the reason.
 """
 
 import math

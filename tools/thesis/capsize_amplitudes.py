@@ -22,7 +22,7 @@ FINE_NM, COARSE_NM = 100.0, 500.0
 
 
 def _thresholds(model: RollModel, phases_deg: FloatArray, step_nm: float) -> FloatArray:
-    """Least amplitude of M cos(0.6 t + phase) that capsizes her from rest, N m, at each phase."""
+    """Least amplitude of M cos(0.6 t + phase) that capsizes it from rest, N m, at each phase."""
     return np.array(
         [
             capsize_threshold(
@@ -66,7 +66,7 @@ def figure_capsize() -> Figure:
     return Figure(
         "nonlinear model; the least capsizing amplitude, searched upwards in steps of "
         f"{FINE_NM:g} N m without a tank and {COARSE_NM:g} with it, {DURATION_S:.0f} s each",
-        "The phase at which the wave starts, Lz, the friction and how long she must survive are "
+        "The phase at which the wave starts, Lz, the friction and how long it must survive are "
         "not given: phases over half a turn (the other half is to the other side), Lz from -1 to "
         "0.5 m, damping ratio of the water from 0.05 to 0.5.",
         (
@@ -96,7 +96,7 @@ def figure_capsize() -> Figure:
         ),
         rows=(
             Row(
-                "least moment that capsizes her without a tank, cosine",
+                "least moment that capsizes it without a tank, cosine",
                 "N m",
                 WEAK_NM,
                 float(bare[0]),
@@ -155,7 +155,7 @@ def figure_capsize() -> Figure:
                 Verdict.of(bool((bare <= WEAK_NM).mean() > 0.5)),
                 f"the least capsizing moment is {np.min(bare) / 1e3:.1f} to "
                 f"{np.max(bare) / 1e3:.1f} kN m over the phase; it is the printed one at about "
-                f"{least_deg:g}° only, elsewhere she capsizes before",
+                f"{least_deg:g}° only, elsewhere it capsizes before",
             ),
             Check(
                 "the ship with the passive tank survives 7.8601e4 and capsizes at 8.6461e4 N m",

@@ -91,7 +91,7 @@ def figure_damping() -> Figure:
                 "%",
                 100.0,
                 100 * tank,
-                "fall to a quarter from 10°; her own damping is small, the tank's share large",
+                "fall to a quarter from 10°; its own damping is small, the tank's share large",
             ),
             Row(
                 "the same by the greatest roll in waves of 20 kN m",

@@ -29,7 +29,7 @@ _METHOD: Final = (
 )
 _OPEN: Final = (
     "Chapter 2 gives no ship: here the first ship of 3.8 with 2.5 % roll damping and a duct of "
-    "4.26 m² that gives the water her roll frequency. The frictions of the family are not known "
+    "4.26 m² that gives the water its roll frequency. The frictions of the family are not known "
     "and varied from 0.02 to 1, as damping ratio of the water."
 )
 
@@ -239,7 +239,7 @@ def figure_2_6() -> Figure:
                 Verdict.PARTLY if rise[-1] > 0 else Verdict.of(rise[0] > 0),
                 f"between the two peaks the phase rises by {rise[0]:.0f}° at {FRICTIONS[0]:g} and "
                 f"still by {rise[-1]:.0f}° at {FRICTIONS[-1]:g}: the ship remains an absorber of "
-                "the water at her own frequency",
+                "the water at its own frequency",
             ),
             Check(
                 "(2.26) gives the phase (implied)",

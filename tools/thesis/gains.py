@@ -56,7 +56,7 @@ def figure_gains() -> Figure:
             Check(
                 "they are those of the printed ship",
                 Verdict.of(max(as_printed.roll_only, as_printed.both, as_printed.angle) < 0.05),
-                f"her own laws deviate by up to {as_printed.roll_only:.1%} (roll), "
+                f"its own laws deviate by up to {as_printed.roll_only:.1%} (roll), "
                 f"{as_printed.both:.1%} (both) and {as_printed.angle:.0%} (tank angle); with "
                 f"reservoirs of {FITTED[1].reservoir_area_m2:.1f} m² the laws on roll by "
                 f"{fitted.roll_only:.2%}",

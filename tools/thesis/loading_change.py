@@ -189,7 +189,7 @@ def _modes(a: FloatArray) -> tuple[float, ...]:
 
 
 class _Sea:
-    """The changed ship in her wave, sailed part by part."""
+    """The changed ship in its wave, sailed part by part."""
 
     def __init__(self, ship: RollShip, tank: Tank, wave: Wave) -> None:
         self._a, self._b = transition_and_step(*state_matrices(ship, tank), _STEP_S)

@@ -24,7 +24,7 @@ _X: Final = "Wave frequency per roll frequency"
 
 
 def _first() -> ShipTankRatios:
-    """The first ship's ratios with a duct of her frequency; f² as its static coupling."""
+    """The first ship's ratios with a duct of its frequency; f² as its static coupling."""
     ship, tank = first_ship(4.87e7, 0.1)
     found, _ = ship_ratios(ship, tuned_tank(ship, tank))
     return ShipTankRatios(found.mass_ratio, found.coupling_ratio, found.roll_damping_ratio)
@@ -113,7 +113,7 @@ def figure_3_3() -> Figure:
     tops = {share: float(y.max()) for share, y in family.items()}
     return Figure(
         "closed form of 3.2",
-        "Ship and dampings are not given: the first ship with a duct of her roll frequency "
+        "Ship and dampings are not given: the first ship with a duct of its roll frequency "
         f"(mass ratio {ratios.mass_ratio:.3f}), 0.3, 1 and 3 times the optimum.",
         (
             Panel(

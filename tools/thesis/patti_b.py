@@ -76,7 +76,7 @@ def run_controller(
 
 
 def told(result: Survival) -> str:
-    """Greatest roll, or when she capsized."""
+    """Greatest roll, or when it capsized."""
     if math.isfinite(result.capsized_s):
         return f"capsizes at {result.capsized_s:.0f} s"
     return f"{math.degrees(result.max_roll_rad):.1f}°"

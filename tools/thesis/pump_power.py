@@ -1,6 +1,6 @@
 """Figure 2.7: moment of the stimulator per pump power, against the mass ratio.
 
-The ship is held still and the pump swings the water at her roll frequency w. With tank angle tau::
+The ship is held still and the pump swings the water at its roll frequency w. With tank angle tau::
 
     moment  K = (k_hh + m_hphi w^2) tau,     m_hphi = -rho L^2 At (H + Lz) / 2
     pump    M = abs(k_hh - m_hh w^2 + i b_hh w) tau,     power = M w tau / 2
@@ -57,7 +57,7 @@ def figure_2_7() -> Figure:
     spread = float(np.ptp(found["the same, friction as (2.12)"][1]))
     names = list(ways)
     return Figure(
-        "linear model, ship held still, pump at her roll frequency; apparent power, for a moment "
+        "linear model, ship held still, pump at its roll frequency; apparent power, for a moment "
         "of 0.02 rad times the ship's stiffness",
         "The source gives neither ship, power (mean or of the amplitudes), moment nor how the mass "
         "ratio is changed. Varied: by the duct with the printed and with smaller reservoirs, by "

@@ -30,7 +30,7 @@ def first_ship(
 
 
 AS_PRINTED: Final = first_ship(5.8e7, 0.080)
-"""Printed geometry, dampings at which her laws come nearest to the printed ones."""
+"""Printed geometry, dampings at which its laws come nearest to the printed ones."""
 GREATER: Final = first_ship(1.04e8, 0.153, 25.2)
 """Reservoirs with which all printed gains come within 4 %."""
 FITTED: Final = first_ship(7.9885e7, 0.15836, 24.416)

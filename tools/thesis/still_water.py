@@ -1,4 +1,4 @@
-"""Figure 2.8: the pump rolls the ship on still water, is stopped, and the tank quiets her."""
+"""Figure 2.8: the pump rolls the ship on still water, is stopped, and the tank quiets it."""
 
 import math
 from dataclasses import replace
@@ -60,7 +60,7 @@ def figure_2_8() -> Figure:
     return Figure(
         "nonlinear model, compiled simulation",
         "The source gives no ship, pressure or friction. Here the first ship with a duct sized for "
-        "her roll frequency; the pressure is chosen for three degrees, the friction varied from "
+        "its roll frequency; the pressure is chosen for three degrees, the friction varied from "
         "0.08 to 0.3 (0.16 drawn).",
         (
             Panel(
@@ -88,7 +88,7 @@ def figure_2_8() -> Figure:
                 "°",
                 90.0,
                 math.degrees(found.level_lead_rad),
-                f"her roll frequency with the water is {ship_ratios(ship, tank)[1]:.3f} rad/s, "
+                f"its roll frequency with the water is {ship_ratios(ship, tank)[1]:.3f} rad/s, "
                 f"not {ROLL_RAD_S:g}",
             ),
             Row(

@@ -185,9 +185,9 @@ def figure_4_10() -> Figure:
                 f"to {heel:.0%} of the greatest, {where}",
             ),
             Check(
-                "in the transient she can capsize at once (4.6)",
+                "in the transient it can capsize at once (4.6)",
                 Verdict.of(first_minute > 0.5),
-                f"of the amplitudes up to 200 kN m that capsize her with the passive tank within "
+                f"of the amplitudes up to 200 kN m that capsize it with the passive tank within "
                 f"300 s, {first_minute:.0%} do within the first 60 s",
             ),
         ),
@@ -196,7 +196,7 @@ def figure_4_10() -> Figure:
 
 
 def _early_share() -> float:
-    """Share of the capsizing amplitudes that capsize her within a minute."""
+    """Share of the capsizing amplitudes that capsize it within a minute."""
     amplitude = np.linspace(1e3, 200e3, 400)
     wave = WaveMoment(amplitude[:, None], [[WAVE_RAD_S]], [[0.0]])
     at = simulate_batch(PATTI_B, 300.0, wave=wave).capsized_s
@@ -269,7 +269,7 @@ def figure_4_14() -> Figure:
             _told(runs) + ": it is their gains, which the source does not give, that decide",
         ),
         Check(
-            "adaptive fuzzy control does not significantly help her to survive, compared with "
+            "adaptive fuzzy control does not significantly help it to survive, compared with "
             "the passive tank",
             Verdict.of(all(gain < 0.1 for gain in gains.values())),
             f"with a pump of {PUMP_PA / 1e3:g} kPa the greatest wave survived is, per that of "
@@ -285,7 +285,7 @@ def figure_4_15() -> Figure:
     return _figure(
         _plane("", runs),
         Check(
-            "the law keeps her within the passive tank's trajectory (implied)",
+            "the law keeps it within the passive tank's trajectory (implied)",
             Verdict.of(
                 runs["fuzzy (4.20)"].result.max_roll_rad < runs["passive"].result.max_roll_rad
             ),

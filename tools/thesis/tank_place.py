@@ -37,7 +37,7 @@ def figure_tank_place() -> Figure:
     acting = [_couplings(ship, replace(tank, lz_m=z)) for z in (PLACES_M[0], PLACES_M[-1])]
     return Figure(
         "linear model; moments by difference of the model at Lz and at 0",
-        "Only the trend is described. The first ship with a duct of her roll frequency and a "
+        "Only the trend is described. The first ship with a duct of its roll frequency and a "
         f"damping ratio of {_DAMPING:g}; Lz from -10 m (above the centre of gravity) to 5 m, also "
         "with frequency and damping at their optimum for each Lz.",
         (

@@ -42,7 +42,7 @@ def figure_3_1() -> Figure:
     labels = [f"friction {friction:g}" for friction in FRICTIONS]
     return Figure(
         "closed form (2.24), corrected",
-        "Ship, friction and tuning are not given: the first ship with a duct of her own roll "
+        "Ship, friction and tuning are not given: the first ship with a duct of its own roll "
         "frequency, friction varied from 0.05 to 0.4 (numbers at 0.1), and with the printed duct.",
         tuple(
             Panel(

@@ -59,7 +59,7 @@ class SeaState:
 
     @classmethod
     def on(cls, ship: RollShip, wave_moment: Harmonics) -> "SeaState":
-        """The sea as a ship feels it: waves up to twice her roll frequency, and their peak.
+        """The sea as a ship feels it: waves up to twice its roll frequency, and their peak.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A tank and pump for a ship, from her stability, her roll period and the room there is.
+"""A tank and pump for a ship, from its stability, its roll period and the room there is.
 
 For a ship of displacement weight W, metacentric height GM and roll frequency w, and a tank of duct
 length L, reservoir area At and still height H (`utank_hil.dynamics.tank`):
@@ -41,7 +41,7 @@ LEAST_GM_M: Final = 0.15
 USABLE_SHARE: Final = 3.85 / 4.88
 """Of the level at which a reservoir is full or empty, as on the first ship."""
 MOST_DUCT_SPEED_M_S: Final = 45.0 / 6.22
-"""Of the water: the first ship's at her pump's greatest flow."""
+"""Of the water: the first ship's at its pump's greatest flow."""
 PUMP_SLOPE_RAD: Final = math.radians(1.5)
 """Effective wave slope that a pump is made for: its level holds the ship upright on it."""
 LOADINGS: Final = (0.85, 1.0, 1.15)
@@ -183,7 +183,7 @@ def size_tank(
     Parameters
     ----------
     ship : RollShip
-        With her displacement.
+        With its displacement.
     stability_share : float
         0.03 to 0.25.
 
@@ -237,7 +237,7 @@ def size_tank(
 def _in_room(
     ship: RollShip, room: TankRoom, stability_share: float, duct_m: float, *, tuned: bool
 ) -> SizedTank:
-    """Tank of a share of stability, as fast as the ship or tuned to her, above a duct so high."""
+    """Tank of a share of stability, as fast as the ship or tuned to it, above a duct so high."""
     way_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2  # 2H + L At/Ap of a tuned tank
     duct_m = min(duct_m, _DUCT_SHARE * room.height_m)
     height_m = min((room.height_m - duct_m) / 2, _STILL_SHARE * way_m)

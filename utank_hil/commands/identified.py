@@ -83,7 +83,7 @@ class IdentifiedShips:
         OSError
             If they can't be written.
         ParameterError
-            If she is no ship that a file may hold.
+            If it is no ship that a file may hold.
         """
         ship, tank = found.ship(self.vessel.ship), found.tank(self.vessel.tank)
         refuse("vessel", tank_problems(ship, tank))

@@ -160,7 +160,7 @@ class ControllerConfig(Section):
         ]
 
     def _roll_problems(self) -> list[Problem]:
-        """The protection against great roll must act while the ship still rights herself."""
+        """The protection against great roll must act while the ship still rights itself."""
         limit_rad, righting = self.safety.roll_limit_rad, self.vessel.righting
         if limit_rad < righting.vanishing_rad:
             return []

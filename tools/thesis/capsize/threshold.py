@@ -96,8 +96,8 @@ def capsize_threshold(
     """Smallest amplitude of a regular wave moment that capsizes a ship initially at rest.
 
     The safe amplitudes need not form one interval: their boundary is fractal beyond a certain
-    forcing, and windows in which she capsizes lie far below the amplitudes that always capsize
-    her. So the whole range is searched upwards in steps of 1 / `cells` of it, and finer steps
+    forcing, and windows in which it capsizes lie far below the amplitudes that always capsize
+    it. So the whole range is searched upwards in steps of 1 / `cells` of it, and finer steps
     refine the first capsize. A window narrower than a step may be missed.
 
     Parameters
@@ -113,7 +113,7 @@ def capsize_threshold(
     """
 
     def first_capsize(amplitude: FloatArray) -> Threshold | None:
-        """The first of rising amplitudes that capsizes her, and the one before."""
+        """The first of rising amplitudes that capsizes it, and the one before."""
         wave = WaveMoment(amplitude[1:, None], [[frequency_rad_s]], [[phase_rad]])
         result = simulate_batch(model, duration_s, wave=wave)
         over = np.flatnonzero(np.isfinite(result.capsized_s))
