@@ -26,50 +26,46 @@ from utank_hil.telemetry.frame_log import SUFFIX
 
 LOCKSTEP: Final = "lockstep"
 POLL_S: Final = 0.1
-"""How often the progress is shown and Ctrl-C noticed, where no deadline depends on it."""
+"""Interval of the progress display and the check for Ctrl-C in s; no deadline depends on it."""
 BEGIN_AFTER_NS: Final = 200_000_000
-"""Time from when both sides are ready to the first tick of both: twenty looks of each."""
+"""Time in ns from both sides being ready to their common first tick: 20 polls of each side."""
 READY_POLL_S: Final = 0.01
-"""How often each side looks: once a tick."""
+"""Polling interval of each side in s: one tick."""
 
 LEAST_REACH: Final = 0.5
-"""A run that came less far than this share of the longest does not shorten what is compared."""
+"""Least share of the longest run that a run must reach to shorten the window compared."""
 LEAST_ROWS: Final = 0.9
-"""A run with less than this share of its rows in the time compared is not compared."""
+"""Least share of its rows in the window with which a run is compared."""
 
 Progress = Callable[[str, float], None]
-"""Takes a run's name and the seconds of it that are done."""
+"""Callback that takes the name of a run and its simulated or elapsed time in s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BenchResult:
-    """Everything a bench measured.
-
-    All runs are compared over one window of the ship's time, which is the time of the waves.
+    """Results of a bench; all runs are compared over one window of ship's time.
 
     Attributes
     ----------
     mode : str
-        "lockstep", "real time" or "real time on" and the interface.
+        "lockstep", "real time", or "real time on" and the interface.
     duration_s : float
-        Length asked for of each run.
+        Requested length of each run.
     settle_s, end_s : float
-        The window: what is left out at the start, and where the shortest run ended that came at
-        least `LEAST_REACH` as far as the longest.
+        Window: its start, and the end of the shortest run that reached `LEAST_REACH` of the
+        longest.
     without_tank_rad : ndarray, shape (n,)
         Roll of the bare ship in the same waves, every `RECORD_S` up to `end_s`.
     runs : tuple of Run
-        Those with at least one row; the passive tank first.
+        Runs with at least one row; the passive tank first.
     not_run : tuple of str
-        Names of the others.
+        Names of the runs without a row.
     interrupted : bool
-        Whether it was ended from outside.
-    wall_s : float
-        Time all of it took.
+        Whether the bench was ended from outside.
     without_tank_capsized_s : float
-        When the bare ship capsized; infinite if it did not.
+        Time at which the bare ship capsized; infinite if it did not.
     killed : bool
-        Whether a process of it was killed from outside, which ended the runs that went on.
+        Whether a process of the bench was killed from outside.
     """
 
     scenario: Scenario
@@ -88,32 +84,26 @@ class BenchResult:
 
     @property
     def expected_rows(self) -> int:
-        """Rows that a run has in the window if none is left out."""
+        """Number of rows of a complete run in the window."""
         return max(1, round((self.end_s - self.settle_s) / RECORD_S))
 
     def rows_compared(self, run: Run) -> int:
-        """Rows that a run has in the window."""
+        """Number of rows of a run in the window."""
         return int(run.between(self.settle_s, self.end_s).sum())
 
     def compares(self, run: Run) -> bool:
-        """Whether a run has enough rows in the window to stand beside the others."""
+        """Whether a run has enough rows in the window to be compared."""
         return self.rows_compared(run) >= LEAST_ROWS * self.expected_rows
 
 
 @dataclass(frozen=True, slots=True)
 class BenchOptions:
-    """What a caller may choose about a bench.
+    """Options of a bench; `seed` and `duration_s` replace the scenario's values.
 
     Attributes
     ----------
-    real_time : bool
-        In real time instead of lockstep.
     channel : str, optional
         SocketCAN interface for real time; without it both sides share one process.
-    seed : int, optional
-        Instead of the scenario's.
-    duration_s : float, optional
-        Instead of the scenario's.
     frames : Path, optional
         Folder for a frame log of each run in simulated time.
     """
@@ -126,7 +116,7 @@ class BenchOptions:
 
 
 class _Board:
-    """What the bench and the processes of its runs exchange, in shared memory."""
+    """Shared memory through which the bench and the processes of its runs communicate."""
 
     def __init__(self, context: SpawnContext, runs: int) -> None:
         self.done_s = [context.Value("d", 0.0, lock=False) for _ in range(runs)]
@@ -136,7 +126,7 @@ class _Board:
 
 
 class _Watch:
-    """The board as one run sees it."""
+    """View of the board for one run."""
 
     def __init__(self, board: _Board, index: int) -> None:
         self._board = board
@@ -165,7 +155,7 @@ def jobs_of(
     duration_s: float,
     laws: Mapping[str, BuiltLaw] | None = None,
 ) -> list[Job]:
-    """The passive tank's run, then one for each controller; `laws` as in `run_bench`."""
+    """Return the job of the passive tank, then one for each controller."""
     laws = laws or {name: build_law(each) for name, each in scenario.controllers.items()}
     first = next(iter(scenario.controllers.values()), None)
     if first is None:
@@ -190,22 +180,22 @@ def run_bench(
     progress: Progress,
     laws: Mapping[str, BuiltLaw] | None = None,
 ) -> BenchResult:
-    """Run a scenario: passive, then with each controller, all in the same waves.
+    """Run a scenario with the passive tank, then with each controller, in the same waves.
 
-    Each run has a process of its own. Ctrl-C ends the runs between two ticks, with the pump at
-    zero; what was recorded until then is returned.
+    Each run has its own process. Ctrl-C ends the runs between two ticks, with the pump at zero; the
+    rows recorded until then are returned.
 
     Parameters
     ----------
     progress : callable
-        Called several times a second while runs go on.
+        Function called several times a second.
     laws : mapping of str to BuiltLaw, optional
-        Of the scenario's controllers, if they were built before; they are designed without.
+        Laws of the scenario's controllers; they are designed if not given.
 
     Raises
     ------
     OSError
-        If the interface can't be used, or everything was ended before the first sample.
+        If the interface cannot be used, or everything was ended before the first sample.
     BrokenProcessPool
         If a process was killed before the passive run had ended.
     """
@@ -237,15 +227,7 @@ def run_bench(
 def run_in_turn(
     scenario: Scenario, seed: int, laws: Mapping[str, BuiltLaw] | None = None
 ) -> BenchResult:
-    """`run_bench` in lockstep within this process, one run after the other; the same rows.
-
-    Parameters
-    ----------
-    seed : int
-        Instead of the scenario's.
-    laws : mapping of str to BuiltLaw, optional
-        As in `run_bench`.
-    """
+    """Do what `run_bench` does in lockstep and in this process, one run after the other."""
     started = time.monotonic()
     jobs = jobs_of(scenario, seed, scenario.duration_s, laws)
     return _result(jobs, [run_lockstep(job) for job in jobs], LOCKSTEP, False, started)
@@ -254,7 +236,7 @@ def run_in_turn(
 def _result(
     jobs: list[Job], runs: list[Run], mode: str, interrupted: bool, started: float
 ) -> BenchResult:
-    """What the runs of a bench come to; `started` is the monotonic time of its beginning."""
+    """Return the result of a bench that began at the monotonic time `started`."""
     scenario, seed = jobs[0].scenario, jobs[0].seed
     done = tuple(run for run in runs if len(run.rows))
     settle_s, end_s = window_s(done, scenario.settle_s)
@@ -276,16 +258,15 @@ def _result(
 
 
 def frames_name(run: str) -> str:
-    """Name of the frame log of a run."""
+    """File name of the frame log of a run."""
     return f"{run}{SUFFIX}"
 
 
 def window_s(runs: tuple[Run, ...], settle_s: float) -> tuple[float, float]:
-    """Start and end of what is compared of runs, on the ship's time and on the grid of the rows.
+    """Start and end of the window compared, in ship's time on the grid of the rows.
 
-    The end is that of the shortest run; but a run counts only if it came at least `LEAST_REACH` as
-    far as the longest, so that one that was ended early doesn't leave too little of the others. At
-    least half of what there is lies in the window, however short that is.
+    The window ends with the shortest run that reached `LEAST_REACH` of the longest. It covers at
+    least half of the rows, however few there are.
     """
     longest_s = max(run.end_s for run in runs)
     end_s = min(run.end_s for run in runs if run.end_s >= LEAST_REACH * longest_s)
@@ -307,7 +288,7 @@ def _run_all(
     def wait(futures: list[Future[Any]]) -> Iterable[Any]:
         while not all(future.done() for future in futures):
             time.sleep(POLL_S)
-            # where one side has failed, the other must not wait for it
+            # when one side has failed, the other must not wait for it
             failed = any(future.done() and future.exception() for future in futures)
             board.stop.value = stopped() or failed
             if board.ready.value == len(futures) and not board.begin_ns.value:

@@ -78,7 +78,7 @@ def firmware_sim(
 
     **Example:** firmware-sim configs/scenarios/storm.yaml --bus vcan0 --without panel
     """
-    loaded = load(scenario, Scenario, allow_code=True)  # its laws are not built
+    loaded = load(scenario, Scenario, allow_code=True)  # laws are not built from it
     if loaded.faults:
         fail(f"{scenario}: faults: are for the bench in simulated time: leave them out")
     length_s = loaded.duration_s if duration is None else duration
@@ -147,7 +147,7 @@ def _run(
 
 
 def _figures(rows: FloatArray) -> tuple[RollStatistics, PumpStatistics]:
-    """Statistics of the truth, rows of columns `TRUTH`."""
+    """Statistics of the truth rows, with columns `TRUTH`."""
     roll_rad, level_m, pressure_pa, power_w = (
         rows[:, TRUTH.index(f"true_{name}")]
         for name in ("roll_rad", "level_m", "pressure_pa", "shaft_power_w")

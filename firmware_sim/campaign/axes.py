@@ -1,4 +1,4 @@
-"""Values that a key takes in a study: lists, ranges, hours of a measured file, random draws."""
+"""Values of a key in a study: lists, ranges, hours of a measured file, random draws."""
 
 import csv
 import zlib
@@ -14,16 +14,16 @@ from utank_hil.configuration import Section
 from utank_hil.configuration.spectra import read_spectra, utc
 
 Value = Any
-"""A number, text, time or truth value, or the content of a file that was named."""
+"""Number, text, time, truth value, or content of a file that the study names."""
 MOST_CASES: Final = 1_000_000
 WEIGHT: Final = "weight"
-"""Column of a table of draws: how often a row is drawn, relative to the others."""
+"""Column of a table of draws: relative probability of a row."""
 
 _Count = Annotated[int, Range(least=1, most=MOST_CASES)]
 
 
 class Spaced(Section):
-    """Numbers at equal distances, both ends included."""
+    """Equidistant numbers, both ends included."""
 
     low: Finite
     high: Finite
@@ -35,7 +35,7 @@ class Spaced(Section):
 
 
 class Counted(Section):
-    """Whole numbers from a first one on, such as seeds."""
+    """Consecutive whole numbers, such as seeds."""
 
     first: Annotated[int, Range(least=0)]
     count: _Count
@@ -59,7 +59,7 @@ class Hours(Section):
         return file
 
     def values(self) -> list[str]:
-        """The times, as a scenario writes them."""
+        """The times in the notation of a scenario."""
         found = read_spectra(self.hours_of).times(utc(self.since), utc(self.until))
         return [each.isoformat() for each in found]
 
@@ -72,7 +72,7 @@ _KINDS: Final[dict[str, type[Spaced | Counted | Hours]]] = {
 
 
 def _listed(written: Any) -> Any:
-    """A list as it is, a range as the list of its values."""
+    """Return a list unchanged, and a range as the list of its values."""
     if not isinstance(written, dict):
         return written
     for key, kind in _KINDS.items():
@@ -85,16 +85,16 @@ def _listed(written: Any) -> Any:
 
 
 Axis = Annotated[list[Value], BeforeValidator(_listed), Field(min_length=1)]
-"""The values that one key takes, one after the other."""
+"""Values of one key."""
 
 
 class Uniform(Section):
-    """Numbers of equal probability between two."""
+    """Uniformly distributed numbers."""
 
     low: Finite
-    """The least."""
+    """Lower bound."""
     high: Finite
-    """The greatest."""
+    """Upper bound."""
 
     def drawn(self, rng: np.random.Generator, count: int) -> list[Value]:
         """Draw `count` values."""
@@ -115,7 +115,7 @@ class Normal(Section):
 
 
 class Consecutive(Section):
-    """Whole numbers, another for each sample: seeds."""
+    """Consecutive whole numbers, one for each sample, such as seeds."""
 
     first: Annotated[int, Range(least=0)]
     """The first number."""
@@ -126,7 +126,7 @@ class Consecutive(Section):
 
 
 class Choice(Section):
-    """One of some values, each as often as the others."""
+    """Equally likely choice among given values."""
 
     one_of: Annotated[list[Value], Field(min_length=1)]
     """The values."""
@@ -137,16 +137,16 @@ class Choice(Section):
 
 
 class Draws(Section):
-    """Samples of keys that are drawn independently of one another, and of the rows of a table."""
+    """Samples of keys drawn independently of one another and of the rows of a table."""
 
     samples: _Count
     """Number of samples."""
     seed: Annotated[int, Range(least=0)] = 1
-    """Seed of the draws; another than that of the waves."""
+    """Seed of the draws, independent of the seed of the waves."""
     keys: dict[str, Uniform | Normal | Consecutive | Choice] = Field(default_factory=dict)
-    """What is drawn for each dotted key."""
+    """Distribution of each dotted key."""
     table: Path | None = None
-    """CSV: its heading names keys, and `weight`; a sample takes the values of one row."""
+    """CSV file whose header names keys and `weight`; a sample takes the values of one row."""
 
     @model_validator(mode="after")
     def _something_to_draw(self) -> "Draws":
@@ -160,7 +160,7 @@ class Draws(Section):
         return self
 
     def samples_drawn(self) -> list[dict[str, Value]]:
-        """Each sample's values by key; the same for the same seed, whatever else is drawn."""
+        """Values of each sample by key; the draws of one key do not depend on the other keys."""
         columns = {key: each.drawn(self._rng(key), self.samples) for key, each in self.keys.items()}
         samples = [
             {key: values[index] for key, values in columns.items()} for index in range(self.samples)

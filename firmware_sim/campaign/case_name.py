@@ -1,4 +1,4 @@
-"""Names of cases: the hash of configuration, seed and code, so that the same is computed once."""
+"""Names of cases: a hash of configuration, seed and code, so that no case is computed twice."""
 
 import hashlib
 import importlib.metadata
@@ -20,7 +20,7 @@ _WAVES: Final = ("sea", "voyage", "duration_s", "settle_s")
 
 @cache
 def code_digest() -> str:
-    """Hash of the program's files and of the versions of the packages that compute for it."""
+    """Hash of the program's files and of the versions of the numerical packages."""
     whole = hashlib.sha256()
     for package in _PACKAGES:
         files = (file for file in (_ROOT / package).rglob("*") if file.suffix in _SUFFIXES)
@@ -34,26 +34,20 @@ def code_digest() -> str:
 
 
 def case_name(simulation: str, content: dict[str, Any]) -> str:
-    """Name of a case.
-
-    Parameters
-    ----------
-    content : dict
-        Of the scenario, its seed included. A data file counts by what is in it.
-    """
+    """Name of a case: a hash of the scenario's content, its seed and its data files."""
     return _digest([simulation, content, code_digest()])
 
 
 def waves_name(content: dict[str, Any]) -> str:
-    """What a scenario's waves are named by, and the span that is judged.
+    """Hash of a scenario's waves and of the span that is judged.
 
-    Two runs of one name met the same waves: they are compared pair by pair.
+    Runs with the same name met the same waves and are compared pair by pair.
     """
     return _digest([{key: content.get(key) for key in _WAVES}, content.get("seed", 1)])
 
 
 def as_text(content: Any) -> str:
-    """A content as JSON, in one form."""
+    """Content as JSON in canonical form."""
     return json.dumps(content, sort_keys=True, default=_plain)
 
 

@@ -1,4 +1,4 @@
-"""Workers of a campaign: a process for each core of this machine, or a cluster that is there."""
+"""Workers of a campaign: one process per core of this machine, or an existing cluster."""
 
 import logging
 import os
@@ -15,22 +15,22 @@ from utank_hil.runners.stopping import signals_waiting
 
 LOOPBACK: Final = "127.0.0.1"
 MOST_DEATHS: Final = 10
-"""A batch whose workers died so often is given up; three is too few where workers are preempted."""
+"""Worker deaths after which a batch is abandoned; three is too few for preemptible workers."""
 RESTART_S: Final = 120
-"""A worker is given so long to come back: importing takes a while on a busy machine."""
+"""Time in s allowed for a worker to restart: imports are slow on a busy machine."""
 CONNECT_S: Final = 10.0
 
 
 @contextmanager
 def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
-    """Connect with a scheduler, or start one on this machine that nobody else can reach.
+    """Connect to a scheduler, or start a local one that no other machine can reach.
 
     Parameters
     ----------
     scheduler : str, optional
-        Address, as ``tcp://10.0.0.5:8786``; without it the workers are processes of this machine.
+        Address such as ``tcp://10.0.0.5:8786``; without it the workers are local processes.
     count : int, optional
-        Of processes here; one a core if not given.
+        Number of local processes; one per core by default.
 
     Raises
     ------
@@ -41,15 +41,15 @@ def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
         with Client(scheduler, timeout=CONNECT_S) as client:
             yield client
         return
-    # what is said of workers that die and are started anew is the campaign's to say
+    # the campaign itself reports workers that die and are restarted
     settings = {
         "distributed.scheduler.allowed-failures": MOST_DEATHS,
         "distributed.deploy.lost-worker-timeout": f"{RESTART_S}s",
         "logging.distributed": "error",
     }
-    resource_tracker.ensure_running()  # its start would let Ctrl-C through again
+    resource_tracker.ensure_running()  # its start would unblock Ctrl-C
     with one_thread_each(), dask.config.set(settings):
-        with signals_waiting():  # Ctrl-C reaches all of the process group: the driver decides
+        with signals_waiting():  # Ctrl-C reaches the whole process group: the driver decides
             cluster = LocalCluster(
                 n_workers=count or len(os.sched_getaffinity(0)),
                 threads_per_worker=1,
@@ -63,10 +63,9 @@ def workers(scheduler: str | None, count: int | None) -> Iterator[Client]:
 
 
 def replace_lost(client: Client) -> None:
-    """Start workers of this machine anew that nothing watches any more.
+    """Restart local workers that no nanny watches any more.
 
-    One that dies is started anew at once by its nanny; a nanny whose worker dies while it starts,
-    or takes too long, gives up.
+    A nanny restarts a worker that dies, but gives up when the restart fails or takes too long.
     """
     cluster = client.cluster
     if cluster is not None:

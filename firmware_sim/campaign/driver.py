@@ -1,4 +1,4 @@
-"""Runs the cases of a study that are missing, and keeps their rows as they come."""
+"""Driver of a campaign: runs the missing cases of a study and stores their rows as they come."""
 
 import time
 from collections import deque
@@ -18,28 +18,28 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 BATCH_S: Final = 0.5
-"""Work that is sent together: ample beside the 10 ms that sending costs, little to lose."""
+"""Work per batch in s: large beside the 10 ms of sending it, small enough to lose."""
 MOST_TOGETHER: Final = 200
 AHEAD: Final = 2
-"""Batches that wait at each worker or run there."""
+"""Number of batches queued or running at each worker."""
 LOOK_S: Final = 5.0
-"""So often workers that are gone for good are replaced."""
+"""Interval in s at which dead workers are replaced."""
 FLUSH_S: Final = 1.0
-"""Rows are on disk so long after they came back."""
+"""Longest delay in s between the return of rows and their writing to disk."""
 
 Work = Callable[[Batch], list[Row]]
 
 
 @dataclass(slots=True)
 class Count:
-    """How far a campaign is.
+    """Progress of a campaign.
 
     Attributes
     ----------
     needed : int
-        Cases that are still to be computed, or were.
+        Number of cases computed or still to be computed.
     done, failed, lost : int
-        Of those: computed, failed, ended from outside.
+        Number of cases computed, failed, and ended from outside.
     case_s : float
         Mean time of a case.
     """
@@ -51,7 +51,7 @@ class Count:
     case_s: float = 0.0
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Count the cases of some rows."""
+        """Count the cases in some rows."""
         for row in {row["case"]: row for row in rows}.values():
             self.done += 1
             self.failed += row["status"] == FAILED
@@ -64,16 +64,16 @@ Progress = Callable[[Count], None]
 
 @dataclass(slots=True)
 class Driver:
-    """Sends the missing cases of a study to workers.
+    """Sender of the missing cases of a study to workers.
 
     Parameters
     ----------
     store : Store
-        Begun for this study.
+        Store already begun for this study.
     progress : callable
-        Called with the state after each batch.
+        Function called with the `Count` after each batch.
     work : callable
-        What a worker does.
+        Function that a worker runs on a batch.
     """
 
     loaded: LoadedStudy
@@ -90,19 +90,13 @@ class Driver:
         done = self.store.done()
         self.stopping = Stopping(self.loaded.study.stop, self.loaded.cases)
         self.stopping.add(self.store.rows().to_pylist())
-        # the same case may stand in a study twice
+        # a study may contain the same case twice
         missing = {case.name: case for case in self.loaded.cases if case.name not in done}
         self._waiting = deque(case for case in missing.values() if self.stopping.needs(case))
         self.count = Count(len(self._waiting))
 
     def run(self, client: "Client") -> None:
-        """Compute what is missing.
-
-        Raises
-        ------
-        OtherCodeError
-            If a worker has other code.
-        """
+        """Compute the missing cases; raise `OtherCodeError` if a worker has different code."""
         from firmware_sim.campaign.cluster import replace_lost
 
         self._written_s = looked_s = time.monotonic()
@@ -158,7 +152,7 @@ class Driver:
         while True:
             try:
                 return future.result(timeout=LOOK_S)
-            except TimeoutError:  # it is lost with its worker, and has to be computed again
+            except TimeoutError:  # the result is lost with its worker and must be recomputed
                 replace_lost(client)
             except KilledWorker:
                 reason = "the workers that computed it died again and again: too little memory?"
@@ -179,7 +173,7 @@ class Driver:
 
 
 def batch_of(loaded: LoadedStudy, cases: Iterable[Case]) -> Batch:
-    """Cases of a study, ready to be sent."""
+    """Batch of cases, ready to be sent."""
     study = loaded.study
     return Batch(
         study.simulation,

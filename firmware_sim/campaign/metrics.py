@@ -1,4 +1,4 @@
-"""The figures that a campaign keeps of each run."""
+"""Metrics that a campaign stores for each run."""
 
 from typing import Final
 
@@ -16,7 +16,7 @@ METRICS: Final = {
     "strikes": "how often the water struck a limit of its level",
     "active_share": "share of the time in which the controller was in charge",
 }
-"""Column and meaning, over the scenario's window; not a number where a run has no such figure."""
+"""Meaning of each metric's column over the scenario's window; NaN where it does not apply."""
 
 LEAVES_OUT: Final = {
     "bus": (),
@@ -36,4 +36,4 @@ LEAVES_OUT: Final = {
         "the drive's own limits",
     ),
 }
-"""What each kind of simulation does not compute."""
+"""Effects that each kind of simulation leaves out."""

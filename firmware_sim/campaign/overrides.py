@@ -8,33 +8,26 @@ from utank_hil.configuration.known_keys import known_keys, nearest
 
 Content = dict[str, Any]
 WHOLE: Final = "scenario"
-"""Key of the whole scenario: its value is another one."""
+"""Key whose value replaces the whole scenario."""
 _VESSEL: Final = "vessel"
 _EVERY: Final = "*"
 
 
 class OverrideError(ValueError):
-    """A key that stands nowhere in the scenario; the message begins with a verb."""
+    """Error for a key that the scenario does not have; the message begins with a verb."""
 
 
 def changed(content: Content, values: Mapping[str, Any]) -> Content:
-    """A scenario's content with other values at some keys.
+    """Return a copy of a scenario's content with other values at some dotted keys.
 
     ``*`` stands for every name, as in ``controllers.*.limits.pressure_pa``. A key of ``vessel``
-    counts for the controllers of the same ship, too: what the ship really is, apart from what they
-    believe, is ``actual_ship``.
-
-    Parameters
-    ----------
-    content : dict
-        Left as it is.
-    values : mapping
-        By dotted key, taken in this order; `WHOLE` replaces the content.
+    also applies to the controllers of the same ship; ``actual_ship`` changes the ship alone and not
+    the controllers' model of it. Values are applied in order; `WHOLE` replaces the content.
 
     Raises
     ------
     OverrideError
-        If a key leads into a value, or to a name that is not there.
+        If a key leads into a value, or to a name that does not exist.
     """
     new: Content = values.get(WHOLE, content)
     for key, value in values.items():
@@ -45,7 +38,7 @@ def changed(content: Content, values: Mapping[str, Any]) -> Content:
 
 
 def _paths(content: Content, path: list[str]) -> Iterator[list[str]]:
-    """The places that a key stands for."""
+    """Yield the paths that a key with ``*`` matches."""
     if _EVERY in path:
         at = path.index(_EVERY)
         names = _inside(content, path[:at])
@@ -69,7 +62,7 @@ def _inside(content: Any, path: list[str]) -> Any:
 
 
 def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:
-    """A copy of a section, as deep as the path goes, with another value at its end."""
+    """Return a copy of a section, down to the end of the path, with the new value there."""
     if depth == len(path):
         return value
     part, above = path[depth], ".".join(path[:depth])
@@ -86,7 +79,7 @@ def _with(place: Any, path: list[str], value: Any, depth: int = 0) -> Any:
 
 
 def _refuse_stranger(place: Content, path: list[str]) -> None:
-    """Refuse a section that nothing of the kind may stand at; an absent one may be begun."""
+    """Refuse a key that the schema does not allow; a missing allowed section may be created."""
     *above, name = path
     known = known_keys(Scenario, above)
     if name in known:

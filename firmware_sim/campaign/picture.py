@@ -1,4 +1,4 @@
-"""The picture of a campaign from its figures."""
+"""Picture of a campaign."""
 
 import math
 from pathlib import Path
@@ -10,13 +10,7 @@ from utank_hil.pictures.campaign import CampaignRun, draw_campaign
 
 
 def draw(results: Results, groups: list[dict[str, Any]], path: Path) -> Path:
-    """Draw a campaign.
-
-    Parameters
-    ----------
-    groups : list of dict
-        Its `summary`.
-    """
+    """Draw the groups of a campaign's `summary`."""
     names = list(dict.fromkeys(run for group in groups for run in group["runs"]))
     found = groups_of(results)
 
@@ -43,7 +37,7 @@ def draw(results: Results, groups: list[dict[str, Any]], path: Path) -> Path:
 
 
 def _label(parameters: dict[str, Any]) -> str | float:
-    """A number where one is varied, else the values in words."""
+    """Label of a group: the number if one key is varied, else the values as text."""
     values = list(parameters.values())
     if len(values) == 1 and isinstance(values[0], float | int):
         return values[0]

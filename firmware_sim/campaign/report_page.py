@@ -1,4 +1,4 @@
-"""What a report says of a campaign: read from the files that it left."""
+"""Report of a campaign, made from the files in its folder."""
 
 import json
 from pathlib import Path
@@ -11,23 +11,16 @@ from utank_hil.pictures.report_page import ReportPicture, ReportSection, ReportT
 from utank_hil.reports.parts import Report, ReportKind, about_section, printed
 
 MOST_LINES: Final = 8
-"""Of the verdict."""
+"""Most lines of the verdict. Chosen; no study."""
 
 
 def campaign_report(folder: Path, scratch: Path) -> Report:  # noqa: ARG001
-    """The report of a campaign.
-
-    Parameters
-    ----------
-    folder : Path
-        What ``utank-hil campaign --out`` wrote.
-    scratch : Path
-        As of every report; this one makes no pictures.
+    """Return the report of a campaign's folder; `scratch` is unused, as it makes no pictures.
 
     Raises
     ------
     OSError, ValueError
-        If a file of the campaign is missing or is none.
+        If a file of the campaign is missing or invalid.
     """
     content = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     groups, failed, study = content["groups"], content["failures"], content["configuration"]

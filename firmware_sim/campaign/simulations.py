@@ -1,4 +1,4 @@
-"""One case computed: the bare ship, the passive tank and every controller, in the same waves."""
+"""Simulation of one case: bare ship, passive tank and every controller in the same waves."""
 
 import math
 from collections import deque
@@ -39,7 +39,7 @@ _LEVEL, _LEVEL_RATE = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Record:
-    """A run of a fast simulation, every `RECORD_S`; arrays of shape (n,)."""
+    """Record of a fast simulation, every `RECORD_S`; arrays have shape (n,)."""
 
     name: str
     roll_rad: FloatArray
@@ -58,20 +58,20 @@ def rows_of(simulation: str, scenario: Scenario, seed: int, laws: Laws) -> list[
     simulation : str
         "bus", "linear" or "nonlinear".
     seed : int
-        Instead of the scenario's.
+        Seed that replaces the scenario's.
     laws : mapping of str to BuiltLaw
-        Of its controllers.
+        Laws of the scenario's controllers.
 
     Returns
     -------
     list of dict
-        A row for the ship without a tank and for each run: ``run``, ``mark`` (why it does not
-        count, or empty) and the figures of `METRICS`.
+        One row for the bare ship and for each run: ``run``, ``mark`` (why it does not count, or
+        empty) and the figures of `METRICS`.
 
     Raises
     ------
     ValueError
-        If this kind of simulation can't compute the scenario.
+        If this kind of simulation cannot compute the scenario.
     """
     if simulation == "bus":
         return _on_the_bus(scenario, seed, laws)
@@ -98,7 +98,7 @@ def _on_the_bus(scenario: Scenario, seed: int, laws: Laws) -> list[Row]:
 
 
 def _judged(scenario: Scenario, records: list[_Record]) -> list[Row]:
-    """Rows of a fast simulation, over the scenario's window."""
+    """Yield the rows of a fast simulation, judged over the scenario's window."""
     window = slice(round(scenario.settle_s / RECORD_S), None)
     rows: list[Row] = []
     rolls: dict[str, float] = {}
@@ -152,7 +152,7 @@ def _number(value: float | None) -> float:
 
 
 def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
-    """Linear ship and tank; the law with limiter, level observer and sensor noise."""
+    """Simulate linear ship and tank with law, limiter, level observer and sensor noise."""
     _refuse_valve(scenario)
     ship, tank = scenario.ship_at(0.0), scenario.vessel.tank
     changes = scenario.voyage or len(scenario.sea.spectra) > 1
@@ -197,7 +197,7 @@ def _linear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
 
 
 def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
-    """The bench's plant with its pump; the law with its limiter, on the true motion."""
+    """Simulate the nonlinear plant and pump with law and limiter, fed with the true motion."""
     _refuse_valve(scenario)
     if scenario.plant == "linear":
         raise ValueError("plant: linear is not simulation: nonlinear; remove one")
@@ -212,7 +212,7 @@ def _nonlinear(scenario: Scenario, seed: int, laws: Laws) -> Iterator[_Record]:
 
 
 def _sailed(name: str, scenario: Scenario, seed: int, command: Callable[[Plant], float]) -> _Record:
-    """Sail with what is asked each tick for the pump's set-point."""
+    """Simulate a plant whose set-point is given by a function called once a tick."""
     plant = Plant(
         scenario.ship_at, scenario.vessel.tank, scenario.vessel.pump, scenario.waves(seed)
     )
@@ -230,7 +230,7 @@ def _sailed(name: str, scenario: Scenario, seed: int, command: Callable[[Plant],
 
 
 class _Commander:
-    """Law, limiter and delay between a plant and its pump, once a tick."""
+    """Law, limiter and delay between a plant and its pump, called once a tick."""
 
     def __init__(self, controller: ControllerConfig, law: BuiltLaw) -> None:
         self._law = law.controller()
@@ -243,7 +243,7 @@ class _Commander:
         self._tick = 0
 
     def __call__(self, plant: Plant) -> float:
-        """The set-point from now on."""
+        """Set-point of the pump from now on."""
         level_m, rate_m_s = plant.level_m, plant.flow_m3_s / self._area_m2
         if self._tick % self._samples == 0:
             if self._tick:

@@ -1,4 +1,4 @@
-"""When a group of cases is known well enough, whatever the order in which they come back."""
+"""Stopping rule for a group of cases, independent of the order in which they return."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,11 +11,11 @@ from utank_hil.analysis.motion.confidence import mean_interval
 _NOTHING: Final[Mapping[str, float]] = {}
 
 Figures = Mapping[str, float]
-"""A metric by run; empty of a case that failed."""
+"""Metric by run; empty for a failed case."""
 
 
 def figures_of(rows: Iterable[Mapping[str, Any]], metric: str) -> dict[str, float]:
-    """A metric by run, of the runs that count and have it."""
+    """Return a metric by run, for the runs that count and have it."""
     return {
         str(row["run"]): float(row[metric])
         for row in rows
@@ -24,7 +24,7 @@ def figures_of(rows: Iterable[Mapping[str, Any]], metric: str) -> dict[str, floa
 
 
 def enough(stop: Stop, figures: Sequence[Figures]) -> bool:
-    """Whether the intervals of all runs over these cases are as narrow as asked."""
+    """Whether the confidence intervals of all runs are as narrow as requested."""
     if len(figures) < stop.least:
         return False
     runs = {run for each in figures for run in each}
@@ -43,13 +43,7 @@ def enough(stop: Stop, figures: Sequence[Figures]) -> bool:
 
 
 class Stopping:
-    """Which cases a campaign still needs.
-
-    Parameters
-    ----------
-    stop : Stop or None
-        None needs all.
-    """
+    """Selection of the cases that a campaign still needs; without a rule it needs all."""
 
     def __init__(self, stop: Stop | None, cases: Sequence[Case]) -> None:
         self._stop = stop
@@ -62,7 +56,7 @@ class Stopping:
         self._closed: dict[tuple[Scalar, ...], int] = {}
 
     def add(self, rows: Iterable[Mapping[str, Any]]) -> None:
-        """Take the rows of cases that are done."""
+        """Record the rows of completed cases."""
         if self._stop is None:
             return
         by_case: dict[str, list[Mapping[str, Any]]] = {}
@@ -77,15 +71,15 @@ class Stopping:
             self._judge(group)
 
     def needs(self, case: Case) -> bool:
-        """Whether a case that is not computed is still to be."""
+        """Whether a case must still be computed."""
         return case.group not in self._closed
 
     def used(self, group: tuple[Scalar, ...]) -> list[str]:
-        """Names of the cases of a group that count: the first ones, up to where it was enough."""
+        """Names of the cases that count in a group: the first ones, up to the stopping point."""
         return self._groups[group][: self._closed.get(group)]
 
     def _judge(self, group: tuple[Scalar, ...]) -> None:
-        """Go on along the group's cases, in their order, as far as they are known."""
+        """Advance through a group's cases, in order, as far as their rows are known."""
         assert self._stop is not None
         if group in self._closed:
             return

@@ -1,7 +1,7 @@
-"""A campaign's folder: study, where it comes from, cases and rows.
+"""Folder of a campaign: study, provenance, cases and rows.
 
-Rows are written in parts, each whole or not at all (temporary name, then renamed), and never
-changed. A case that stands in several counts once.
+Rows are written in immutable parts, each atomically by renaming a temporary file. A case that
+occurs in several parts counts once.
 """
 
 import json
@@ -34,24 +34,18 @@ _SCHEMA: Final = pa.schema(
 
 
 class StoreError(Exception):
-    """A folder that can't be used as it is; the message says what to do."""
+    """Error for a folder that cannot be used; the message contains the remedy."""
 
 
 class Store:
-    """The folder of a campaign."""
+    """Folder of a campaign."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._rows = folder / ROWS
 
     def begin(self, loaded: LoadedStudy, about: Mapping[str, Any], *, resume: bool) -> None:
-        """Write down what will be computed.
-
-        Raises
-        ------
-        StoreError
-            If there are results and they are not to be gone on with.
-        """
+        """Write the study and its cases; raise `StoreError` over results without `resume`."""
         if not resume and any(self._rows.glob("*.parquet")):
             raise StoreError(
                 f"{self.folder}: holds results; add --resume to go on with them, or choose another "
@@ -75,14 +69,14 @@ class Store:
             pq.write_table(pa.table({name: _column(each) for name, each in columns.items()}), file)
 
     def write(self, rows: list[Row]) -> None:
-        """Add rows as a part of their own."""
+        """Write rows as a new part."""
         if rows:
             table = pa.Table.from_pylist(rows, schema=_SCHEMA)
             with _replacing(self._rows / f"{time.time_ns()}-{os.getpid()}.parquet") as file:
                 pq.write_table(table, file)
 
     def rows(self) -> pa.Table:
-        """All rows, each case's once: the first that was written, or one that was not lost."""
+        """All rows, with one copy of each case: the first written, or one that was not lost."""
         files = sorted(self._rows.glob("*.parquet"))
         if not files:
             return _SCHEMA.empty_table()
@@ -103,7 +97,7 @@ class Store:
         return set(table.filter(pc.not_equal(table["status"], LOST))["case"].to_pylist())
 
     def gather(self) -> None:
-        """Put all parts together in one."""
+        """Merge all parts into one."""
         parts = sorted(self._rows.glob("*.parquet"))
         if len(parts) > 1:
             with _replacing(self._rows / f"{time.time_ns()}-{os.getpid()}.parquet") as file:
@@ -112,25 +106,25 @@ class Store:
                 part.unlink()
 
     def write_json(self, name: str, content: Any) -> None:
-        """Write a file of figures."""
+        """Write a JSON file of figures."""
         with _replacing(self.folder / name) as file:
             file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A campaign as read from its folder.
+    """Campaign as read from its folder.
 
     Attributes
     ----------
     about : dict
-        Where it comes from; ``configuration`` is the study.
+        Provenance; ``configuration`` is the study.
     keys : tuple of str
-        Keys that make groups.
+        Keys that define groups.
     cases : list of dict
         Index, name, waves and parameters of every case.
     rows : dict
-        Rows of each case that has any, by its name.
+        Rows by the name of the case; a case without rows is absent.
     """
 
     about: dict[str, Any]
@@ -140,7 +134,7 @@ class Results:
 
 
 def is_campaign(folder: Path) -> bool:
-    """Whether a folder holds a campaign."""
+    """Whether a folder contains a campaign."""
     return (folder / CASES).is_file() and (folder / ABOUT).is_file()
 
 
@@ -155,7 +149,7 @@ def read_results(folder: Path) -> Results:
 
 
 def _column(values: Iterable[Any]) -> pa.Array:
-    """Values of one key: numbers as numbers, mixed ones as text."""
+    """Column of one key: numeric if all values are numbers, else text."""
     values = list(values)
     try:
         return pa.array(values)
@@ -165,7 +159,7 @@ def _column(values: Iterable[Any]) -> pa.Array:
 
 @contextmanager
 def _replacing(file: Path) -> Iterator[Path]:
-    """A name to write a file under, which then takes its place at once."""
+    """Yield a temporary path that atomically replaces the file at the end."""
     temporary = file.with_name(file.name + ".part")
     with errors_name(file), left_whole(temporary):
         yield temporary

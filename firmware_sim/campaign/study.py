@@ -1,4 +1,4 @@
-"""Studies, ``configs/studies``: which cases of a scenario a campaign computes."""
+"""Studies (``configs/studies``): the cases of a scenario that a campaign computes."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping
@@ -32,20 +32,20 @@ SEED: Final = "seed"
 
 
 class Stop(Section):
-    """When a group of cases is known well enough.
+    """Stopping rule for a group of cases.
 
-    The interval is of the first cases of the group, in their order: which of them come back first
-    changes nothing.
+    The interval is computed over the first cases of the group in their order, so it does not depend
+    on which cases return first.
     """
 
     metric: str
-    """The figure: a column of the results."""
+    """Column of the results whose interval is judged."""
     half_width: Positive | None = None
-    """Of the 95 % interval, in the metric's unit."""
+    """Largest half width of the 95 % confidence interval, in the metric's unit."""
     relative: Positive | None = None
-    """Half width as a share of the mean, instead."""
+    """Largest half width as a share of the mean, instead of `half_width`."""
     least: Annotated[int, Range(least=3)] = 10
-    """Cases that are computed in any case."""
+    """Least number of cases computed."""
 
     @model_validator(mode="after")
     def _one_measure(self) -> "Stop":
@@ -59,27 +59,27 @@ class Stop(Section):
 
 
 class Study(Section):
-    """A scenario, and what is varied of it."""
+    """Scenario and the keys that are varied in it."""
 
     noun: ClassVar = "study"
 
     name: str
     scenario: Content
-    """What is varied: the file of a scenario."""
+    """Scenario file that is varied."""
     simulation: Literal["bus", "linear", "nonlinear"]
-    """How a case is computed, and what is left out of it."""
+    """Kind of simulation, which determines the effects that are left out."""
     set: Content = Field(default_factory=dict)
-    """Values by dotted key that hold for every case."""
+    """Values by dotted key that apply to every case."""
     cases: Annotated[tuple[Content, ...], Field(min_length=1)] = ({},)
-    """Sets of values by dotted key, each for a case; every one of them with all of `grid`."""
+    """Sets of values by dotted key; each set is combined with all of `grid`."""
     grid: dict[str, Axis] = Field(default_factory=dict)
-    """Values by dotted key, every one with every other."""
+    """Lists of values by dotted key; all combinations are computed."""
     random: Draws | None = None
-    """Samples that are drawn, every one with all of `cases` and `grid`."""
+    """Random samples, each combined with all of `cases` and `grid`."""
     average_over: tuple[str, ...] = (SEED,)
-    """Keys whose values make no group of their own; all that is drawn belongs to them."""
+    """Keys that are averaged over and define no group; drawn keys always belong to them."""
     stop: Stop | None = None
-    """When a group needs no more cases."""
+    """Rule by which a group needs no more cases."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "Study":
@@ -109,18 +109,16 @@ class Case:
 
     Attributes
     ----------
-    index : int
-        Place in the study.
     name : str
         Hash of configuration, seed and code.
     waves : str
-        Hash of what makes the waves.
+        Hash of what determines the waves.
     group : tuple
-        Values of the keys that make groups.
+        Values of the keys that define groups.
     parameters : dict
-        What is varied, by key: values, or names of the files that stand for them.
+        Varied keys with their values, or the names of files that stand for them.
     values : dict
-        What differs from the study's scenario, by dotted key.
+        Overrides of the study's scenario by dotted key.
     """
 
     index: int
@@ -134,14 +132,14 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class LoadedStudy:
-    """A study with its cases.
+    """Study with its cases.
 
     Attributes
     ----------
     keys : tuple of str
-        Keys that make groups.
+        Keys that define groups.
     allow_code : bool
-        Whether a law of a case may be code that the files name.
+        Whether laws may be code that the files name.
     """
 
     path: Path
@@ -151,21 +149,21 @@ class LoadedStudy:
     allow_code: bool
 
     def scenario_of(self, case: Case) -> Scenario:
-        """The scenario of a case."""
+        """Scenario of a case."""
         content = changed(self.study.scenario, case.values)
         return Scenario.model_validate(content, context={ALLOW_CODE: self.allow_code})
 
 
 def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
-    """Read a study and lay out its cases.
+    """Read a study and list its cases.
 
-    The first case with each set of keys is checked whole; a later one that is wrong fails alone.
-    `allow_code` as in `load_config`.
+    The first case with each set of keys is validated completely; a later invalid case fails alone.
+    The parameter `allow_code` is that of `load_config`.
 
     Raises
     ------
     ConfigError
-        If the study, its scenario or a key of it is wrong.
+        If the study, its scenario or one of its keys is invalid.
     """
     study = load_config(path, Study)
     files = files_named(path)
@@ -176,7 +174,7 @@ def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
         if key != SEED and key not in varied:
             problem = f"names {key}, which is not varied"
             raise ConfigError([ConfigProblem(path, "average_over", problem)])
-    # what is averaged over varies slowest: every group has its first cases early
+    # averaged keys vary slowest: every group has its first cases early
     axes.sort(key=lambda axis: any(key not in averaged for each in axis for key in each))
     keys = tuple(key for key in varied if key not in averaged)
     cases = []
@@ -208,7 +206,7 @@ def load_study(path: Path, *, allow_code: bool = False) -> LoadedStudy:
 
 
 def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[Any, Scalar]]]]:
-    """What varies, each as the list of its alternatives: values and their labels by key."""
+    """Varied axes, each a list of alternatives: values and their labels by key."""
 
     def labelled(value: Any, at: Key) -> tuple[Any, Scalar]:
         if at in files:
@@ -236,7 +234,7 @@ def _axes(study: Study, files: Mapping[Key, Path]) -> list[list[dict[str, tuple[
 def _check(
     path: Path, study: Study, values: Content, content: Content, *, allow_code: bool
 ) -> None:
-    """Refuse a case that is no scenario, at the places where what is wrong was written."""
+    """Refuse an invalid case, with each problem at the place where its value was written."""
     try:
         Scenario.model_validate(content, context={ALLOW_CODE: allow_code})
         return
@@ -258,7 +256,7 @@ def _check(
 
 
 def _override_of(values: Iterable[str], dotted: str) -> str | None:
-    """The override that a key of the scenario was set by, or that set a part of it."""
+    """Override that set a key of the scenario, or a part of it."""
 
     def matches(written: str) -> bool:
         shorter = min(len(written.split(".")), len(dotted.split(".")))
@@ -275,7 +273,7 @@ def _override_of(values: Iterable[str], dotted: str) -> str | None:
 
 
 def _place(study: Study, key: str) -> str:
-    """Where in a study's file the value of a key is written."""
+    """Place in a study's file where the value of a key is written."""
     for name, keys in _sections(study):
         if key in keys:
             return f"{name}.{key}"
@@ -294,7 +292,7 @@ def _sections(study: Study) -> Iterator[tuple[str, Iterable[str]]]:
 
 
 def _at_override(path: Path, study: Study, values: Content, reason: str) -> ConfigProblem:
-    """A key that can't be set, found by setting the keys one after the other."""
+    """Problem of the first override that cannot be applied."""
     so_far = {}
     for key, value in values.items():
         so_far[key] = value

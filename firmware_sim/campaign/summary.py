@@ -1,4 +1,4 @@
-"""What a campaign comes to: means with their intervals, and laws compared in the same waves."""
+"""Summary of a campaign: means with confidence intervals, and paired comparison of laws."""
 
 import itertools
 import math
@@ -16,23 +16,23 @@ from utank_hil.analysis.motion.confidence import mean_interval
 
 ROLL: Final = "roll_rms_rad"
 Figure = dict[str, float | int | None]
-"""Mean, half width of its 95 % interval (None of a single case), and number of cases."""
+"""Mean, half width of its 95 % confidence interval (None for one case), and number of cases."""
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Cases that differ in what is averaged over alone.
+    """Cases that differ only in the keys averaged over.
 
     Attributes
     ----------
     parameters : dict
-        What they have in common of the keys that are varied.
+        Varied keys that the cases have in common.
     rows : list of list of dict
-        Rows of each case that counts and has any, without failed ones.
+        Rows of each case that counts and succeeded.
     planned : int
-        Cases of the study.
+        Number of cases in the study.
     failed, lost : int
-        Of those that count.
+        Number of counted cases that failed or were lost.
     """
 
     parameters: dict[str, Scalar]
@@ -43,7 +43,7 @@ class Group:
 
     @property
     def runs(self) -> list[str]:
-        """Names of the runs, in their order."""
+        """Names of the runs in order."""
         return list(dict.fromkeys(str(row["run"]) for rows in self.rows for row in rows))
 
     def of_run(self, run: str) -> list[dict[str, Any]]:
@@ -52,7 +52,7 @@ class Group:
 
 
 def groups_of(results: Results) -> list[Group]:
-    """The groups of a campaign with the rows that count, see `Stopping`."""
+    """Groups of a campaign with the rows that count by `Stopping`."""
     cases = [
         Case(each["index"], each["case"], each["waves"], 0,
              tuple(each[key] for key in results.keys), {}, {})
@@ -79,7 +79,7 @@ def groups_of(results: Results) -> list[Group]:
 
 
 def figure(values: Sequence[float]) -> Figure:
-    """Mean of values with its interval; those that are no number are left out."""
+    """Mean and confidence interval of values; NaN values are left out."""
     known = [value for value in values if not math.isnan(value)]
     if not known:
         return {"mean": None, "half_width": None, "cases": 0}
@@ -110,7 +110,7 @@ def summary(results: Results) -> list[dict[str, Any]]:
 
 
 def failures(results: Results) -> dict[str, int]:
-    """Reasons of cases without a result, and how many have each."""
+    """Number of cases without a result, by reason."""
     reasons: dict[str, int] = {}
     for rows in results.rows.values():
         if rows[0]["status"] != OK:
@@ -124,7 +124,7 @@ def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[st
     marks = [row["mark"] for row in rows if row["mark"]]
     made: dict[str, Any] = {name: figure([row[name] for row in counted]) for name in METRICS}
     made["marked"] = {mark: marks.count(mark) for mark in dict.fromkeys(marks)}
-    # of all of them: a ship that capsized had the worst case
+    # the maximum covers all cases: a ship that capsized had the worst one
     worst = max(rows, key=lambda row: row[ROLL])
     made["worst"] = {name: worst[name] for name in ("mark", ROLL, "roll_max_rad")}
     made["worst"] |= cases[worst["case"]]
@@ -132,7 +132,7 @@ def _run(group: Group, run: str, cases: Mapping[str, dict[str, Any]]) -> dict[st
 
 
 def _paired(group: Group) -> list[dict[str, Any]]:
-    """Roll RMS of each run against those before it, case by case, which is wave by wave."""
+    """Roll RMS of each run against those before it, paired by case and so by waves."""
     runs = [run for run in group.runs if run != NO_TANK]
     pairs = []
     for against, run in itertools.combinations(runs, 2):
@@ -143,7 +143,7 @@ def _paired(group: Group) -> list[dict[str, Any]]:
 
 
 def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Roll RMS of each run against the same run of the study's first group, in the same waves."""
+    """Roll RMS of each run against the same run of the first group, in the same waves."""
     pairs = []
     for run in group.runs:
         there, here = (
@@ -157,7 +157,7 @@ def _beside(first: Group, group: Group, waves: Mapping[str, str]) -> list[dict[s
 
 
 def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
-    """Rolls of one, and of another in the same waves."""
+    """Difference and ratio of paired roll values."""
     return {
         "roll_rms_difference_rad": figure([one - other for other, one in both]),
         "share_below": figure([1 - one / other for other, one in both if other >= LEAST_ROLL_RAD]),
@@ -165,6 +165,6 @@ def _pair(both: list[tuple[float, float]]) -> dict[str, Figure]:
 
 
 def _counted(group: Group, *runs: str) -> list[Mapping[str, Mapping[str, float]]]:
-    """The rows of cases in which some runs count, by run."""
+    """Rows by run of the cases in which all given runs count."""
     by_run = ({row["run"]: row for row in rows if not row["mark"]} for rows in group.rows)
     return [rows for rows in by_run if all(run in rows for run in runs)]

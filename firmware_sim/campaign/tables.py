@@ -1,4 +1,4 @@
-"""A campaign's figures for a terminal."""
+"""Terminal tables of a campaign."""
 
 import math
 from typing import Any
@@ -12,7 +12,7 @@ Figure = dict[str, Any]
 
 
 def interval(figure: Figure, scale: float, digits: int) -> str:
-    """A mean with the half width of its interval."""
+    """Format a mean with the half width of its interval."""
     if figure["mean"] is None:
         return ""
     mean = f"{scale * figure['mean'] + 0.0:.{digits}f}"
@@ -21,7 +21,7 @@ def interval(figure: Figure, scale: float, digits: int) -> str:
 
 
 def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
-    """A row for each run of each group."""
+    """Table with a row for each run of each group."""
     power = _power(groups)
     marked = any(run["marked"] for group in groups for run in group["runs"].values())
     figures = (
@@ -50,7 +50,7 @@ def runs_table(groups: list[dict[str, Any]], title: str) -> Table:
 
 
 def pairs_table(groups: list[dict[str, Any]]) -> Table:
-    """What each law is worth beside the others, in the same waves."""
+    """Table of the paired comparison of laws in the same waves."""
     table = new_table(
         "In the same waves, pair by pair",
         *("pairs", "roll RMS below it %", "difference °"),
@@ -77,7 +77,7 @@ def _mean(figure: Figure, scale: float, digits: int) -> str:
 
 
 def _power(groups: list[dict[str, Any]]) -> tuple[float, str]:
-    """Unit of power in which the greatest mean has no more than three digits."""
+    """Scale and unit of power in which the largest mean has at most three digits."""
     means = [
         found["power_mean_w"]["mean"] or 0.0
         for group in groups
@@ -88,7 +88,7 @@ def _power(groups: list[dict[str, Any]]) -> tuple[float, str]:
 
 
 def _short_keys(groups: list[dict[str, Any]]) -> list[str]:
-    """The keys that make groups, each by its end as far as that says which it is."""
+    """Shortest unambiguous suffixes of the keys that define groups."""
     keys = list(groups[0]["parameters"]) if groups else []
     short = []
     for key in keys:

@@ -1,4 +1,4 @@
-"""What a worker does: a few cases, one after the other, each failing for itself."""
+"""Work of a campaign's worker: a few cases in turn, each failing alone."""
 
 import json
 import time
@@ -21,29 +21,29 @@ from utank_hil.control import BuiltLaw
 
 OK: Final = "ok"
 FAILED: Final = "failed"
-"""The case can't be computed; it would fail again."""
+"""Status of a case that cannot be computed; it would fail again."""
 LOST: Final = "lost"
-"""The case was ended from outside: `--resume` tries it again."""
+"""Status of a case that was ended from outside; `--resume` tries it again."""
 
 
 class OtherCodeError(Exception):
-    """A worker has other code than the campaign."""
+    """Error for a worker whose code differs from the campaign's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Cases that a worker is given together.
+    """Cases sent to a worker together.
 
     Attributes
     ----------
     scenario : str
-        Content of the study's scenario, as text.
+        Content of the study's scenario as text.
     code : str
-        What `code_digest` must be.
+        Required `code_digest`.
     allow_code : bool
-        Whether a law of a case may be code that the files name.
+        Whether laws may be code that the files name.
     cases : tuple of tuple
-        Name, seed, and what differs from the scenario, as text.
+        Name, seed, and overrides of the scenario as text.
     """
 
     simulation: str
@@ -54,12 +54,9 @@ class Batch:
 
 
 def run_batch(batch: Batch) -> list[Row]:
-    """Rows of all cases; of one that failed a single row with the reason.
+    """Return the rows of all cases; a failed case gives one row with the reason.
 
-    Raises
-    ------
-    OtherCodeError
-        If the worker's code is not that of the campaign.
+    Raises `OtherCodeError` if the worker's code is not that of the campaign.
     """
     if code_digest() != batch.code:
         raise OtherCodeError(
@@ -70,7 +67,7 @@ def run_batch(batch: Batch) -> list[Row]:
 
 
 def failed_row(name: str, status: str, reason: str) -> Row:
-    """What is kept of a case without a result."""
+    """Row stored for a case without a result."""
     return {"case": name, "run": "", "status": status, "reason": reason, "mark": "", "wall_s": 0.0}
 
 
@@ -78,7 +75,7 @@ def _case(batch: Batch, name: str, seed: int, values: str) -> Sequence[Row]:
     started = time.perf_counter()
     try:
         content = changed(_content(batch.scenario), json.loads(values))
-        # the seed is given apart, so that one check serves all
+        # the seed is passed separately, so that one validation serves all seeds
         content = {key: value for key, value in content.items() if key != "seed"}
         scenario = _scenario(as_text(content), batch.allow_code)
         laws = {
@@ -95,7 +92,7 @@ def _case(batch: Batch, name: str, seed: int, values: str) -> Sequence[Row]:
     except ParameterError as error:
         reason = "; ".join(f"{key}: {why}" for key, why in error.problems)
         return [failed_row(name, FAILED, reason)]
-    except Exception as error:  # a law may be anybody's, and no case may end the campaign
+    except Exception as error:  # a law may be foreign code, and no case may end the campaign
         return [failed_row(name, FAILED, f"{type(error).__name__}: {error}")]
     wall_s = time.perf_counter() - started
     ended: Row = {"case": name, "status": OK, "reason": "", "wall_s": wall_s}
@@ -115,7 +112,7 @@ def _scenario(text: str, allow_code: bool) -> Scenario:
 
 @lru_cache(maxsize=64)
 def _law(text: str, name: str, allow_code: bool) -> BuiltLaw:
-    """The law of a controller; its controllers are made anew for every run."""
+    """Law of a controller; its controllers are created anew for every run."""
     try:
         content = json.loads(text)
         return build_law(ControllerConfig.model_validate(content, context={ALLOW_CODE: allow_code}))

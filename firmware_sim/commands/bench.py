@@ -72,7 +72,7 @@ def bench(
     that capsized, ended in a fault or was not in charge is marked, not ranked, and the exit code
     says so (docs/deployment.md).
     """
-    # loaded when it runs: `--help` needs none of it
+    # imported late: `--help` needs none of it
     from firmware_sim.bench import BenchOptions, frames_name, run_bench
     from firmware_sim.figures import figures
     from firmware_sim.report import REPORT_FILES, write_report
@@ -158,7 +158,7 @@ def bench(
 def _about(
     scenario: "Scenario", options: "BenchOptions", out: Path, given: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Where the results come from; their configuration is the scenario with the options in it."""
+    """Provenance of the results: the scenario with the options applied."""
     changes: dict[str, float] = {}
     if options.seed is not None:
         changes["seed"] = options.seed

@@ -1,4 +1,4 @@
-"""``utank-hil campaign``: many cases of a scenario, on all cores or a cluster."""
+"""``utank-hil campaign``: many cases of a scenario, on all cores or on a cluster."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -44,7 +44,7 @@ def campaign(
     After Ctrl-C, or if it was killed, the same command with **--resume** goes on where it
     was. A case that fails is recorded with its reason and ends nothing.
     """
-    # loaded when it runs: `--help` needs none of it
+    # imported late: `--help` needs none of it
     from firmware_sim.campaign.picture import draw
     from firmware_sim.campaign.store import FILES, PICTURE, SUMMARY, Store, StoreError, read_results
     from firmware_sim.campaign.study import load_study
@@ -83,7 +83,7 @@ def campaign(
 
 
 def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[str, Any]:
-    """Where the results come from."""
+    """Provenance of the results."""
     from firmware_sim.campaign.case_name import code_digest
     from firmware_sim.campaign.metrics import LEAVES_OUT, METRICS
 
@@ -99,7 +99,7 @@ def _about(loaded: "LoadedStudy", folder: Path, given: dict[str, Any]) -> dict[s
 
 
 def _run(loaded: "LoadedStudy", store: Any, scheduler: str | None, count: int | None) -> bool:
-    """Compute what is missing, with a bar; whether it was interrupted."""
+    """Compute the missing cases with a progress bar; return whether it was interrupted."""
     from firmware_sim.campaign.cluster import workers
     from firmware_sim.campaign.driver import Count, Driver
     from firmware_sim.campaign.work import OtherCodeError

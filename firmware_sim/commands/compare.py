@@ -1,4 +1,4 @@
-"""``utank-hil compare``: what differs between runs, recordings or campaigns."""
+"""``utank-hil compare``: differences between runs, recordings or campaigns."""
 
 import math
 from dataclasses import asdict
@@ -67,7 +67,7 @@ def compare(
 
 
 def _recording(place: Path) -> Path:
-    """The recording that a path stands for."""
+    """Recording of a run, for a file or a folder."""
     from firmware_sim.report_page import RECORDING
 
     file = place / RECORDING if place.is_dir() else place
@@ -109,7 +109,7 @@ def _cells(name: str, figure: "Difference") -> list[str]:
 
 
 def _unit(name: str) -> tuple[float, str]:
-    """Scale and unit in which a figure is shown."""
+    """Scale and unit for the display of a figure."""
     if name in _SHARES:
         return 100.0, "%"
     return _SCALES.get(name.rsplit("_", 1)[-1], (1.0, ""))

@@ -1,4 +1,4 @@
-"""``utank-hil design``: what a law or a tank could be, and what it would cost."""
+"""``utank-hil design``: candidate laws and tanks, with their costs."""
 
 from firmware_sim.commands.design_controller import controller
 from firmware_sim.commands.design_tank import tank

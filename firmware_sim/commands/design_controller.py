@@ -1,4 +1,4 @@
-"""``utank-hil design controller``: what a law could be, and what it would cost."""
+"""``utank-hil design controller``: candidate laws, with their costs."""
 
 import json
 import math
@@ -51,7 +51,7 @@ def controller(
     from utank_hil.analysis.loop.trade import Design, trade
     from utank_hil.pictures.trade import draw_trade
 
-    loaded = load(config, ControllerConfig, allow_code=True)  # code is refused, not run
+    loaded = load(config, ControllerConfig, allow_code=True)  # foreign code is refused, not run
     law = loaded.law
     if isinstance(law, AutoDesign):
         law = law.tuned(loaded.plant)
@@ -64,7 +64,7 @@ def controller(
     path = scenario or shipped_scenario(vessel)
     if path is None:
         fail(f"no shipped scenario is for {vessel.name}: say with --scenario which sea counts")
-    sea = load(path, Scenario, allow_code=True)  # its laws are not built
+    sea = load(path, Scenario, allow_code=True)  # laws are not built from it
     prepare_out(out, (PICTURE, FIGURES))
     bar = Progress(
         TextColumn("designing"), BarColumn(), console=notes, disable=not notes.is_terminal

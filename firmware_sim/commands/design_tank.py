@@ -1,4 +1,4 @@
-"""``utank-hil design tank``: which tank for a ship in a sea."""
+"""``utank-hil design tank``: tanks for a ship in a sea."""
 
 import json
 from collections.abc import Sequence
@@ -113,7 +113,7 @@ def tank(
 
 
 def _left_out(ship: "RollShip") -> str:
-    """What a linear prediction does not have of a ship."""
+    """Effects that a linear prediction of this ship leaves out."""
     parts = {
         "quadratic damping": ship.quadratic_damping_nms2_rad2 > 0,
         "the restoring moment's curve": bool(ship.restoring_odd_nm or ship.gz_m),
@@ -122,13 +122,13 @@ def _left_out(ship: "RollShip") -> str:
 
 
 def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:
-    """A scenario, and its sea on the vessel's ship."""
+    """Scenario, and its sea as it acts on the vessel's ship."""
     from firmware_sim.pooled_waves import pooled_wave_moment
     from firmware_sim.scenario import Scenario
     from utank_hil.analysis.loop.sea_response import CalmSeaError
     from utank_hil.analysis.tank_prediction import SeaState
 
-    scenario = load(path, Scenario, allow_code=True)  # its laws are not built
+    scenario = load(path, Scenario, allow_code=True)  # laws are not built from it
     try:
         return scenario, SeaState.on(vessel.ship, pooled_wave_moment(scenario, vessel.ship))
     except CalmSeaError as error:
@@ -136,7 +136,7 @@ def _sea(path: Path, vessel: Vessel) -> tuple["Scenario", "SeaState"]:
 
 
 def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
-    """What a law would be designed for; level limit and lag are the vessel's."""
+    """Plant for the design of a law, with the vessel's level limit and lag."""
     from utank_hil.control import DesignPlant, PumpLimits
 
     lag_s = 0.0 if vessel.pump is None else vessel.pump.lag_s
@@ -144,7 +144,7 @@ def _plant(vessel: Vessel, tank: Tank) -> "DesignPlant":
 
 
 def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict[str, Any]:
-    """A tank in SI units."""
+    """Figures of a tank in SI units."""
     from firmware_sim.tank_report import prediction_json
     from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost
@@ -159,7 +159,7 @@ def _figures(vessel: Vessel, tank: Tank, found: "RollPrediction | None") -> dict
 def _table(
     vessel: Vessel, tanks: dict[str, Tank], found: dict[str, "RollPrediction"], caption: str = ""
 ) -> Table:
-    """Present tank and best passive one side by side."""
+    """Table of the present tank beside the best passive one."""
     from firmware_sim.tank_report import cost_rows, figure_rows, roll_rows
     from utank_hil.analysis.tank_design import tank_figures
     from utank_hil.analysis.tank_sizing import tank_cost

@@ -1,4 +1,4 @@
-"""``utank-hil faults``: every fault of the table, and whether it is found in time."""
+"""``utank-hil faults``: injects every fault of the table and checks that it is found in time."""
 
 import json
 import sys
@@ -55,7 +55,7 @@ def faults(
     need processes and an interface run with **--bus** only. The exit code says whether a row
     failed (docs/deployment.md).
     """
-    # loaded when it runs: `--help` needs none of it
+    # imported late: `--help` needs none of it
     from firmware_sim.fault_campaign.campaign import Campaign
     from firmware_sim.fault_campaign.report import as_json
     from firmware_sim.fault_campaign.runner import run_rows
@@ -140,7 +140,7 @@ def faults(
 def _on_bus(
     campaign: "Campaign", live: Sequence["LiveRow"], bus: str | None
 ) -> tuple[list[dict[str, Any]], list[str], str]:
-    """Results of the live rows, those that were not run, and why if it is the bus's fault."""
+    """Results of the live rows, names of those not run, and the bus's error if it is the cause."""
     from firmware_sim.fault_campaign.live import run_live
 
     waiting = [row for row in live if row.does]
@@ -154,7 +154,7 @@ def _on_bus(
             del waiting[0]
     except OSError as why_not:
         error = why(why_not)
-    except KeyboardInterrupt:  # what was done is kept
+    except KeyboardInterrupt:  # completed rows are kept
         error = INTERRUPTED
     return results, [row.id for row in waiting], error
 
@@ -174,5 +174,5 @@ def _print(results: Sequence["Result"], on_bus: Sequence[Mapping[str, Any]]) -> 
         )
 
 
-if __name__ == "__main__":  # as a part of the evidence
+if __name__ == "__main__":  # run as a part of the evidence
     typer.run(faults)

@@ -1,4 +1,4 @@
-"""``utank-hil init``: a project for a ship of one's own."""
+"""``utank-hil init``: a starter project for a user's ship."""
 
 import math
 from dataclasses import asdict, replace
@@ -30,11 +30,11 @@ _OPTIONS = {
     "tank.lz_m": "duct-below-cg",
     "duct_below_cg_m": "duct-below-cg",
 }
-"""Options that are not named as the parameters they set."""
+"""Options whose names differ from the parameters they set."""
 _UNITS = ("_m", "_t", "_s")
 
 WORTH_IT: Final = 0.15
-"""Share of the roll that a tank should take in the starter's sea."""
+"""Least reduction of roll that makes a tank worthwhile in the starter's sea; chosen, no study."""
 
 
 def init(
@@ -144,7 +144,7 @@ def init(
         fail(f"--tp: {error}")
     except ParameterError as error:
         _fail_at(error)
-    prepare_out(folder, ())  # not before: a refusal leaves nothing behind
+    prepare_out(folder, ())  # written last: a refusal leaves no files behind
     files = {file: folder / file for file in FILES}
     for file, path in files.items():
         write_whole(path, project.texts[file])
@@ -166,7 +166,7 @@ def init(
 
 
 def _little_help(project: "StarterProject") -> str | None:
-    """What is to be said where the tank is hardly worth its water; None where it is."""
+    """Warning where the tank reduces roll by little; None where it does not."""
     found = project.prediction
     best = found.passive if found.active is None else found.active
     less = 1 - best.roll_rms_rad / found.without_tank_rad
@@ -181,7 +181,7 @@ def _little_help(project: "StarterProject") -> str | None:
 
 
 def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
-    """Name the options that are wrong, and end with exit code 2."""
+    """Name the invalid options and exit with code 2."""
     for name, reason in error.problems:
         place = f"--{_OPTIONS[name]}" if name in _OPTIONS else _place(name, prefix)
         notes.say(f"{place}: {reason}", red="error:")
@@ -189,7 +189,7 @@ def _fail_at(error: ParameterError, prefix: str = "") -> NoReturn:
 
 
 def _place(name: str, prefix: str) -> str:
-    """The option that sets a parameter; the parameter where none does."""
+    """Option that sets a parameter, or the parameter itself where there is none."""
     section, _, option = name.rpartition(".")
     if section not in ("", "ship", "sea", "law.sea"):
         return name
@@ -199,7 +199,7 @@ def _place(name: str, prefix: str) -> str:
 
 
 def _as_json(project: "StarterProject") -> dict[str, Any]:
-    """What was found, in SI units."""
+    """Project in SI units."""
     vessel, sized, law, pump = project.vessel, project.sized, project.law, project.vessel.pump
     assert pump is not None
     return {
@@ -228,7 +228,7 @@ def _as_json(project: "StarterProject") -> dict[str, Any]:
 
 
 def _table(project: "StarterProject") -> Table:
-    """Tank, pump, law and expected roll."""
+    """Table of tank, pump, law and expected roll."""
     sized, demand, law, pump = project.sized, project.demand, project.law, project.vessel.pump
     assert pump is not None
     sea = f"{project.sea['hs_m']:g} m, {project.sea['tp_s']:g} s"

@@ -1,4 +1,4 @@
-"""Which of the shipped scenarios is for a vessel."""
+"""Shipped scenario of a vessel."""
 
 from pathlib import Path
 
@@ -10,13 +10,13 @@ from utank_hil.console.common import load
 
 
 class _VesselOfScenario(BaseModel):
-    """Whom a scenario is for; the rest of it may cost the design of its controllers."""
+    """Vessel of a scenario; loading the rest could require the design of its controllers."""
 
     vessel: Vessel
 
 
 def shipped_scenario(vessel: Vessel) -> Path | None:
-    """The shipped scenario of a vessel: the storm for its ship, else the first with the ship."""
+    """Shipped scenario of a vessel: the storm for its ship, else the first one with the ship."""
     shipped = [STORM, *sorted(STORM.parent.glob("*.yaml"))]
     own = (p for p in shipped if load(p, _VesselOfScenario).vessel.version == vessel.version)
     return next(own, None)
