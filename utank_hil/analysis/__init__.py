@@ -1,7 +1,6 @@
-"""Analysis: what a ship, a tank and a law do, without a bus.
+"""Analysis of ship, tank and law without a bus.
 
-The rooms: `loop` (margins, robustness, trade-offs) and `motion` (statistics, decay, comfort,
-exceedance).
+`loop` holds margins, robustness and trade-offs; `motion` statistics, decay, comfort, exceedance.
 """
 
 from utank_hil.analysis.loop.loop_simulation import LinearShip as LinearShip

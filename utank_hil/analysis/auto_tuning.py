@@ -1,10 +1,10 @@
-"""GPC, DPC and LQG laws that take all their numbers from ship, pump and sea: ``tuning: auto``.
+"""GPC, DPC and LQG laws whose numbers all follow from ship, pump and sea: ``tuning: auto``.
 
-The search begins with the shipped law of the kind, scaled to ship and sea and asked for less until
-it has all margins (`first_law`). Then four factors are varied in turn, in smaller and smaller
-steps: on the weights, on the noises (never below the sensors'), on peak and on damping of the
-waves that the predictor expects. A law is taken if it has all margins and costs less in that sea,
-by linear prediction; the cost is that of a self-tuned law (`cost_weights`).
+The search begins with the shipped law of the kind, scaled to ship and sea, with weights lowered
+until it has all margins (`first_law`). Then four factors are varied in turn, in decreasing steps:
+on the weights, on the noises (never below the sensors'), on peak and on damping of the waves in the
+predictor. A law is accepted if it has all margins and costs less in that sea, by linear prediction,
+with the cost of a self-tuned law (`cost_weights`).
 """
 
 import math
@@ -27,16 +27,17 @@ from utank_hil.dynamics.linear import coupled_model
 from utank_hil.sea import Harmonics
 
 _STEPS: Final = (4.0, 2.0, 1.15, 2.0)
-"""First steps of the factors on weights, noises, peak and damping."""
+"""First step of each factor: on weights, noises, peak and damping. Chosen; no study."""
 _SIZES: Final = 3
-"""Of steps, each the root of the one before."""
+"""Number of step sizes, each the square root of the one before. Chosen; no study."""
 _SWEEPS: Final = 3
-"""Over the factors with steps of one size, at most."""
+"""Limit on passes over the factors with one step size. Chosen; no study."""
 _MOST_DAMPING: Final = 1.0
+"""Limit on the damping of the predictor's waves: critical damping."""
 _SLOPE: Final = 1.46
-"""Over the passive roll's RMS: significant slope of the sea for which the shipped law is scaled."""
+"""Significant slope of the sea assumed for the scaled law, over the passive roll's RMS."""
 _OMEGA: Final = np.geomspace(0.1, 10.0, 600)
-"""Of the waves, over roll frequency."""
+"""Wave frequencies over the roll frequency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +46,8 @@ class AutoTuned:
 
     Attributes
     ----------
-    design : PredictiveDesign or LQGDesign
-        Its numbers.
     cost : float
-        Predicted; 1 is that of the passive tank's roll.
+        Predicted cost; 1 is that of the roll with the passive tank.
     """
 
     design: LinearDesign
@@ -57,15 +56,7 @@ class AutoTuned:
 
 
 def auto_tuned(kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> AutoTuned:
-    """The law of a kind with all margins that costs least of those tried.
-
-    Parameters
-    ----------
-    kind : {"gpc", "dpc", "lqg"}
-    plant : DesignPlant
-        With the limits of its pump.
-    sea : SlopeDensity
-        That it expects.
+    """Find the law of a kind with all margins that costs least of those tried.
 
     Raises
     ------
@@ -98,9 +89,9 @@ class AutoDesign:
     ----------
     kind : {"gpc", "dpc", "lqg"}
     tuning : {"auto"}
-        In place of the numbers of the kind.
+        Replaces the numbers of the kind.
     sea : SeaModel or None
-        The sea it expects, of which spectrum and effective slope count; None where none is known.
+        Expected sea, of which spectrum and effective slope count; None for an unknown sea.
     """
 
     kind: LinearKind
@@ -108,7 +99,7 @@ class AutoDesign:
     sea: SeaModel | None = None
 
     def tuned(self, plant: DesignPlant) -> LinearDesign:
-        """The law's numbers for a plant.
+        """Numbers of the law for a plant.
 
         Raises
         ------
@@ -123,7 +114,7 @@ class AutoDesign:
 
 
 class _Search:
-    """Laws of a kind for one ship in one sea: designed, judged and predicted."""
+    """Design, judgement and prediction of laws of a kind for one ship in one sea."""
 
     def __init__(self, kind: LinearKind, plant: DesignPlant, sea: SlopeDensity) -> None:
         self._least_std = asdict(SensorNoise())
@@ -147,7 +138,7 @@ class _Search:
         )
 
     def better(self, factors: list[float], cost: float) -> AutoTuned | None:
-        """The law with these factors if it costs less than that and has all margins."""
+        """The law with these factors if it has all margins and costs less than `cost`."""
         design = _varied(self.start.design, self._least_std, *factors)
         if design is None:
             return None
@@ -156,7 +147,7 @@ class _Search:
             if not found < cost:
                 return None
             judged = self._judged(design)
-        except (ValueError, ArithmeticError):  # LinAlgError is one of the former
+        except (ValueError, ArithmeticError):  # LinAlgError is a ValueError
             return None
         return None if judged.failures() else AutoTuned(design, judged, found)
 
@@ -187,7 +178,7 @@ def _varied(
     peak: float,
     damping: float,
 ) -> LinearDesign | None:
-    """A design with its numbers multiplied; None if that is no sea any more."""
+    """Return a design with its numbers multiplied, or None if its waves become invalid."""
     given = design.predictor
     damping_ratio = given.wave_damping_ratio * damping
     peak_rad_s = given.wave_peak_rad_s * peak

@@ -8,20 +8,17 @@ import numpy as np
 from utank_hil.dynamics.pump import Pump, pump_load, pump_speed
 
 _NODES: Final = 24
+"""Quadrature nodes for each variable. Chosen; no study."""
 
 
 def mean_shaft_power_w(
     pump: Pump, pressure_rms_pa: float, flow_rms_m3_s: float, water_power_w: float
 ) -> float:
-    """Mean power drawn for a Gaussian pressure and flow, the rotor at rest in each of their values.
+    """Mean shaft power for Gaussian pressure and flow, with the rotor in equilibrium at each value.
 
-    What flows back counts as nothing, as on the bench. In waves it is several times the power given
-    to the water: a pump is efficient at its rated pressure and flow, not while either changes sign.
-
-    Parameters
-    ----------
-    water_power_w : float
-        Mean of pressure times flow.
+    Power from the water counts as zero, as on the bench. In waves the shaft power is several times
+    the mean power `water_power_w` (pressure times flow), because a pump is efficient at its rated
+    point, not while pressure or flow changes sign.
     """
     if not (pressure_rms_pa > 0 and flow_rms_m3_s > 0):
         return 0.0
@@ -31,7 +28,7 @@ def mean_shaft_power_w(
     mean_w = 0.0
     for first, share in zip(nodes.tolist(), weights.tolist(), strict=True):
         if first < 0:
-            continue  # as much power to one side as to the other
+            continue  # the power is symmetric in the sign
         for second, part in zip(nodes.tolist(), weights.tolist(), strict=True):
             pressure_pa = pressure_rms_pa * first
             flow_m3_s = flow_rms_m3_s * (correlation * first + rest * second)

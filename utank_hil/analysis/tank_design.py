@@ -1,4 +1,4 @@
-"""The passive tank a ship should have, as a tank that can be built."""
+"""The best passive tank for a ship, as a tank that can be built."""
 
 from dataclasses import dataclass, replace
 
@@ -14,22 +14,23 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 _WAVES = np.geomspace(0.05, 5.0, 4000)
+"""Wave frequencies over the roll frequency. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class TankFigures:
-    """A tank in the numbers that matter.
+    """Dimensionless numbers of a tank.
 
     Attributes
     ----------
     mass_ratio, coupling_ratio : float
         As in `ShipTankRatios`.
     frequency_ratio : float
-        Frequency of the water per roll frequency of the ship.
+        Natural frequency of the water over the ship's roll frequency.
     damping_ratio : float
-        Of the water.
+        Damping ratio of the water.
     peak : float
-        Greatest roll per static roll over all wave frequencies.
+        Greatest roll over static roll, over all wave frequencies.
     """
 
     mass_ratio: float
@@ -41,7 +42,7 @@ class TankFigures:
 
 
 def tank_figures(ship: RollShip, tank: Tank) -> TankFigures:
-    """Figures of a ship's tank as it is."""
+    """Dimensionless numbers of a ship's existing tank."""
     ratios, roll_rad_s = ship_ratios(ship, tank)
     frequency_ratio = tank.natural_frequency_rad_s / roll_rad_s
     roll = roll_magnification(_WAVES, frequency_ratio, tank.damping_ratio, ratios)
@@ -56,19 +57,15 @@ def tank_figures(ship: RollShip, tank: Tank) -> TankFigures:
 
 
 def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
-    """The tank with the duct area and damping ratio of the passive optimum (3.2).
+    """Return the tank with the duct area and damping ratio of the passive optimum, thesis (3.2).
 
-    The duct's area changes mass and coupling ratio too, so area and optimum are brought to agree.
-
-    Parameters
-    ----------
-    tank : Tank
-        Its reservoirs, width, height and place are kept.
+    Reservoirs, width, height and place are kept. The duct's area changes mass and coupling ratio
+    too, so area and optimum are iterated to agreement.
 
     Raises
     ------
     ValueError
-        If the reservoirs alone are already slower than the best water.
+        If the reservoirs alone already make the water slower than the optimum.
     """
     for _ in range(50):
         ratios, roll_rad_s = ship_ratios(ship, tank)
@@ -89,5 +86,5 @@ def best_passive_tank(ship: RollShip, tank: Tank) -> Tank:
 
 
 def _free(ratios: ShipTankRatios) -> ShipTankRatios:
-    """A tank that is built with the frequency ratio it has, not pumped to it."""
+    """Return the ratios of a tank built with its frequency ratio, instead of pumped to it."""
     return replace(ratios, static_coupling=None)

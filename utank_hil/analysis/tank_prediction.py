@@ -1,8 +1,8 @@
-"""How much a ship rolls in a sea without, with a passive and with an active tank, by linear theory.
+"""Linear prediction of a ship's roll in a sea: without tank, with passive and with active tank.
 
-The active tank has the law of `first_law`, and is asked for less until twice the RMS of its
-pressure and level, their significant amplitudes, are within the limits of pump and tank: beyond
-them a linear prediction means little.
+The active tank has the law of `first_law`, with weights lowered until twice the RMS of its pressure
+and level, their significant amplitudes, are within the limits of pump and tank, beyond which a
+linear prediction does not hold.
 """
 
 import math
@@ -34,14 +34,17 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.sea import Harmonics
 
 STABILITY_SHARES: Final = (0.04, 0.08, 0.12, 0.16, 0.2, MOST_STABILITY_SHARE)
+"""Shares of stability of a sweep. Chosen; no study."""
 FREQUENCY_RATIOS: Final = (0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4)
+"""Frequency ratios of a sweep. Chosen; no study."""
 
 _BANDS = 40
+"""Number of bands of the sea's energy in the curves. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class SeaState:
-    """What is known of a sea and its roll moment on a ship.
+    """A sea and its roll moment on a ship.
 
     Attributes
     ----------
@@ -50,7 +53,7 @@ class SeaState:
     slope_rad : float
         Significant amplitude of the effective wave slope.
     peak_rad_s : float
-        Of the spectrum.
+        Peak frequency of the spectrum.
     """
 
     wave_moment: Harmonics
@@ -59,7 +62,7 @@ class SeaState:
 
     @classmethod
     def on(cls, ship: RollShip, wave_moment: Harmonics) -> "SeaState":
-        """The sea as a ship feels it: waves up to twice its roll frequency, and their peak.
+        """Return the sea that acts on a ship: waves up to twice its roll frequency, and their peak.
 
         Raises
         ------
@@ -86,13 +89,13 @@ class RollPrediction:
     Attributes
     ----------
     active : MotionInSea or None
-        None where there is no pump or no law.
+        None without pump or law.
     mean_power_w : float or None
-        That the shaft of a pump similar to the first ship's draws, see `mean_shaft_power_w`.
+        Shaft power of a pump similar to the first ship's, see `mean_shaft_power_w`.
     law : FirstLaw or None
-        Of the active tank.
+        Law of the active tank.
     no_law : str
-        Why there is none.
+        Reason for the absence of a law.
     """
 
     without_tank_rad: float
@@ -104,12 +107,12 @@ class RollPrediction:
 
     @property
     def passive_below_no_tank(self) -> float:
-        """Share by which the passive tank lowers the roll."""
+        """Reduction of the roll by the passive tank, as a share."""
         return 1 - self.passive.roll_rms_rad / self.without_tank_rad
 
     @property
     def active_below_passive(self) -> float | None:
-        """Share by which the pump lowers the roll of the passive tank."""
+        """Reduction of the passive tank's roll by the pump, as a share."""
         if self.active is None:
             return None
         return 1 - self.active.roll_rms_rad / self.passive.roll_rms_rad
@@ -117,12 +120,12 @@ class RollPrediction:
 
 @dataclass(frozen=True, slots=True)
 class LoadingPoint:
-    """One loading of a ship, with tank and law as they are.
+    """Roll in one loading of a ship, with unchanged tank and law.
 
     Attributes
     ----------
     period_scale : float
-        Of the roll period, by the stiffness.
+        Factor on the roll period, by the stiffness.
     without_tank_rad, passive_rad : float
         Roll RMS.
     """
@@ -140,7 +143,7 @@ class SweepPoint:
     Attributes
     ----------
     stability_share, frequency_ratio : float
-        What the tank was given: share of stability, and frequency of the water per roll frequency.
+        Prescribed share of stability, and frequency of the water over the roll frequency.
     """
 
     stability_share: float
@@ -152,16 +155,16 @@ class SweepPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RollCurves:
-    """Roll per static roll in regular waves, and where the sea's energy lies.
+    """Roll over static roll in regular waves, and the distribution of the sea's energy.
 
     Attributes
     ----------
     period_s : ndarray, shape (N,)
-        Of the waves.
+        Wave periods.
     without_tank, passive : ndarray, shape (N,)
     active : ndarray, shape (N,), or None
     sea_period_s, sea : ndarray, shape (M,)
-        Share of the moment's energy in each band, of the greatest band's.
+        Energy of the moment in each band over that of the greatest band.
     """
 
     period_s: FloatArray
@@ -173,7 +176,7 @@ class RollCurves:
 
 
 def roll_curves(plant: DesignPlant, sea: SeaState, law: FirstLaw | None) -> RollCurves:
-    """Roll in regular waves of half to twice the roll period, per moment over stiffness."""
+    """Roll over static roll in regular waves of half to twice the roll period."""
     ship, system = plant.ship, coupled_model(plant.ship, plant.tank)
     own = ship.natural_frequency_rad_s
     w = own * np.geomspace(0.5, 2.0, 300)
@@ -205,15 +208,7 @@ def roll_curves(plant: DesignPlant, sea: SeaState, law: FirstLaw | None) -> Roll
 
 
 def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> RollPrediction:
-    """Predict the roll of a ship without, with a passive and with an active tank.
-
-    Parameters
-    ----------
-    plant : DesignPlant
-        With the limits of its pump.
-    pump : bool
-        Whether there is one.
-    """
+    """Predict the roll of a ship without, with a passive and, given a pump, an active tank."""
     ship, waves = plant.ship, sea.wave_moment
     without = rms(roll_response_without_tank(ship, waves.frequency_rad_s), waves)
     passive = motion_in_sea(None, coupled_model(ship, plant.tank), (), waves)
@@ -238,9 +233,9 @@ def predict_roll(plant: DesignPlant, sea: SeaState, *, pump: bool = True) -> Rol
 def loading_sensitivity(
     plant: DesignPlant, sea: SeaState, prediction: RollPrediction
 ) -> tuple[LoadingPoint, ...]:
-    """Roll at other roll periods of the ship, `PERIOD_SCALES`, in the same waves.
+    """Roll at the other roll periods `PERIOD_SCALES` of the ship, in the same waves.
 
-    Tank and law stay as they are; the wave moment goes with the ship's stiffness.
+    Tank and law are unchanged; the wave moment is proportional to the ship's stiffness.
     """
     points = []
     for scale in PERIOD_SCALES:
@@ -271,11 +266,11 @@ def sweep_tank(
     shares: Sequence[float] | None = None,
     ratios: Sequence[float] | None = None,
 ) -> tuple[SweepPoint, ...]:
-    """Tanks of other mass and frequency in the same place, with the same losses and pump limits.
+    """Predict the roll for tanks of other mass and frequency in the same place.
 
-    The reservoirs' area gives the share of stability, the duct's the frequency. Tanks that no duct
-    can make fast enough are left out. The shares are `STABILITY_SHARES` and the ratios
-    `FREQUENCY_RATIOS` where none are given.
+    Losses and pump limits are unchanged. The reservoirs' area gives the share of stability, the
+    duct's the frequency; tanks that no duct makes fast enough are left out. The default shares are
+    `STABILITY_SHARES`, the default ratios `FREQUENCY_RATIOS`.
     """
     points = []
     for share in shares or STABILITY_SHARES:
@@ -307,7 +302,7 @@ def _active(
     *,
     design_plant: DesignPlant | None = None,
 ) -> MotionInSea:
-    """Linear motion with a law, which may have been made for another plant."""
+    """Linear motion with a law, which may have been designed for another plant."""
     return motion_in_sea(
         design.law(design_plant or plant),
         coupled_model(plant.ship, plant.tank),
@@ -339,6 +334,6 @@ def pump_moments(
 
 
 def _mean_power_w(plant: DesignPlant, design: LinearDesign, waves: Harmonics) -> float:
-    """Mean shaft power of a pump of the duct, similar to the first ship's."""
+    """Mean shaft power of a pump for this duct, similar to the first ship's."""
     pump = Pump.for_duct(plant.tank.duct_area_m2, plant.limits.pressure_pa)
     return mean_shaft_power_w(pump, *pump_moments(plant, design, waves))

@@ -1,18 +1,18 @@
-"""A tank and pump for a ship, from its stability, its roll period and the room there is.
+"""A tank and pump for a ship, from its stability, its roll period and the available room.
 
 For a ship of displacement weight W, metacentric height GM and roll frequency w, and a tank of duct
 length L, reservoir area At and still height H (`utank_hil.dynamics.tank`):
 
 * The free surface takes the share s = rho g At L^2 / (2 W GM) of the stability. A tank tuned to the
-  ship has s as its mass ratio as well, so s settles what a tank can do and what it costs. It is
-  chosen, and gives At.
-* Frequency and damping are those of the passive optimum (3.2), which gives the duct's area.
+  ship has the mass ratio s as well, so s determines its effect and its cost. It is chosen, and
+  gives At.
+* Frequency and damping are those of the passive optimum, thesis (3.2), which gives the duct's area.
 * The level h lists a ship by s h / (L / 2): at the usable level the tank holds an effective wave
   slope of that angle, the wave slope capacity.
 * The pressure that moves the water to a level h at a frequency w in the ship held still is
-  |2 rho g - w^2 rho (2H + L At/Ap) + i w r| h, with the loss r. The pump can do that at the roll
-  periods of `LOADINGS`, for the level that holds `PUMP_SLOPE_RAD`, and gives the flow At w h at the
-  same time.
+  |2 rho g - w^2 rho (2H + L At/Ap) + i w r| h, with the loss r. The pump is sized for it at the
+  roll periods of `LOADINGS`, for the level that holds `PUMP_SLOPE_RAD`, together with the flow
+  At w h.
 """
 
 import math
@@ -30,34 +30,38 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 from utank_hil.dynamics.water import water_moments
 
 STABILITY_SHARE: Final = 0.15
-"""Of the ship's stability that the free surface takes, unless something else is asked for."""
+"""Default share of the ship's stability that the free surface takes."""
 LEAST_STABILITY_SHARE: Final = 0.03
-"""A smaller tank is not worth its room: the thesis's first ship has 0.05."""
+"""Least share of stability worth the room; the first ship of the thesis has 0.05."""
 MOST_STABILITY_SHARE: Final = 0.25
+"""Greatest share of stability that the free surface may take. Chosen; no study."""
 MOST_MASS_SHARE: Final = 0.04
-"""Of the displacement, the water."""
+"""Greatest mass of the water over the displacement. Chosen; no study."""
 LEAST_GM_M: Final = 0.15
-"""Metacentric height that must be left: IS Code 2008, part A, 2.2.4."""
+"""Metacentric height that must remain: IS Code 2008, part A, 2.2.4."""
 USABLE_SHARE: Final = 3.85 / 4.88
-"""Of the level at which a reservoir is full or empty, as on the first ship."""
+"""Usable level over the level at which a reservoir is full or empty, as on the first ship."""
 MOST_DUCT_SPEED_M_S: Final = 45.0 / 6.22
-"""Of the water: the first ship's at its pump's greatest flow."""
+"""Greatest speed of the water in the duct: the first ship's at its pump's greatest flow."""
 PUMP_SLOPE_RAD: Final = math.radians(1.5)
-"""Effective wave slope that a pump is made for: its level holds the ship upright on it."""
+"""Effective wave slope that a pump is sized for: its level holds the ship upright on it."""
 LOADINGS: Final = (0.85, 1.0, 1.15)
-"""Roll periods, of the ship's, at which the pump moves the water to the usable level."""
+"""Factors on the roll period at which the pump moves the water to the usable level."""
 EFFICIENCY: Final = 2.25 / 3.6
-"""Hydraulic power of a pump at its greatest pressure and flow per shaft power (`Pump.for_duct`)."""
+"""Hydraulic power of a pump at its greatest pressure and flow over shaft power (`Pump.for_duct`).
+"""
 
-_RESERVOIR_SHARE = 0.2  # of the room's breadth, each, where the duct does not ask for less
-_DUCT_SHARE = 0.25  # of the room's height, at most
-_STILL_SHARE = 0.25  # of the water's effective length, at most: the duct has to do the rest
+_RESERVOIR_SHARE = 0.2  # greatest breadth of a reservoir over the room's
+_DUCT_SHARE = 0.25  # greatest height of the duct over the room's
+_STILL_SHARE = 0.25  # greatest share of the reservoirs in the water's effective length
 _ROUNDS = 20
+"""Limit on the iterations. Chosen; no study."""
 _TOLERANCE = 1e-3
+"""Relative change at which the iteration ends. Chosen; no study."""
 
 
 class TankImpossibleError(ValueError):
-    """No tank that is worth having fits the ship or the room."""
+    """No useful tank fits the ship or the room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +95,7 @@ class TankRoom:
 
     @classmethod
     def in_hull(cls, length_m: float, beam_m: float) -> "TankRoom":
-        """Room that a ship of that length and beam usually has."""
+        """Return the usual room in a ship of that length and beam."""
         return cls(0.9 * beam_m, 0.4 * beam_m, 0.08 * length_m, 0.1 * beam_m)
 
 
@@ -102,11 +106,11 @@ class SizedTank:
     Attributes
     ----------
     reservoir_length_m, reservoir_breadth_m : float
-        Of one reservoir, along and across the ship.
+        Dimensions of one reservoir, along and across the ship.
     duct_height_m : float
-        Of a duct as long as the reservoirs along the ship.
+        Height of a duct as long as the reservoirs along the ship.
     bound_by : str
-        What settled its size, in words.
+        Constraint that determined the size, in words.
     """
 
     tank: Tank
@@ -118,7 +122,7 @@ class SizedTank:
 
 @dataclass(frozen=True, slots=True)
 class PumpDemand:
-    """What a pump has to do to move the water to a level, in the ship held still.
+    """Requirements on a pump that moves the water to a level, in the ship held still.
 
     Attributes
     ----------
@@ -127,9 +131,9 @@ class PumpDemand:
     pressure_pa, flow_m3_s : float
         Amplitudes, the greatest over `LOADINGS`.
     duct_speed_m_s : float
-        Of the water at that flow.
+        Speed of the water at that flow.
     mean_power_w : float
-        Shaft power at the ship's own roll period, where the pump makes up for the water's losses.
+        Shaft power at the ship's own roll period, where the pump balances the water's losses.
     """
 
     level_m: float
@@ -141,18 +145,18 @@ class PumpDemand:
 
 @dataclass(frozen=True, slots=True)
 class TankCost:
-    """What a tank takes from the ship, and what it can hold.
+    """Cost of a tank to the ship, and its capacity.
 
     Attributes
     ----------
     share_of_displacement : float or None
-        The water's; None for a ship without a displacement.
+        Mass of the water over the displacement; None for a ship without a displacement.
     stability_taken : float
-        By the free surface, as a share.
+        Share of the stability that the free surface takes.
     water_period_s, damping_ratio : float
         Of the water in the ship held still.
     usable_level_m : float
-        As `usable_level_m`.
+        As the function `usable_level_m`.
     slope_capacity_rad : float
         Effective wave slope that the usable level holds.
     """
@@ -178,7 +182,7 @@ class _Demand:
 def size_tank(
     ship: RollShip, room: TankRoom, stability_share: float = STABILITY_SHARE
 ) -> SizedTank:
-    """The tank with a share of the ship's stability, or the greatest below it that can be.
+    """Size the tank with a share of the ship's stability, or the greatest feasible share below it.
 
     Parameters
     ----------
@@ -190,7 +194,7 @@ def size_tank(
     Raises
     ------
     TankImpossibleError
-        If ship or room allow no tank of `LEAST_STABILITY_SHARE`; it says why, and what would help.
+        If ship or room allow no tank of `LEAST_STABILITY_SHARE`, with the reason and a remedy.
     ValueError
         If the share is out of its range or the ship has no displacement.
     """
@@ -222,7 +226,7 @@ def size_tank(
         elif abs(found.duct_height_m - duct_m) < _TOLERANCE * room.height_m:
             if tuned:
                 break
-            tuned = True  # the optimum takes long: from here on, where it is nearly right
+            tuned = True  # The slow optimum is used only near the solution.
         duct_m = found.duct_height_m
     assert found is not None
     if wanted < LEAST_STABILITY_SHARE:
@@ -237,12 +241,12 @@ def size_tank(
 def _in_room(
     ship: RollShip, room: TankRoom, stability_share: float, duct_m: float, *, tuned: bool
 ) -> SizedTank:
-    """Tank of a share of stability, as fast as the ship or tuned to it, above a duct so high."""
+    """Tank of a share of stability, as fast as the ship or tuned to it, with a duct of length L."""
     way_m = 2 * GRAVITY_M_S2 / ship.natural_frequency_rad_s**2  # 2H + L At/Ap of a tuned tank
     duct_m = min(duct_m, _DUCT_SHARE * room.height_m)
     height_m = min((room.height_m - duct_m) / 2, _STILL_SHARE * way_m)
     duct_part_m = way_m - 2 * height_m
-    # the duct is as high as L b / duct_part, with b the reservoirs' breadth and L + b the room's
+    # The duct's height is L b / duct_part, with the reservoirs' breadth b and the room's L + b.
     root = room.breadth_m**2 - 4 * _DUCT_SHARE * room.height_m * duct_part_m
     breadth_m = _RESERVOIR_SHARE * room.breadth_m
     if root > 0:
@@ -259,7 +263,7 @@ def _in_room(
     )
     if tuned:
         try:
-            with np.errstate(all="ignore"):  # an optimum that runs away ends in the error below
+            with np.errstate(all="ignore"):  # a divergent optimum ends in the error below
                 tank = best_passive_tank(ship, tank)
         except ValueError as error:
             raise TankImpossibleError(
@@ -282,7 +286,7 @@ def wave_slope_capacity_rad(ship: RollShip, tank: Tank, level_m: float) -> float
 
 
 def usable_level_m(ship: RollShip, tank: Tank) -> float:
-    """Level that a pump may drive the water to: below the roof, and not too fast in the duct."""
+    """Greatest level a pump may reach: below the roof, and within the duct's speed limit."""
     _, roll_rad_s = ship_ratios(ship, tank)
     fastest_rad_s = roll_rad_s / min(LOADINGS)
     speed_per_level = fastest_rad_s * tank.reservoir_area_m2 / tank.duct_area_m2
@@ -290,13 +294,13 @@ def usable_level_m(ship: RollShip, tank: Tank) -> float:
 
 
 def pump_level_m(ship: RollShip, tank: Tank) -> float:
-    """Level that a pump has to move: it holds `PUMP_SLOPE_RAD`, if it is usable."""
+    """Level that a pump is sized for: it holds `PUMP_SLOPE_RAD`, limited to the usable level."""
     holding_m = PUMP_SLOPE_RAD / wave_slope_capacity_rad(ship, tank, 1.0)
     return min(usable_level_m(ship, tank), holding_m)
 
 
 def pump_demand(ship: RollShip, tank: Tank, level_m: float) -> PumpDemand:
-    """What a pump has to do to move the water to a level."""
+    """Requirements on a pump that moves the water to a level."""
     _, roll_rad_s = ship_ratios(ship, tank)
     frequencies = [roll_rad_s / scale for scale in LOADINGS]
     flow_m3_s = tank.reservoir_area_m2 * max(frequencies) * level_m
@@ -320,7 +324,7 @@ def _pressure_pa_per_m(tank: Tank, frequency_rad_s: float) -> float:
 
 
 def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
-    """What a tank takes from a ship."""
+    """Cost of a tank to the ship, and its capacity."""
     mass_kg, taken = water_moments(tank, 0.0).mass_kg, stability_taken(ship, tank)
     level_m, weight_n = usable_level_m(ship, tank), ship.displacement_n
     weighed = weight_n > 0
@@ -337,11 +341,10 @@ def tank_cost(ship: RollShip, tank: Tank) -> TankCost:
 
 
 def size_pump(tank: Tank, demand: PumpDemand) -> Pump:
-    """Pump of the tank's duct for a demand, similar to the first ship's.
+    """Size a pump of the tank's duct for a demand, similar to the first ship's.
 
-    Its greatest flow goes with the root of its pressure; where the demand's flow asks for more
-    pressure than the demand does, the flow counts. Motor and drive are for pressure and flow at
-    once.
+    Its greatest flow is proportional to the root of its pressure, so the pressure is the greater of
+    what the demand's pressure and its flow require. Motor and drive are sized for both at once.
     """
     by_speed_pa = 50e3 * (demand.duct_speed_m_s / MOST_DUCT_SPEED_M_S) ** 2
     pump = Pump.for_duct(tank.duct_area_m2, max(demand.pressure_pa, by_speed_pa))

@@ -1,1 +1,1 @@
-"""The closed loop: its margins, robustness, and what it is worth in a sea."""
+"""Analysis of the closed loop: margins, robustness, and motion in a sea."""

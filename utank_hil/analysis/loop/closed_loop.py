@@ -24,20 +24,13 @@ from utank_hil.dynamics.transfer import state_space_response
 if TYPE_CHECKING:
     from control import StateSpace
 
-_SINGULAR: Final = 1e-12  # singular values of 1 - D Dp below this, relative, count as zero
+_SINGULAR: Final = 1e-12  # relative; smaller singular values of 1 - D Dp count as zero
 
 
 def closed_loop_eigenvalues(
     law: LinearLaw, plant: "StateSpace | LinearModel", gain: float = 1.0
 ) -> ComplexArray:
-    """Eigenvalues of the sampled closed loop.
-
-    Parameters
-    ----------
-    plant : control.StateSpace or LinearModel
-        Sampled plant from the law's inputs to its outputs (`sampled_model`).
-    gain : float
-        Factor on the plant.
+    """Eigenvalues of the loop of a law and a sampled plant (`sampled_model`), scaled by `gain`.
 
     Raises
     ------
@@ -87,8 +80,6 @@ def closed_loop_response(
         None leaves the tank passive.
     system : control.StateSpace
         Continuous, inputs pressure_pa and wave_moment_nm (`coupled_model`).
-    measured : tuple of str
-        Names of the outputs that the law sees, in its order.
     frequency_rad_s : ndarray, shape (N,)
         Positive, below pi / Ts.
     delay_s, lag_s : float

@@ -1,19 +1,19 @@
-"""A law that is known only by stepping it: its impulse response, and the linear law that has it.
+"""Impulse response of a law that can only be stepped, and the linear law that has this response.
 
-A controller at rest is stepped with an impulse in one measurement. Its answers are handed back to
-`applied` as they are, without limits. Over the size of the impulse they are the law's Markov
+A controller at rest is stepped with an impulse in one measurement. Its commands are passed to
+`applied` unchanged, without limits. Divided by the size of the impulse they are the law's Markov
 parameters h(1), h(2), ... in the loop's count (`utank_hil.dynamics.sampling`)::
 
     v(k) = h(1) y(k-1) + h(2) y(k-2) + ...,    C(z) = sum_j h(j) z^-j
 
-The frequency response is this sum itself. The state-space model, of which eigenvalues are taken, is
-the balanced truncation of the sum (Kung; Juang and Pappa)::
+The frequency response is this sum. The state-space model, whose eigenvalues are taken, is the
+balanced truncation of the sum (Kung 1978)::
 
     H = [h1 h2 ...; h2 h3 ...; ...] = U S V^T
     A = S^-1/2 U^T U+ S^1/2,   B = S^1/2 V^T E_m,   C = E_r^T U S^1/2,   U+ = U one sample on
 
-The error of its response is 2 (s_{n+1} + s_{n+2} + ...) at most. H has as many rows as h has
-samples, and few singular values that matter. They are found from its products with random vectors
+The error of its response is at most 2 (s_{n+1} + s_{n+2} + ...). H has as many rows as h has
+samples, and few significant singular values. They are found from products with random vectors
 (Halko, Martinsson and Tropp 2011), which are convolutions.
 
 References
@@ -41,26 +41,28 @@ from utank_hil.dynamics.sampling import LinearModel
 IMPULSES: Final[Mapping[str, float]] = dict(zip(STATES, (1e-3, 1e-3, 1e-2, 1e-2), strict=True))
 """Size of the impulse in each measurement, in its unit."""
 MOST_SAMPLES: Final = 200_000
+"""Limit on the steps of one response. Chosen; no study."""
 BUDGET_S: Final = 60.0
-"""For all steps together."""
+"""Time limit for all steps together. Chosen; no study."""
 MOST_STATES: Final = 256
+"""Limit on the order of the realized model. Chosen; no study."""
 
-_QUIET = 1e-9  # of the peak: below this a response has decayed
-_LEAST_QUIET = 100  # samples that it must be quiet for, and for half of those before
-_BEYOND = 1e100  # per unit of the impulse: grows without bound
-_LINEAR = 1e-6  # of the peak: difference between the responses to impulses of a linear law
+_QUIET = 1e-9  # share of the peak below which a response has decayed
+_LEAST_QUIET = 100  # samples that must be quiet, besides half of those before
+_BEYOND = 1e100  # response per unit impulse that counts as unbounded growth
+_LINEAR = 1e-6  # share of the peak by which a linear law's scaled responses may differ
 _FIRST_STATES = 16
-_TRUNCATED = 1e-7  # of the sum of the singular values: sum of those left out
-_ACCURACY = 1e-6  # of the greatest response: error of the state-space model's
-_BLOCK = 256  # samples of the response that are summed at once
+_TRUNCATED = 1e-7  # share of the sum of singular values that may be truncated
+_ACCURACY = 1e-6  # error of the model's response over the greatest response
+_BLOCK = 256  # samples of the response summed at once
 
 
 class NoImpulseResponse(ValueError):
-    """The impulse response of a law can't be had; the message says why."""
+    """The impulse response of a law cannot be determined; the message gives the reason."""
 
 
 class NotDecaying(NoImpulseResponse):
-    """The response goes on: the law holds an integrator, is unstable, or learns."""
+    """The response does not decay: the law has an integrator, is unstable, or adapts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,13 +72,12 @@ class ImpulseResponseLaw:
     Attributes
     ----------
     impulse : ndarray, shape (N, r, m)
-        Answer of the j-th step, per unit of an impulse in the first.
+        Command of the j-th step, per unit of an impulse in the first.
     model : LinearModel
         Realization of `impulse`, strictly proper.
     linear : bool
-        Whether impulses of half the size and of the other sign have the same response. If not, the
+        Whether impulses of half the size and of opposite sign have the same response. If not, the
         law is nonlinear at rest, and `impulse` is the slope for small measurements.
-    make_controller : callable
     """
 
     impulse: FloatArray
@@ -90,11 +91,11 @@ class ImpulseResponseLaw:
         return self.model.dt
 
     def controller(self) -> Controller:
-        """A new controller, at rest: the law itself."""
+        """Return a new controller at rest: the stepped law itself."""
         return self.make_controller()
 
     def response(self, z: ComplexArray) -> ComplexArray:
-        """Transfer matrix from y to u at points of the unit circle, shape (N,); shape (N, r, m)."""
+        """Transfer matrix from y to u at N points of the unit circle; shape (N, r, m)."""
         points = np.asarray(z, dtype=np.complex128)
         samples, *shape = self.impulse.shape
         blocks = math.ceil(samples / _BLOCK)
@@ -107,7 +108,7 @@ class ImpulseResponseLaw:
         return total.reshape(-1, *shape)
 
     def matrices(self) -> LinearModel:
-        """The law from y to u as a discrete state-space model."""
+        """Discrete state-space model of the law from y to u."""
         return self.model
 
 
@@ -125,21 +126,21 @@ def impulse_response_law(
     make_controller : callable
         Makes a controller at rest.
     measured : tuple of str
-        What it measures, in order.
+        Measurements of the controller, in its order.
     sizes : mapping of str to float
         Size of the impulse in each measurement.
     most_samples : int
         Steps after which a response must have decayed.
     budget_s : float
-        Time that the steps may take in all.
+        Time limit for all steps.
 
     Raises
     ------
     NotDecaying
         If a response has not decayed to 1e-9 of its peak in `most_samples`.
     NoImpulseResponse
-        If a step raises, its answer is no array of finite numbers, the steps take too long, or no
-        model of `MOST_STATES` states has the response.
+        If a step raises, its command is not an array of finite numbers, the steps take too long, or
+        no model of `MOST_STATES` states has the response.
     """
     until_s = time.monotonic() + budget_s
     columns, linear = [], True
@@ -159,17 +160,12 @@ def impulse_response_law(
 
 
 def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
-    """Strictly proper state-space model of an impulse response that has decayed.
-
-    Parameters
-    ----------
-    impulse : ndarray, shape (N, r, m)
-        C B, C A B, C A^2 B, ...
+    """Strictly proper state-space model of a decayed impulse response C B, C A B, ..., (N, r, m).
 
     Raises
     ------
     NoImpulseResponse
-        If no model of `MOST_STATES` states has the response to 1e-6 of its greatest.
+        If no model of `MOST_STATES` states has the response to 1e-6 of its greatest value.
     """
     _, commands, outputs = impulse.shape
     row_scale = _peaks(impulse, (0, 2))
@@ -182,7 +178,7 @@ def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
     a = (left[:-commands].T @ left[commands:]) / root[:, None] * root
     b = root[:, None] * right[:outputs, :states].T
     c = left[:commands] * root
-    # the sum of the samples' errors bounds that of the frequency response
+    # The sum of the samples' errors bounds the error of the frequency response.
     state, error = b, np.zeros((commands, outputs))
     for sample in scaled:
         error += np.abs(sample - c @ state)
@@ -201,7 +197,7 @@ def realize(impulse: FloatArray, sample_time_s: float) -> LinearModel:
 def _answers(
     controller: Controller, measured: tuple[str, ...], index: int, size: float, until_s: float
 ) -> Iterator[FloatArray]:
-    """What a controller answers to an impulse, step by step, until a moment of the clock."""
+    """Yield a controller's commands after an impulse, step by step, until a moment of the clock."""
     commands = None
     for step in itertools.count(1):
         y = np.zeros(len(measured))
@@ -229,9 +225,9 @@ def _where(step: int, size: float, name: str) -> str:
 def _slope(
     answers: Iterable[tuple[FloatArray, ...]], name: str, size: float, most_samples: int
 ) -> tuple[FloatArray, bool]:
-    """Response per unit of an impulse until it has decayed; whether it is that of a linear law.
+    """Response per unit of an impulse until it has decayed, and whether it is that of a linear law.
 
-    `answers` are those to half the impulse, to half of it with the other sign, and to all of it.
+    `answers` are the responses to half the impulse, to minus half of it, and to all of it.
     """
     slopes: list[FloatArray] = []
     peak, deviation, loud = 0.0, 0.0, 0  # loud: the last sample that was not quiet
@@ -254,14 +250,14 @@ def _slope(
 
 
 def _hankel_svd(impulse: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Leading singular vectors and values of the Hankel matrix; as many as matter."""
+    """Leading singular vectors and values of the Hankel matrix, up to the truncation error."""
     samples, commands, outputs = impulse.shape
     length = next_fast_len(2 * samples, real=True)
     spectrum = np.fft.rfft(impulse, length, axis=0)
     transposed = spectrum.transpose(0, 2, 1)
 
     def times(spectrum: ComplexArray, vectors: FloatArray) -> FloatArray:
-        """The Hankel matrix, or its transpose, times columns."""
+        """Multiply columns by the Hankel matrix or its transpose."""
         product = np.empty((samples * spectrum.shape[1], vectors.shape[1]))
         for k, vector in enumerate(vectors.T):
             seen = np.fft.rfft(vector.reshape(samples, -1), length, axis=0).conj()
@@ -284,6 +280,6 @@ def _hankel_svd(impulse: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 def _peaks(impulse: FloatArray, axes: tuple[int, int]) -> FloatArray:
-    """Greatest magnitude over `axes`; one where there is nothing."""
+    """Greatest magnitude over `axes`; one where all values are zero."""
     peaks: FloatArray = np.abs(impulse).max(axis=axes)
     return np.where(peaks > 0, peaks, 1.0)

@@ -1,21 +1,21 @@
-"""The filter on a law's innovations that costs least in the expected sea and keeps the loop robust.
+"""The innovation filter that costs least in the expected sea and keeps the loop robust.
 
-The innovations nu of a law's observer are white noise as long as ship and sea are as
-the model says. A stable filter Q from them to the command changes what the law does in that sea and
-can't make it unstable on that ship (Youla parametrization). With the basis of Laguerre f_k(z)::
+The innovations nu of a law's observer are white noise as long as ship and sea match the model. A
+stable filter Q from them to the command changes the law's response to that sea and cannot make the
+loop unstable on that ship (Youla parametrization). With the Laguerre basis f_k(z)::
 
     q(k) = Q nu(k),    Q = sum_k f_k c_k,    T = T_0 + T_q Q M
 
 where T is the loop from sea and sensors to the command. So the cost, the mean square of roll, level
 and pressure, is quadratic in the coefficients c, and the sensitivity S = 1 + T P is affine in them.
 On another ship the law becomes unstable only where 1 - Q D passes zero, with D from q to nu on that
-ship. Re exp(-j a) (1 - Q D) > 0 at all frequencies prevents it, and is linear in c. What is made
-least is convex, and its minimum is unique::
+ship. Re exp(-j a) (1 - Q D) > 0 at all frequencies prevents it, and is linear in c. The objective
+is convex and has a unique minimum::
 
     J + mean (|S| / 0.85 S_max)^16 + mean (|S_v| / Re exp(-j a) (1 - Q D_v) S_others)^4 + r |c|^2
 
-with S_v the sensitivity on ship v without the filter. Newton's method ends at it to rounding.
-The angles a are zero at first. A second solution takes those that 1 - Q D has at the first.
+with S_v the sensitivity on ship v without the filter. Newton's method reaches it to rounding. The
+angles a are zero in the first solution; a second one takes the angles that 1 - Q D has there.
 
 Means over frequency are Gaussian quadratures on panels that are narrow around the roll frequency.
 
@@ -47,35 +47,43 @@ from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.transfer import state_space_response
 
 _ORDER: Final = 14
-"""Filter states. From 8 to 14 the predicted roll of the shipped laws falls by 1.5 %, to 16 by 0.2 %
-more."""
+"""Number of filter states. From 8 to 14 the predicted roll of the shipped laws falls by 1.5 %, to
+16 by 0.2 % more."""
 _POLE: Final = 0.7
-"""Rate of the Laguerre basis over roll frequency; from 0.5 to 1 the roll differs by 0.5 %."""
+"""Decay rate of the Laguerre basis over the roll frequency; from 0.5 to 1 the roll changes by 0.5
+%."""
 _BOUND: Final = 0.85 * PEAK_SENSITIVITY
+"""Peak sensitivity that the penalty aims at: the required one less 15 %. The 15 % is chosen; no
+study."""
 _POWER: Final = 16
+"""Exponent of the penalty on the ship's sensitivity. Chosen; no study."""
 _OTHERS_PEAK: Final = 40.0
-"""Sensitivity on the other ships from which it costs; a ship of the grid must be stable only."""
+"""Sensitivity on the other ships from which it is penalized; on these only stability is required.
+"""
 _OTHERS_POWER: Final = 4
+"""Exponent of the penalty on the other ships' sensitivity. Chosen; no study."""
 _RIDGE: Final = 1e-6
-"""Cost of the square of a coefficient: of filters that do the same the smallest is taken."""
+"""Cost of a squared coefficient; it selects the smallest of equivalent filters."""
 _TURNS: Final = 2
+"""Number of solutions: with zero angles, then with the angles found. Chosen; no study."""
 _MOST_ANGLE_RAD: Final = math.radians(80)
-"""Of a, so that a half plane is not turned past zero between two frequencies."""
+"""Limit on the angles a, so that a half plane does not pass zero between two frequencies."""
 _EXACT: Final = 1e-14
-"""Newton decrement of the last step, which squares what is left."""
+"""Newton decrement of the last step. Newton's method squares the remaining error."""
 _MOST_STEPS: Final = 200
+"""Limit on the Newton steps. Chosen; no study."""
 _SHORTEST: Final = 1e-6
-"""Share of a Newton step that is still tried; below it rounding is all that is left."""
+"""Smallest share of a Newton step that is tried; below it only rounding error remains."""
 
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Root mean squares without limits, and the mean power.
+    """Predicted root mean squares without limits, and mean power.
 
     Attributes
     ----------
     power_w : float
-        Mean of what the pump puts into the water, what it takes out not counted.
+        Mean power from pump to water; power taken from the water is not counted.
     """
 
     roll_rad: float
@@ -92,14 +100,15 @@ class InnovationFilter:
     law : LQGLaw
         Stable on all ships of the grid (`robustness`).
     design : ConstrainedDesign
-        The design that it was made from.
+        The design of that law.
     weights : tuple of float
-        Of the cost, on the squares of roll in rad, level in m, and pressure per the pump's most.
+        Cost weights on the squares of roll in rad, level in m, and pressure over the pump's
+        maximum.
 
     Attributes
     ----------
     coefficients : int
-        How many there are.
+        Number of coefficients of the filter.
     """
 
     def __init__(
@@ -115,7 +124,7 @@ class InnovationFilter:
         omega, self._mean = _quadrature(angle)
         self._z = np.exp(1j * omega)
         share = np.where(omega > 2e-3 * angle, self._mean / omega, 0.0)
-        self._octaves = share / share.sum()  # each octave counts the same
+        self._octaves = share / share.sum()  # each octave has the same weight
         self._measured = [STATES.index(name) for name in design.measured]
         self.coefficients = _ORDER * len(self._measured)
         self._noise = np.diag(np.asarray(design.measurement_std))
@@ -131,7 +140,7 @@ class InnovationFilter:
         self._other_ships()
 
     def laws(self) -> Iterator[LQGLaw]:
-        """The law with its best filter, and those that were found on the way, the best first."""
+        """Yield the law with its best filter, then with intermediate filters, best first."""
         found, coefficients = [], np.zeros(self.coefficients)
         for _ in range(_TURNS):
             angle_rad = np.angle(1 + self._turning @ coefficients)
@@ -142,7 +151,7 @@ class InnovationFilter:
             yield self._filtered(each)
 
     def prediction(self, law: LQGLaw) -> Prediction:
-        """Predicted motion under a law in the sea, with the noise of the sensors."""
+        """Predict the motion under a law in the sea, with the noise of the sensors."""
         to_command = law.response(self._z)[:, 0] / self._unit_pa
         loop = np.einsum("wm,wm->w", to_command, self._by_pump[:, self._measured])
         to_command = to_command / (1 - loop)[:, None]
@@ -163,7 +172,7 @@ class InnovationFilter:
         )
 
     def value(self, coefficients: FloatArray) -> float:
-        """What is made least; infinite outside a half plane."""
+        """Objective at these coefficients; infinite outside a half plane."""
         c = coefficients
         room = self._room + self._rooms @ c
         if not (room > 0).all():
@@ -194,7 +203,7 @@ class InnovationFilter:
         return gradient, hessian
 
     def minimum(self, coefficients: FloatArray) -> FloatArray:
-        """Coefficients at the minimum, by Newton's method from where all half planes hold."""
+        """Coefficients at the minimum, by Newton's method from a point inside all half planes."""
         for _ in range(_MOST_STEPS):
             value = self.value(coefficients)
             gradient, hessian = self.derivatives(coefficients)
@@ -211,7 +220,7 @@ class InnovationFilter:
         return coefficients
 
     def _law_parts(self) -> None:
-        """Transfers within the law: from command and innovations to estimate's command and output.
+        """Compute transfers from command and innovations to the estimate's command and output.
 
         The estimate is x = (z - A + B K)^-1 (B q + L nu), the command q - K x.
         """
@@ -239,7 +248,7 @@ class InnovationFilter:
         return np.asarray(np.linalg.inv(np.eye(loop.shape[-1]) + loop), dtype=np.complex128)
 
     def _own_ship(self, weights: FloatArray) -> None:
-        """Cost and sensitivity on the known ship, as functions of the coefficients."""
+        """Compute cost and sensitivity on the nominal ship as functions of the coefficients."""
         pump = self._by_pump[:, self._measured]
         surprise = self._surprise(pump)
         noise = np.broadcast_to(self._noise, surprise.shape)
@@ -248,7 +257,7 @@ class InnovationFilter:
         spread = np.einsum("w,wic,wjc->ij", self._mean, innovations, innovations.conj()).real
         self._whitening = np.linalg.inv(np.linalg.cholesky(spread))
         start = np.einsum("wi,wij->wj", self._command_by_surprise, surprise)
-        # roll, level and pressure of a command v are m + g v: their cost is |g|^2 |v - best|^2
+        # A command v gives roll, level and pressure m + g v, at a cost |g|^2 |v - best|^2.
         picked = [STATES.index("roll_rad"), STATES.index("level_m")]
         g = np.hstack([self._by_pump[:, picked], np.ones((len(self._z), 1))])
         m = np.hstack([self._by_sea[:, picked], np.zeros((len(self._z), 1))])
@@ -275,7 +284,7 @@ class InnovationFilter:
         self._sensitivities = self._command_by_command[:, None] * by_pump
 
     def _other_ships(self) -> None:
-        """How 1 - Q D turns on the other ships with the coefficients, and their sensitivity."""
+        """Compute how 1 - Q D and the sensitivity depend on the coefficients on the other ships."""
         turning, peaks = [], []
         names = tuple(STATES[row] for row in self._measured)
         for ship, gain in _others(self._plant):
@@ -289,12 +298,12 @@ class InnovationFilter:
         self._aim(np.zeros(self._others_peak.shape))
 
     def _aim(self, angle_rad: FloatArray) -> None:
-        """Keep 1 - Q D in the half planes at these angles."""
+        """Set the half planes of 1 - Q D to these angles."""
         back = np.exp(-1j * angle_rad)
         self._room, self._rooms = back.real, (back[..., None] * self._turning).real
 
     def _filtered(self, coefficients: FloatArray) -> LQGLaw:
-        """The law with the filter's states q after its own: q+ = A' q + c nu, b q added."""
+        """Append filter states q to the law: q+ = A' q + c nu, with b q added to the command."""
         law, states = self._law, len(self._law.model.A)
         a, b, c, d, dt = law.model
         rest = np.zeros((states, _ORDER))
@@ -311,7 +320,7 @@ class InnovationFilter:
         )
 
     def _along(self, outputs: ComplexArray) -> ComplexArray:
-        """What a transfer to innovations becomes behind the filter, per coefficient."""
+        """Transfers to innovations, each followed by the filter, per coefficient."""
         per: ComplexArray = self._basis[..., None] * (outputs @ self._whitening.T)[:, None]
         return per.reshape(len(self._z), -1)
 
@@ -321,7 +330,7 @@ class InnovationFilter:
         return response
 
     def _in_sea(self, design: ConstrainedDesign) -> ComplexArray:
-        """Motion with the tank passive, of the sea's white noise; shape (N, 4)."""
+        """Response of the motion with passive tank to the sea's white noise; shape (N, 4)."""
         model, spread = sea_plant(design.sea, self._plant, sample_time_s=self._law.sample_time_s)
         most = int(np.diag(spread).argmax())
         noise = spread[:, most : most + 1] / math.sqrt(spread[most, most])  # its rank is one
@@ -331,13 +340,7 @@ class InnovationFilter:
 
 
 def laguerre(order: int, pole: float) -> tuple[FloatArray, FloatArray]:
-    """Laguerre filters x+ = A x + b e, whose answers to a pulse are orthonormal.
-
-    Parameters
-    ----------
-    pole : float
-        0 to 1.
-    """
+    """Laguerre filters x+ = A x + b e of orthonormal pulse responses; pole between 0 and 1."""
     back = np.subtract.outer(np.arange(order), np.arange(order))
     a = np.where(back > 0, (1 - pole**2) * (-pole) ** (np.maximum(back, 1) - 1.0), 0.0)
     np.fill_diagonal(a, pole)
@@ -345,7 +348,7 @@ def laguerre(order: int, pole: float) -> tuple[FloatArray, FloatArray]:
 
 
 def mean_positive_product(first: float, second: float, covariance: float) -> float:
-    """Mean of x y where that is positive, of two normal variables of zero mean."""
+    """Mean of the positive part of x y, for two normal variables of zero mean."""
     size = first * second
     if size == 0:
         return 0.0
@@ -354,7 +357,7 @@ def mean_positive_product(first: float, second: float, covariance: float) -> flo
 
 
 def _quadrature(roll_angle: float) -> tuple[FloatArray, FloatArray]:
-    """Angles from 0 to pi and their weights in a mean, dense about the roll's angle a sample."""
+    """Angles from 0 to pi and their weights in a mean, dense near the roll's angle per sample."""
     low, high = 0.3 * roll_angle, 3 * roll_angle
     edges = np.concatenate(
         [
@@ -371,7 +374,7 @@ def _quadrature(roll_angle: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _others(plant: DesignPlant) -> Iterator[tuple[DesignPlant, float]]:
-    """The ships of the grid but the known one, each in time and late, and the pumps' gains."""
+    """Yield the other ships of the grid, each with and without extra delay, and the pump gains."""
     late = replace(plant, delay_s=plant.delay_s + EXTRA_DELAY_S)
     yield late, 1.0
     for period_scale, inertia_scale, ship in ship_variants(plant.ship):

@@ -1,9 +1,9 @@
 """A closed loop of law, limiter and ship in waves, without bus and nodes.
 
-`run_law` runs a controller on anything that moves tick by tick. `NonlinearShip` is ship and tank
+`run_law` runs a controller on any ship that moves tick by tick. `NonlinearShip` is ship and tank
 with their nonlinear equations in a wave moment. `LinearShip` is for long runs in many seas: its
-motion is that with the tank passive, known exactly, plus what the pump adds. Sensors, limiter and
-drive run every tick, level gauges and level observer every `LEVEL_TICKS`, the controller at its own
+motion is the known one with passive tank plus the response to the pump. Sensors, limiter and drive
+run every tick, level gauges and level observer every `LEVEL_TICKS`, the controller at its own
 sample time. Their order within a tick is that of the controller node.
 """
 
@@ -27,13 +27,13 @@ from utank_hil.dynamics.tank import Tank
 from utank_hil.sea import Harmonics
 
 LEVEL_TICKS: Final = 2
-"""Cycle of SENSOR_TANK, in ticks."""
+"""Cycle of the message SENSOR_TANK, in ticks."""
 _LEVEL, _SPEED = STATES.index("level_m"), STATES.index("level_rate_m_s")
 
 
 @dataclass(frozen=True, slots=True)
 class SensorNoise:
-    """Standard deviations of white noise on the sensors; of the two level gauges' mean."""
+    """Standard deviations of white sensor noise; the level's is that of the two gauges' mean."""
 
     roll_rad: float = 2e-4
     roll_rate_rad_s: float = 5e-4
@@ -43,14 +43,15 @@ class SensorNoise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopRun:
-    """What happened, every tick.
+    """Signals of a run, one value per tick.
 
     Attributes
     ----------
     motion : ndarray, shape (n, 4)
         `STATES`.
     pressure_pa, command_pa, wish_pa : ndarray, shape (n,)
-        Actual pressure, the command before delay and lag, and what the controller asked for.
+        Actual pressure, limited command before delay and lag, and the controller's unlimited
+        command.
     """
 
     motion: FloatArray
@@ -62,12 +63,7 @@ class LoopRun:
 def passive_motion(
     ship: RollShip, tank: Tank, wave_moment: Harmonics, step_s: float, count: int
 ) -> FloatArray:
-    """Motion of ship and passive tank from rest, exact whatever the step.
-
-    Parameters
-    ----------
-    wave_moment : Harmonics
-        In N m.
+    """Motion of ship and passive tank from rest in a wave moment in N m, exact for any step.
 
     Returns
     -------
@@ -86,7 +82,7 @@ def passive_motion(
             for column in answer.T
         ]
     )
-    # the free motion that makes it start at rest, in modes
+    # The modes of the free motion make the sum start at rest.
     values, modes = np.linalg.eig(a)
     start = np.linalg.solve(modes, -steady[0].astype(complex))
     free = np.exp(np.outer(step_s * np.arange(count), values)) * start @ modes.T
@@ -94,31 +90,27 @@ def passive_motion(
 
 
 class ShipInWaves(Protocol):
-    """A ship with its tank and pump that moves tick by tick."""
+    """A ship with tank and pump that moves tick by tick."""
 
     def truth(self) -> FloatArray:
         """`STATES` and the actual pressure; shape (5,)."""
 
     def sensed(self) -> FloatArray:
-        """The same as the sensors show it."""
+        """`truth` with the sensors' noise."""
 
     def advance(self, command_pa: float) -> None:
-        """Move by one tick with the command that the drive has got."""
+        """Move by one tick with the command that has reached the drive."""
 
 
 class LinearShip:
-    """A linear ship in waves in which its motion with the tank passive is known.
+    """A linear ship in waves whose motion with the tank passive is known.
 
     Parameters
     ----------
-    plant : DesignPlant
-        Ship, tank and lag of the pump.
     wave_motion : ndarray, shape (n, 4)
         From `passive_motion` with a step of `TICK_S`.
     pump_gain : float
-        Pressure that a command of 1 Pa ends in.
-    seed : int
-        Of the noise.
+        Actual steady pressure per commanded pressure.
     """
 
     def __init__(
@@ -139,7 +131,7 @@ class LinearShip:
         self._advance = np.hstack([transition, step])
         self._waves = np.column_stack([wave_motion, np.zeros(len(wave_motion))])
         self._shown = _noise(noise, len(wave_motion), seed) + self._waves
-        self._by_pump = np.zeros(n + 2)  # the pump's motion and pressure; the command
+        self._by_pump = np.zeros(n + 2)  # motion and pressure due to the pump, then the command
         self._tick = 0
 
     def truth(self) -> FloatArray:
@@ -148,7 +140,7 @@ class LinearShip:
         return found
 
     def sensed(self) -> FloatArray:
-        """The same with the sensors' noise."""
+        """`truth` with the sensors' noise."""
         found: FloatArray = self._shown[self._tick] + self._by_pump[:-1]
         return found
 
@@ -160,18 +152,7 @@ class LinearShip:
 
 
 class NonlinearShip:
-    """Ship and tank with their nonlinear equations, from rest, in a wave moment.
-
-    Parameters
-    ----------
-    plant : DesignPlant
-        Ship, tank and lag of the pump.
-    wave_moment : Harmonics
-        In N m.
-    ticks : int
-        Length of the run.
-    seed : int
-        Of the noise.
+    """Ship and tank with their nonlinear equations, from rest, in a wave moment in N m.
 
     Attributes
     ----------
@@ -220,12 +201,12 @@ class NonlinearShip:
         return np.append(self._state, self._pressure)
 
     def sensed(self) -> FloatArray:
-        """The same with the sensors' noise."""
+        """`truth` with the sensors' noise."""
         found: FloatArray = self.truth() + self._noise[self._tick]
         return found
 
     def advance(self, command_pa: float) -> None:
-        """Move by one tick, the pressure held at its mean over it."""
+        """Move by one tick with the pressure's mean over it."""
         before = float(self._pressure[0])
         after = command_pa + (before - command_pa) * self._decay
         self._pressure[0] = (before + after) / 2
@@ -249,16 +230,16 @@ def run_law(
     Parameters
     ----------
     measured : tuple of str
-        Names of `STATES` that the controller sees, in its order.
+        Names of `STATES` that the controller measures, in its order.
     plant : DesignPlant
-        Of which tank, limits and delay count, the delay a whole number of ticks.
+        Gives tank, limits and delay.
     ticks : int
         Length of the run in ticks of `TICK_S`.
 
     Raises
     ------
     ValueError
-        If delay or sample time are no whole number of ticks.
+        If delay or sample time are not whole numbers of ticks.
     """
     delay_ticks = _ticks("delay_s", plant.delay_s)
     sample_ticks = _ticks("sample_time_s", controller.sample_time_s)
@@ -296,13 +277,13 @@ def simulate_loop(
     noise: SensorNoise | None = None,
     seed: int = 0,
 ) -> LoopRun:
-    """`run_law` on a `LinearShip`, for the length of its motion with the tank passive."""
+    """Run a law on a `LinearShip`, for the length of its motion with passive tank."""
     ship = LinearShip(plant, wave_motion, pump_gain=pump_gain, noise=noise, seed=seed)
     return run_law(ship, controller, measured, plant, len(wave_motion))
 
 
 def _noise(noise: SensorNoise | None, ticks: int, seed: int) -> FloatArray:
-    """Noise of `STATES` and pressure; the level's rate is not measured."""
+    """Noise of `STATES` and pressure; the level's rate is not measured and has none."""
     size = noise or SensorNoise()
     sizes = np.array([size.roll_rad, size.roll_rate_rad_s, size.level_m, 0.0, size.pressure_pa])
     drawn: FloatArray = np.random.default_rng(seed).standard_normal((ticks, len(sizes)))

@@ -17,22 +17,21 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 DELAY_SAMPLES = 25
-"""Samples up to which a delay that destabilizes is looked for."""
+"""Largest delay in samples for which the delay margin is searched."""
 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """How far a loop is from instability, the loop broken at the pump.
+    """Stability margins with the loop broken at the pump.
 
     Attributes
     ----------
     radius : float
-        Greatest eigenvalue magnitude of the closed loop; stable below one. When it is not, the
-        margins are zero (gains one) and say nothing else.
+        Greatest eigenvalue magnitude of the closed loop; stable below one. For an unstable loop the
+        margins are zero (gains one) and carry no other information.
     peak_sensitivity : float
-        Greatest abs(S) = abs(1 / (1 - L)); 1 / it is the distance of L from the critical point.
-    peak_frequency_rad_s : float
-        Where that is.
+        Greatest abs(S) = abs(1 / (1 - L)); its inverse is the distance of L from the critical
+        point.
     gain_low, gain_high : float
         The loop is stable for any gain factor between these.
     phase_margin_rad : float
@@ -42,9 +41,9 @@ class Margins:
         it was not searched for.
     disk_margin : float
         Greatest a for which every gain and phase error (1 + a d / 2) / (1 - a d / 2), complex
-        abs(d) < 1, is harmless (symmetric disk); 2 is the most there is.
+        abs(d) < 1, is harmless (symmetric disk); at most 2.
     peak_loop_gain : float
-        Greatest abs(L); far below one the law does nothing for the roll, however robust.
+        Greatest abs(L); far below one the law has no effect on the roll.
     """
 
     radius: float
@@ -66,14 +65,12 @@ def margins(
     *,
     with_delay_margin: bool = True,
 ) -> Margins:
-    """Margins of the loop that `law` closes around `system`.
+    """Margins of the loop that a law with one input closes around a system.
 
     Parameters
     ----------
-    law : LinearLaw
-        One input.
     system : control.StateSpace or LinearModel
-        Continuous, from the pump pressure to the outputs that the law sees, in its order.
+        Continuous, from the pump pressure to the law's measurements, in its order.
     delay_s, lag_s : float
         As in `sampled_model`.
     with_delay_margin : bool
@@ -131,7 +128,7 @@ def radius_and_peak(law: LinearLaw, plant: "StateSpace | LinearModel") -> tuple[
 def loop_response(
     law: LinearLaw, plant: "StateSpace | LinearModel", frequency_rad_s: FloatArray
 ) -> ComplexArray:
-    """Loop transfer L(exp(j w Ts)) of one pump, sampled plant; shape (N,)."""
+    """Loop transfer L(exp(j w Ts)) of one pump with a sampled plant; shape (N,)."""
     z = np.exp(1j * frequency_rad_s * law.sample_time_s)
     loop: ComplexArray = (law.response(z) @ state_space_response(plant, z))[:, 0, 0]
     return loop
@@ -148,7 +145,7 @@ def _loop(
 
 
 def _frequencies(modes: ComplexArray, sample_time_s: float) -> FloatArray:
-    """Up to the Nyquist frequency, dense around lightly damped modes."""
+    """Frequencies up to the Nyquist frequency, dense around lightly damped modes."""
     nyquist = np.pi / sample_time_s
     grids = [np.geomspace(1e-3, nyquist, 1500), np.array([nyquist])]
     for mode in np.log(modes[(modes.imag > 0) & (np.abs(modes) > 0.8)]) / sample_time_s:
@@ -181,7 +178,7 @@ def _phase_margin(loop: ComplexArray) -> float:
 def _delay_margin(
     law: LinearLaw, system: "StateSpace | LinearModel", delay_s: float, lag_s: float
 ) -> float:
-    """Search by eigenvalues: by quarters of a sample, then by bisection to 0.1 ms."""
+    """Least destabilizing delay, by eigenvalues at quarters of a sample and bisection to 0.1 ms."""
 
     def stable(extra_s: float) -> bool:
         plant = sample(system, law.sample_time_s, delay_s + extra_s, lag_s)

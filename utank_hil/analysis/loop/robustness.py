@@ -1,4 +1,4 @@
-"""The robustness that a law must have before it may be armed."""
+"""Robustness that a law must have before the pump may be armed."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -14,20 +14,23 @@ from utank_hil.dynamics.sampling import sample
 from utank_hil.dynamics.ship import RollShip
 
 PEAK_SENSITIVITY = 2.0
-EXTRA_DELAY_S = 0.020  # two base ticks
+"""Greatest allowed peak sensitivity: L stays at least 0.5 from the critical point."""
+EXTRA_DELAY_S = 0.020  # two base ticks of 10 ms
 PERIOD_SCALES = (0.7, 0.85, 1.0, 1.15, 1.3)
-INERTIA_SCALES = (0.8, 1.25)  # a load spread inwards, and outwards
+"""Factors on the roll period in the grid. Chosen; no study."""
+INERTIA_SCALES = (0.8, 1.25)  # load moved inwards, and outwards; chosen, no study
 GAINS = (0.8, 1.0, 1.2)
+"""Factors on the pump's gain in the grid. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robustness:
-    """What a law's loop stands.
+    """Margins of a law's loop on its own ship and on a grid of variants.
 
     Attributes
     ----------
     nominal : Margins
-        On the ship it was designed for.
+        On the ship of the design.
     late_radius, late_peak_sensitivity : float
         Closed-loop radius and peak sensitivity with `EXTRA_DELAY_S` more delay.
     worst_radius : float
@@ -35,7 +38,7 @@ class Robustness:
         stiffness) and `INERTIA_SCALES` of its inertia, `GAINS` of the pump, and `EXTRA_DELAY_S`
         more delay or none.
     worst_period_scale, worst_inertia_scale, worst_gain, worst_extra_delay_s : float
-        Where that is; of the first two one is 1.
+        Variant with the greatest radius; one of the first two is 1.
     """
 
     nominal: Margins
@@ -48,10 +51,7 @@ class Robustness:
     worst_extra_delay_s: float
 
     def failures(self) -> tuple[str, ...]:
-        """What is missing, in words; empty for a law that may be armed.
-
-        What is not a number is missing, too.
-        """
+        """Unmet requirements in words, NaN values included; empty for a law that may be armed."""
         found = []
         if not self.nominal.radius < 1:
             found.append(f"unstable on its own ship (eigenvalue {self.nominal.radius:.4f})")
@@ -80,14 +80,9 @@ def robustness(
     *,
     with_delay_margin: bool = True,
 ) -> Robustness:
-    """Judge a law on its ship, late, and on a grid of ships, pump gains and delays.
+    """Judge a law on its ship, with extra delay, and on a grid of ships, pump gains and delays.
 
-    Parameters
-    ----------
-    measured : tuple of str
-        Outputs the law sees.
-    with_delay_margin : bool
-        As in `margins`; no requirement needs it.
+    The delay margin (`with_delay_margin`) is informative only; no requirement uses it.
     """
     delay_s, lag_s = plant.delay_s, plant.lag_s
     model = plant.model(measured)
@@ -115,9 +110,9 @@ def robustness(
 
 
 def ship_variants(ship: RollShip) -> Iterator[tuple[float, float, RollShip]]:
-    """The ships of the grid: scales of period and of inertia, and the ship that has them.
+    """Yield the ships of the grid: scales of period and of inertia, and the ship with these.
 
-    Stability changes the stiffness and with it the period; the load's spread the inertia.
+    Stability changes the stiffness and with it the period; the distribution of load the inertia.
     """
     for scale in PERIOD_SCALES:
         stiffness = ship.stiffness_nm_rad / scale**2

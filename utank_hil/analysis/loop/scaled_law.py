@@ -1,4 +1,4 @@
-"""A first law for any ship: a shipped law by similarity, asked for less until it is accepted.
+"""A first law for any ship: a shipped law scaled by similarity, its weights lowered if refused.
 
 The parameters of ``lqg.yaml``, ``gpc.yaml`` and ``dpc.yaml`` in ``configs/controllers`` are those
 of one ship in one sea. Made dimensionless by roll frequency w, effective wave slope s, greatest
@@ -6,12 +6,12 @@ pressure P and level limit h, they serve another ship in another sea:
 
 * measurement noise on roll over s, on roll rate over s w, on level over h;
 * pressure noise over P / sqrt(w); sample time 0.1 / w; corner of the washout 0.04 w; horizons in
-  samples as they are;
+  samples unchanged;
 * weights over P^2, times s^2 on roll, (s w)^2 on roll rate, h^2 on level, (h w)^2 on its rate, with
   1 on the square of the pressure.
 
-Similarity is not robustness. A law that misses a required margin is asked for less, by smaller
-weights on the motion, until it meets them all.
+Similarity does not guarantee robustness. The weights on the motion of a law that misses a required
+margin are lowered until it has all margins.
 """
 
 import math
@@ -32,12 +32,13 @@ LINEAR_KINDS: Final[tuple[LinearKind, ...]] = get_args(LinearKind)
 LinearDesign = PredictiveDesign | LQGDesign
 
 STEP: Final = 2.0
-"""From one trial of the weights to the next."""
+"""Factor between successive trials of the weights. Chosen; no study."""
 MOST_TRIALS: Final = 16
+"""Limit on trials, down to weights of 2^-15. Chosen; no study."""
 
 
 class _Shipped(NamedTuple):
-    """A shipped law without its dimensions."""
+    """Dimensionless parameters of a shipped law."""
 
     measured: tuple[str, ...]
     noise: tuple[float, ...]
@@ -62,7 +63,7 @@ _SHIPPED: Final[dict[LinearKind, _Shipped]] = {
 
 
 class NoLawError(ValueError):
-    """No law of the kind is robust enough, or within the limits, however little it does."""
+    """No law of the kind is robust or within the limits, even with the smallest weights tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,7 @@ class FirstLaw:
     Attributes
     ----------
     weight_factor : float
-        Of the weights that similarity gives; 1 where those were accepted.
+        Factor on the weights of similarity; 1 where those were accepted.
     """
 
     design: LinearDesign
@@ -83,17 +84,16 @@ class FirstLaw:
 def scaled_law(
     kind: LinearKind, plant: DesignPlant, slope_rad: float, peak_rad_s: float
 ) -> LinearDesign:
-    """The shipped law of a kind for another ship, not judged.
+    """Scale the shipped law of a kind to another ship, without judging it.
 
     Parameters
     ----------
-    kind : {"gpc", "dpc", "lqg"}
     plant : DesignPlant
         With the limits of its pump.
     slope_rad : float
         Significant amplitude of the effective wave slope.
     peak_rad_s : float
-        Of the sea's spectrum.
+        Peak frequency of the sea's spectrum.
     """
     w, shipped, limits = plant.ship.natural_frequency_rad_s, _SHIPPED[kind], plant.limits
     sizes = slope_rad, slope_rad * w, limits.level_m, limits.level_m * w
@@ -130,14 +130,12 @@ def first_law(
     suits: Callable[[LinearDesign], bool] = lambda _: True,
     kind: LinearKind = "lqg",
 ) -> FirstLaw:
-    """The law of `scaled_law` with the greatest weights at which it meets the required margins.
+    """Find the law of `scaled_law` with the greatest weights at which it has the required margins.
 
     Parameters
     ----------
-    plant, slope_rad, peak_rad_s, kind
-        As `scaled_law` takes them.
     suits : callable, optional
-        What a law with all margins must be besides; smaller weights suit more.
+        Further requirement on a law with all margins; smaller weights must help to meet it.
 
     Raises
     ------

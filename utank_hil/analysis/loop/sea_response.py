@@ -1,7 +1,7 @@
 """Linear roll, level and pressure in irregular waves, in closed form: no simulation, no limits.
 
-The mean square of a linear answer to a sum of harmonics is sum |H(w)|^2 a^2 / 2. What pump, rate
-and level limits take away is not in it.
+The mean square of a linear response to a sum of harmonics is sum |H(w)|^2 a^2 / 2. Limits of pump,
+rate and level are neglected.
 """
 
 from dataclasses import dataclass
@@ -19,22 +19,17 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 LEAST_ROLL_RAD: Final = 1e-6
-"""Less roll than this is none: a share of it says nothing."""
+"""Roll RMS below which the sea counts as calm, as a ratio to it is meaningless. Chosen; no study.
+"""
 
 
 class CalmSeaError(ValueError):
-    """A sea that does not roll the ship: there is no roll to reduce."""
+    """The sea does not roll the ship, so there is no roll to reduce."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionInSea:
-    """Root mean squares in a sea.
-
-    Attributes
-    ----------
-    pressure_rms_pa : float
-        Of the pressure that the law asks for, after delay and lag.
-    """
+    """Root mean squares of the motion in a sea; the pressure's is that after delay and lag."""
 
     roll_rms_rad: float
     level_rms_m: float
@@ -54,14 +49,11 @@ def motion_in_sea(
     Parameters
     ----------
     law : LinearLaw or None
-        None leaves the tank passive. For an unstable loop the result means nothing.
+        None leaves the tank passive. For an unstable loop the result is meaningless.
     system : control.StateSpace
         `coupled_model` of ship and tank.
-    measured : tuple of str
-        Names of the outputs that the law sees, in its order.
     wave_moment : Harmonics
-        In N m. Components above the Nyquist frequency pi / Ts meet the
-        passive tank.
+        In N m. Above the Nyquist frequency pi / Ts the tank is taken as passive.
     delay_s, lag_s : float
         As in `sampled_model`.
     """
@@ -77,7 +69,7 @@ def motion_in_sea(
 
 
 def require_roll(passive: MotionInSea) -> None:
-    """Raise a `CalmSeaError` where the ship with its passive tank does not roll."""
+    """Raise a `CalmSeaError` if the ship with passive tank does not roll."""
     if not passive.roll_rms_rad >= LEAST_ROLL_RAD:
         raise CalmSeaError(
             "the sea does not roll the ship, so no law can be compared: it needs waves, and not "
@@ -86,7 +78,7 @@ def require_roll(passive: MotionInSea) -> None:
 
 
 def rms(response: ComplexArray, waves: Harmonics) -> float:
-    """Root mean square of a linear answer, its response per component of shape (N,)."""
+    """Root mean square of a linear response with one value per component, shape (N,)."""
     return float(np.sqrt(np.sum(np.square(np.abs(response) * waves.amplitude)) / 2))
 
 

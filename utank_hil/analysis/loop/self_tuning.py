@@ -1,20 +1,20 @@
-"""A constrained law designed for a ship and a sea by itself, with the margins that are required.
+"""A constrained law designed automatically for a ship and a sea, with the required margins.
 
-Sizes follow from scales: the passive roll's RMS s in the expected sea, roll frequency w, greatest
-pressure P and level limit h. The factors on them, constants of this module, were found together by
-trial on the first ship of the thesis in sixteen seas (commit c752396): with them the mean share of
-the clairvoyant bound was 60 % with all margins; with numbers that had been tuned in one storm, 51.
+Weights and noises follow from scales: the passive roll's RMS s in the expected sea, roll frequency
+w, greatest pressure P and level limit h. The factors on them, constants of this module, were found
+together by trial on the first ship of the thesis in sixteen seas (commit c752396): with them the
+mean share of the clairvoyant bound was 60 % with all margins; with numbers tuned in one storm, 51.
 
-Where a law with these weights would swing on with the pump at its limit, pressure costs more:
-with the pump giving any smaller part of what is asked for, an oscillation may grow by
-`_MOST_GROWTH` over the length of a plan. A heel is looked for unless the water takes so much of the
-ship's stability that one can't be told from another load (`_LEAST_STIFFNESS`).
+The weight on pressure is raised where a law would sustain an oscillation with the pump at its
+limit: with the pump giving any smaller part of the requested pressure, an oscillation may grow by
+`_MOST_GROWTH` over the length of a plan. A heel is estimated unless the water takes so much of the
+ship's stability that a heel and another load cannot be distinguished (`_LEAST_STIFFNESS`).
 
-What is left to choose is how far the law trusts ship and sea. As little noise of the slope is added
-as makes it stable on all ships that it must stand, and half as much again. A filter on its
-innovations then makes it cost least in the expected sea, robust all the same
-(`innovation_filter`), a convex problem. Where that misses a margin, the law without it is taken.
-What foresees the waves for the plan at the limits is a Kalman filter without the added noise.
+The remaining choice is how far the law trusts ship and sea. The added noise of the slope is the
+least that makes it stable on all ships of the grid, times `_MORE_NOISE`. A filter on its
+innovations then gives it the least cost in the expected sea under the robustness requirements, a
+convex problem (`innovation_filter`). Where that misses a margin, the law without it is taken. A
+Kalman filter without the added noise predicts the waves for the plan at the limits.
 """
 
 import math
@@ -51,50 +51,55 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import ittc
 
 _PRESSURE_COST: Final = 0.106
-"""Of the greatest pressure all the time, over s^2."""
+"""Cost of constant pressure at its limit, over s^2."""
 _LEVEL_COST: Final = 0.33
-"""Of a level at its limit h all the time, over s^2."""
+"""Cost of a constant level at its limit h, over s^2."""
 _PRESSURE_NOISE: Final = 11.0
-"""White pressure disturbance over P s / sqrt(w), s in rad: what the model ignores."""
+"""White pressure disturbance over P s / sqrt(w), s in rad; it stands for what the model neglects.
+"""
 _SLOPE_NOISE: Final = 0.046
 """Least white noise of the slope, over s / sqrt(w)."""
 _HEEL: Final = 0.13
-"""Deviation of the heel over s."""
+"""Standard deviation of the heel over s."""
 _SMOOTHING: Final = 0.028
-"""Of the sea's density, over w: 0.014 rad/s on a ship of 12.6 s."""
+"""Smoothing width of the sea's density over w: 0.014 rad/s at a roll period of 12.6 s."""
 _KNOB: Final = (1e-4, 3.0)
-"""Least and most of the added noise of the slope, squared, over s^2 / w."""
+"""Range of the squared added slope noise over s^2 / w."""
 _BISECTIONS: Final = 5
-"""From the range of `_KNOB` to a factor of 1.4."""
+"""Number of bisections, which bring the range of `_KNOB` to a factor of 1.4."""
 _ORDER: Final = 16
-"""States of the sea, twice the usual ones (`SeaModel`): the margins come from the noise instead."""
+"""States of the sea, twice the default of `SeaModel`, because the noise provides the margins."""
 _LEAST_FLOOR: Final = 1.3e-4
-"""Of the sea, a tenth of the usual one, for the same reason."""
+"""Floor of the sea's density, a tenth of the default of `SeaModel`, for the reason of `_ORDER`."""
 _OMEGA: Final = np.geomspace(0.05, 30.0, 1500)
-"""Over roll frequency: the slope of short waves falls slowly, and they are in the sensors."""
+"""Frequencies over the roll frequency; short waves count because the slope falls slowly with
+frequency and the sensors see them."""
 _UNKNOWN: Final = ((0.5, 0.017), (0.8, 0.017), (1.4, 0.0026))
-"""Systems of a sea that is not known: peak periods over the roll period, and heights in m per
-square second of the peak period: 0.7, 1.7 and 0.8 m at 6, 10 and 18 s for a ship of 12.6 s."""
+"""Wave systems assumed for an unknown sea: peak periods over the roll period, and heights in m per
+square second of the peak period: 0.7, 1.7 and 0.8 m at 6, 10 and 18 s for a roll period of 12.6 s.
+"""
 _UNKNOWN_SLOPE: Final = 0.5
-"""Effective slope of a sea that is not known: the usual one of `SeaModel`."""
+"""Effective slope of an unknown sea: the default of `SeaModel`."""
 _MORE_NOISE: Final = 1.5
-"""Beyond the least noise: on the very edge of stability a filter finds no room."""
+"""Factor on the least noise; at the edge of stability a filter has no freedom."""
 _MORE_NOISES: Final = 6
+"""Limit on the number of noise levels tried. Chosen; no study."""
 _COSTLIER: Final = 3.0
-"""From one cost of pressure that is tried to the next."""
+"""Factor between successive trial weights on pressure."""
 _MOST_STEPS: Final = 8
+"""Limit on the number of trial weights. Chosen; no study."""
 _MOST_GROWTH: Final = 1.5
-"""Growth over a plan of an oscillation with the pump at its limit: the plan foresees it."""
+"""Allowed growth over a plan of an oscillation with the pump at its limit; the plan predicts it."""
 _PARTS: Final = np.linspace(0.02, 1.0, 50)
-"""Parts of the pressure asked for that a pump at its limit gives."""
+"""Fractions of the requested pressure that a pump at its limit may give."""
 _LEAST_STIFFNESS: Final = 1 / 3
-"""Stiffness of ship and water at the longest roll period over the known one; below it a heel can't
-be told from a load."""
+"""Least stiffness of ship and water at the longest roll period over the nominal one; below it a
+heel and a load cannot be distinguished."""
 _MEASURED: Final = ("roll_rad", "roll_rate_rad_s", "level_m")
 
 
 class SlopeDensity(Protocol):
-    """What a law knows of a sea."""
+    """A sea as a law's design needs it."""
 
     def slope_density(self, omega_rad_s: FloatArray) -> FloatArray:
         """One-sided density of the effective wave slope over encounter frequency."""
@@ -107,9 +112,9 @@ class SelfTuned:
     Attributes
     ----------
     law : ConstrainedLaw
-        It commands what the design's does with a filter on its innovations.
+        The law of `design` with a filter on its innovations.
     prediction : Prediction
-        In the sea that it expects.
+        In the expected sea.
     """
 
     design: ConstrainedDesign
@@ -126,18 +131,16 @@ def self_tuned(
     mean_power_w: float = math.inf,
     sample_time_s: float | None = None,
 ) -> SelfTuned:
-    """The constrained law of least predicted cost that has all margins and keeps a mean power.
+    """Design the constrained law of least predicted cost with all margins, within a mean power.
 
     Parameters
     ----------
     plant : DesignPlant
         With the limits of its pump.
-    sea : SlopeDensity
-        Known, estimated or assumed.
     mean_power_w : float
-        Budget of the predicted power; infinite for the greatest comfort.
+        Limit on the predicted mean power; infinite for the least cost.
     sample_time_s : float, optional
-        Instead of the one that follows from the roll frequency.
+        The default follows from the roll frequency.
 
     Raises
     ------
@@ -172,28 +175,24 @@ def passive_roll_rad(plant: DesignPlant, sea: SlopeDensity) -> float:
 
 
 def cost_weights(passive_rad: float, limits: PumpLimits) -> tuple[float, float, float]:
-    """What a law's motion costs: per square of roll, level, and pressure over the pump's most.
+    """Cost weights on squared roll, level, and pressure over the pump's maximum.
 
-    Parameters
-    ----------
-    passive_rad : float
-        Roll RMS with the passive tank.
+    `passive_rad` is the roll RMS with the passive tank.
     """
     return 1.0, _LEVEL_COST * (passive_rad / limits.level_m) ** 2, _PRESSURE_COST * passive_rad**2
 
 
 @dataclass(frozen=True, slots=True)
 class SelfTunedDesign:
-    """A constrained law that is designed for its ship and sea by itself.
+    """A constrained law whose numbers follow from its ship and sea.
 
     Parameters
     ----------
     kind : {"self_tuned"}
     sea : SeaModel or None
-        The sea it expects, of which spectrum and effective slope count; None where none is known.
+        Expected sea, of which spectrum and effective slope count; None for an unknown sea.
     mean_power_w : float
-        Most that the pump may put into the water in the mean, predicted; infinite for the greatest
-        comfort.
+        Limit on the predicted mean power from pump to water; infinite for the least roll.
     """
 
     kind: Literal["self_tuned"]
@@ -221,13 +220,13 @@ class SelfTunedDesign:
 
 @lru_cache(maxsize=16)
 def _tuned(design: SelfTunedDesign, plant: DesignPlant) -> SelfTuned:
-    """As `SelfTunedDesign.tuned`; it takes seconds, and several ask for the same."""
+    """Design as `SelfTunedDesign.tuned`; cached, as it takes seconds and several callers use it."""
     sea = design.sea or unknown_sea(plant.ship)
     return self_tuned(plant, sea, mean_power_w=design.mean_power_w)
 
 
 def unknown_sea(ship: RollShip) -> SeaModel:
-    """What a law expects of a sea that is not known: broad, and mostly above the roll frequency."""
+    """A broad sea, mostly above the roll frequency, for a law whose sea is unknown."""
     w = ship.natural_frequency_rad_s
     omega, slope = w * _OMEGA, np.zeros(len(_OMEGA))
     for ratio, height in _UNKNOWN:
@@ -239,7 +238,7 @@ def unknown_sea(ship: RollShip) -> SeaModel:
 
 
 class _Search:
-    """One ship in one sea: what is designed, predicted and judged again and again."""
+    """Repeated design, prediction and judgement of laws for one ship in one sea."""
 
     def __init__(self, plant: DesignPlant, sea: SlopeDensity, sample_time_s: float | None) -> None:
         noise = SensorNoise()
@@ -261,7 +260,7 @@ class _Search:
         self._heel_rad = _short(_HEEL * self._roll_rad) if self._tells_heel() else 0.0
 
     def least_cost(self) -> float:
-        """Factor on the pressure's scaled weight from which the pump's limit is no danger."""
+        """Least factor on the pressure's scaled weight without oscillation at the pump's limit."""
         costlier = 1.0
         for _ in range(_MOST_STEPS):
             if self._growth(costlier) <= _MOST_GROWTH:
@@ -272,7 +271,7 @@ class _Search:
     def best(self, costlier: float) -> SelfTuned | None:
         """The law of least predicted cost with all margins, or None.
 
-        The pressure costs so many times its scaled weight.
+        `costlier` is a factor on the scaled weight of the pressure.
         """
         noise = _MORE_NOISE * self._least_noise(costlier)
         for _ in range(_MORE_NOISES):
@@ -291,7 +290,7 @@ class _Search:
         return None
 
     def _least_noise(self, costlier: float) -> float:
-        """Noise of the slope from which the law stands the hard cases, by bisection."""
+        """Least noise of the slope with a stable law in the hardest cases, by bisection."""
         low, high = (math.log(end) for end in _KNOB)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
@@ -302,14 +301,14 @@ class _Search:
         return math.exp(high)
 
     def _weights(self, costlier: float) -> tuple[float, float, float]:
-        """Of the cost, on the squares of roll, level and pressure per the pump's most."""
+        """Cost weights on squared roll, level, and pressure over the pump's maximum."""
         roll, level, pressure = cost_weights(self._roll_rad, self._plant.limits)
         return roll, level, costlier * pressure
 
     def _stands_hard_cases(self, design: ConstrainedDesign) -> bool:
         try:
             law = design.law(self._plant).unlimited()
-        except (ValueError, ArithmeticError):  # LinAlgError is one of the former
+        except (ValueError, ArithmeticError):  # LinAlgError is a ValueError
             return False
         return all(closed_loop_radius(law, model, gain) < 1 for model, gain in self._hard_cases)
 
@@ -331,9 +330,9 @@ class _Search:
         )
 
     def _growth(self, costlier: float) -> float:
-        """Of the fastest growing oscillation over a plan, with the pump at its limit.
+        """Growth over a plan of the fastest growing oscillation, with the pump at its limit.
 
-        The motion is known, and the pump gives a part of the pressure that the law asks for.
+        The motion is known, and the pump gives a part of the requested pressure.
         """
         design = self._design(_KNOB[0], costlier)
         law = design.law(self._plant).unlimited()
@@ -342,14 +341,14 @@ class _Search:
         return float(np.abs(np.linalg.eigvals(closed)).max()) ** design.horizon
 
     def _tells_heel(self) -> bool:
-        """Whether the heel under a steady moment hardly depends on how the ship is loaded."""
+        """Whether the heel under a steady moment hardly depends on the ship's loading."""
         ship = self._plant.ship
         slower = replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / PERIOD_SCALES[-1] ** 2)
         least, known = (_steady_stiffness(each, self._plant) for each in (slower, ship))
         return least > _LEAST_STIFFNESS * known
 
     def _longest_and_shortest_period(self) -> Iterator[tuple[LinearModel, float]]:
-        """Where a law mostly fails first: at the longest and the shortest roll period."""
+        """Yield the cases that usually fail first: the longest and the shortest roll period."""
         ship, plant = self._plant.ship, self._plant
         for scale in (PERIOD_SCALES[-1], PERIOD_SCALES[0]):
             other = replace(ship, stiffness_nm_rad=ship.stiffness_nm_rad / scale**2)
@@ -360,13 +359,13 @@ class _Search:
 
 
 def _steady_stiffness(ship: RollShip, plant: DesignPlant) -> float:
-    """Steady moment over the heel that it makes, the water free to move, in N m / rad."""
+    """Steady moment over the heel that it causes, with free water, in N m / rad."""
     a, b = state_matrices(ship, plant.tank)
     return -1 / float(np.linalg.solve(a, b[:, 1])[0])
 
 
 def sample_time_of(plant: DesignPlant) -> float:
-    """Time between two steps of a law for a plant, in s: a tenth over its roll frequency."""
+    """Sample time in s of a law for a plant: 0.1 over its roll frequency."""
     w = plant.ship.natural_frequency_rad_s
     return round(TICK_S * max(2, round(0.1 / w / TICK_S)), 2)
 

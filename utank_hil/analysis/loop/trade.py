@@ -1,4 +1,4 @@
-"""What a law trades: less roll against robustness and pressure, as its effort is scaled."""
+"""Trade-off of a law between roll on one side, robustness and pressure on the other."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,21 +19,23 @@ Design = PredictiveDesign | ConstrainedDesign | LQGDesign
 DesignT = TypeVar("DesignT", bound=Design)
 
 WEIGHT_FACTORS: Final = tuple(float(factor) for factor in np.geomspace(1e-2, 1e2, 17))
+"""Factors on the weight of a law: four decades. Chosen; no study."""
 HORIZON_FACTORS: Final = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5, 1.75, 2.0)
+"""Factors on the control horizon. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class TradePoint:
-    """One law of a trade.
+    """One law of a trade-off.
 
     Attributes
     ----------
     factor : float
-        Of the weight or horizon; 1 is the design as it stands.
+        Factor on the weight or horizon; 1 is the unchanged design.
     motion : MotionInSea or None
         Linear prediction; None if the loop is unstable on its own ship.
     roll_below_passive : float or None
-        Share by which the roll RMS is less than with the passive tank.
+        Reduction of the roll RMS relative to the passive tank.
     """
 
     factor: float
@@ -49,14 +51,14 @@ class TradePoint:
 
 @dataclass(frozen=True, slots=True)
 class Trade:
-    """A trade, from the gentlest law to the hardest.
+    """A trade-off, from the least to the greatest effort.
 
     Attributes
     ----------
     varied : str
-        What is scaled, in words.
+        Name of the scaled parameter, in words.
     passive : MotionInSea
-        With the tank alone.
+        With the passive tank.
     """
 
     varied: str
@@ -65,7 +67,7 @@ class Trade:
 
 
 def varied(design: Design) -> str:
-    """What `scaled` scales: the output weight, or the control horizon of an exact deadbeat."""
+    """Name of the parameter that `scaled` scales: a weight, or a deadbeat's control horizon."""
     if isinstance(design, LQGDesign):
         return "state weight"
     if isinstance(design, PredictiveDesign) and design.output_weight is None:
@@ -74,10 +76,10 @@ def varied(design: Design) -> str:
 
 
 def scaled(design: DesignT, factor: float) -> DesignT:
-    """The same design with its `varied` parameter multiplied.
+    """Return the design with its `varied` parameter multiplied.
 
     A horizon is rounded to whole samples and its window of targets keeps its length. A constrained
-    design has its pressure weight divided, which comes to the same.
+    design has its pressure weight divided, which is equivalent.
     """
     if isinstance(design, ConstrainedDesign):
         return replace(design, pressure_weight_rad2=design.pressure_weight_rad2 / factor)
@@ -98,28 +100,28 @@ def trade(
     factors: Sequence[float] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trade:
-    """Design, judge and predict a law for each factor; about half a second each.
+    """Design, judge and predict a law for each factor, in about half a second each.
+
+    A constrained design is judged and predicted within its limits, where it is linear.
 
     Parameters
     ----------
-    plant : DesignPlant
-        A constrained design is judged and predicted within its limits, where it is linear.
     wave_moment : Harmonics
         The sea's roll moment in N m.
     factors : sequence of float, optional
-        Positive; `WEIGHT_FACTORS` or `HORIZON_FACTORS` when left out.
+        Positive; the default is `WEIGHT_FACTORS` or `HORIZON_FACTORS`.
     progress : callable, optional
-        Told the finished fraction.
+        Called with the finished fraction.
 
     Raises
     ------
     CalmSeaError
-        If the sea does not roll the ship: there is no roll to trade.
+        If the sea does not roll the ship.
     """
     horizon = varied(design) == "control horizon"
     if factors is None:
         factors = HORIZON_FACTORS if horizon else WEIGHT_FACTORS
-    # a longer horizon asks for less
+    # a longer horizon means less effort
     factors = sorted(factors, reverse=horizon)
     system = coupled_model(plant.ship, plant.tank)
     measured = (
