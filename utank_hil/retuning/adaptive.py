@@ -28,7 +28,7 @@ from utank_hil.retuning.retuner import Retuner
 from utank_hil.retuning.settings import RetuningSettings
 
 MOST_TRIES: Final = 3
-"""Identifications of one change of the ship; if all are refused, the new ship counts as normal."""
+"""Identifications tried for one change of the ship; if all fail, the new ship counts as normal."""
 
 _NEW: Final = (RetuningState.TRIAL, RetuningState.RETUNED)
 # in Python 3.11 a member costs eight times as much to read from its class as from the module
@@ -36,22 +36,18 @@ _IDENTIFY: Final = RetuningState.IDENTIFY
 
 
 class AdaptiveController(LawExchange):
-    """A controller that identifies its ship and has its law designed for it.
+    """A controller that identifies its ship and has a law designed for it.
 
     Parameters
     ----------
-    law : LinearLaw
-        First law.
     controller : Controller
-        Of that law, at rest.
+        Controller of `law`, at rest.
     ship : ShipFigures
-        The ship that it was designed for.
+        The ship that `law` was designed for.
     roll : int
         Index of the roll among the outputs.
     pulses_pa : ndarray, shape (N,)
-        Excitation pressure, one value a sample.
-    retuner : Retuner
-        Identifies and designs.
+        Excitation pressure, one value per sample.
 
     Attributes
     ----------
@@ -133,7 +129,7 @@ class AdaptiveController(LawExchange):
     def _go_on(self) -> None:
         if self.state is not _IDENTIFY:
             super()._go_on()
-        # whatever else is old: the roll is judged as it was last known
+        # The roll is judged by its last known value, whatever else is outdated.
         elif abs(self._roll_rad) > self._settings.roll_limit_rad:
             self._abort("the roll is above the limit for identification")
         elif self._pulses_given == len(self._pulses_pa):
@@ -164,10 +160,7 @@ class AdaptiveController(LawExchange):
             self._relearn_normal()
 
     def _refuse(self, reasons: tuple[str, ...]) -> None:
-        """End without a new law; a change of the ship is tried again, `MOST_TRIES` times in all.
-
-        What `_abort` ends does not count as a try.
-        """
+        """End without a new law; a change of the ship is tried `MOST_TRIES` times."""
         if self._changed:
             self._tries += 1
             if self._tries == MOST_TRIES:

@@ -17,19 +17,19 @@ from utank_hil.retuning.law_bank import MonitoredLaw
 WARM_UP_SAMPLES: Final = 1000
 """Past samples that a new law is stepped through: more than the memory of any law or washout."""
 WARM_UP_CHUNK: Final = 50
-"""Samples of the warm-up done in one sample time."""
+"""Number of warm-up samples processed in one sample time."""
 GAIN_FACTOR: Final = 30.0
 """Largest gains of a candidate, relative to the configured law's."""
 ANOTHER_QUESTION: Final = "the retuner answered another question"
 MOST_COEFFICIENTS: Final = 1e9
-"""Sum of the gains on a reference: far beyond sense, and no overflow."""
+"""Largest sum of the gains on a reference; it prevents an overflow. Chosen; no study."""
 
 
 class Admission:
     """Conditions on a candidate: the same signals and sample time, and bounded gains.
 
-    Bounded gains mean bounded commands. The law feeds back the applied commands, which the pump's
-    limit bounds, and the outputs.
+    Bounded gains mean bounded commands: the law feeds back the applied commands, which the pump
+    limits, and the outputs.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Admission:
         self._most_on_outputs = GAIN_FACTOR * outputs
 
     def admit(self, candidate: Answer) -> "WarmUp | str":
-        """Warm-up of the candidate's law, or the reason why it is not admitted."""
+        """Return the warm-up of the candidate's law, or the reason why it is not admitted."""
         if not isinstance(candidate, Candidate):
             return ANOTHER_QUESTION
         if candidate.law.output_gains.shape[1:] != (1, self._history.outputs):
@@ -68,12 +68,9 @@ class Admission:
 
 
 class WarmUp:
-    """Steps a new law through past samples, a chunk at each sample time.
+    """Steps a new law through past samples, one chunk per sample time.
 
-    Parameters
-    ----------
-    observe : callable, optional
-        Takes a measurement in the place of the law's `step`, whose answers go nowhere.
+    `observe` replaces the law's `step` for a law whose answers are not used.
     """
 
     def __init__(
@@ -113,7 +110,7 @@ def _gains(law: LinearLaw) -> tuple[float, float]:
 
 
 def _candidate_gains(inner: PredictiveLaw, whole: LinearLaw) -> tuple[float, float]:
-    """`_gains` of a predictive law, alone or washed, without its matrices: they cost many ticks."""
+    """Return `_gains` of a predictive law without its matrices, which take many ticks."""
     share = whole.share if isinstance(whole, WashoutLaw) else 0.0
     outputs = (1 - share) * _sum(inner.output_gains) + share * inner.output_gains.shape[2]
     return _sum(inner.input_gains), outputs

@@ -1,7 +1,7 @@
 """The retuner's answer: a law, an estimate of waves and ship, or a refusal with reasons.
 
-All pass between processes as typed messages (`wire`). Decoding rejects anything that is not one,
-and anything too large for the loop to read, to build and to step between two ticks.
+Answers pass between processes as typed messages (`wire`). Decoding rejects anything else, and
+anything too large for the loop to read, build and step between two ticks.
 """
 
 import math
@@ -21,15 +21,15 @@ from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode, refuse_shap
 
 _MOST_REASONS: Final = 20
 _MOST_CHARACTERS: Final = 500
-"""A refusal is for a person to read: a screen of sentences, whatever an exception says."""
+"""Longest refusal in characters, about one screen of text; longer reasons are cut."""
 _MOST_OUTPUTS: Final = len(STATES)
 
 LONGEST_BYTES: Final = OVERHEAD_BYTES + max(
     8 * (MOST_ORDER * (1 + _MOST_OUTPUTS) + MOST_SAMPLES * _MOST_OUTPUTS),
     8 * max(MOST_NUMBERS, 3 * MOST_BANDS),
-    4 * _MOST_REASONS * _MOST_CHARACTERS,  # a character has up to four bytes
+    4 * _MOST_REASONS * _MOST_CHARACTERS,  # A character has up to four bytes.
 )
-"""Of an answer that can be read."""
+"""Length of the longest answer that can be read."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,13 +77,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """No new law.
-
-    Attributes
-    ----------
-    reasons : tuple of str
-        Why, in words; one or more.
-    """
+    """Refusal of a new law, with one or more reasons in words."""
 
     reasons: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=_MOST_CHARACTERS)], ...],

@@ -1,8 +1,8 @@
-"""Whether the ship is still the one that a law was made for.
+"""Monitor of whether the ship still matches the ship that a law was designed for.
 
-Compares the estimated ship (`MotionEstimate`) with the law's, whatever the sea is. A
-difference counts where it exceeds three standard deviations, and in either direction, and where the
-estimate before it was of the same ship.
+The estimated ship (`MotionEstimate`) is compared with the law's, independently of the sea. A
+difference counts, in either direction, if it exceeds three standard deviations and the previous
+estimate was of the same ship.
 """
 
 import math
@@ -12,22 +12,17 @@ from utank_hil.canbus import Verdict
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
 SIGNIFICANT: Final = 3.0
-"""Standard deviations; less is no difference."""
+"""Number of standard deviations from which a difference is significant."""
 
 
 class ChangeMonitor:
-    """Compares the present ship with a law's.
-
-    Parameters
-    ----------
-    ship : ShipFigures
-        The ship that the law was designed for.
+    """Monitor that compares the present ship with the ship that a law was designed for.
 
     Attributes
     ----------
     change : float
-        Factor, 1 or more, between the roll periods, or between the roots of the stiffnesses if
-        that is larger; 1 while no difference is significant.
+        Ratio (1 or more) of the roll periods or of the square roots of the stiffnesses, whichever
+        is larger; 1 while no difference is significant.
     """
 
     def __init__(self, ship: ShipFigures) -> None:
@@ -36,10 +31,7 @@ class ChangeMonitor:
         self.change = 1.0
 
     def watch(self, estimate: MotionEstimate) -> None:
-        """Take a new estimate; one without a good ship changes nothing.
-
-        When estimates are outdated, no change is known any more.
-        """
+        """Take a new estimate; OUTDATED clears the change, one without a good ship leaves it."""
         now, before = estimate.ship, self._latest
         if estimate.of_ship is Verdict.OUTDATED:
             self._latest, self.change = None, 1.0
@@ -50,7 +42,7 @@ class ChangeMonitor:
             self.change = ship_factor(now, self._ship)
 
     def restart(self) -> None:
-        """Take the latest ship for the law's own."""
+        """Take the latest ship as the law's own."""
         self._ship = self._latest or self._ship
         self.change = 1.0
 
@@ -69,6 +61,6 @@ def ship_factor(now: ShipFigures, then: ShipFigures) -> float:
 
 
 def _significant(ratio: float, deviation: float) -> float:
-    """The ratio as a factor of 1 or more; 1 if it is within the deviations."""
+    """Return the ratio as a factor of 1 or more; 1 if it is within the deviations."""
     change = abs(math.log(ratio))
     return math.exp(change) if change > SIGNIFICANT * deviation else 1.0

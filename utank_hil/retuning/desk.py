@@ -1,4 +1,4 @@
-"""One kind of request to the retuner's process, and the way of its answers back.
+"""A desk: the requests of one kind to the retuner's process, and their answers.
 
 The mailboxes hold the only state: a request is open while its number differs from the answer's.
 """
@@ -13,17 +13,11 @@ from utank_hil.retuning.mailbox import Mailbox
 from utank_hil.retuning.retuner import Request, Work
 from utank_hil.retuning.wire import OVERHEAD_BYTES, decoder, encode
 
-_ALIVE_NS: Final = 5_000_000_000  # low priority: may wait long for a busy machine
+_ALIVE_NS: Final = 5_000_000_000  # The worker has low priority and may wait long on a busy machine.
 
 
 class Desk:
-    """Both ends of the requests for one kind of work; may be an argument of a spawned process.
-
-    Parameters
-    ----------
-    work : Work
-        What is done, with which requests.
-    """
+    """Both ends of the requests for one kind of work; may be an argument of a spawned process."""
 
     def __init__(self, work: Work) -> None:
         self._compute, self._request, most_numbers = work
@@ -45,7 +39,7 @@ class Desk:
         self._requests.post(number, encode(request))
 
     def answer(self, number: int, now_ns: int) -> Answer | None:  # noqa: ARG002
-        """The answer, if it has arrived; a message that cannot be decoded is a refusal."""
+        """Return the answer, if any; a message that cannot be decoded counts as a refusal."""
         data = self._answers.read(number)
         if data is None:
             return None
@@ -59,7 +53,7 @@ class Desk:
         self._answers.beat(now_ns)
 
     def serve(self) -> bool:
-        """Answer the open request, in the worker; return whether there was one.
+        """Answer the open request in the worker and return whether there was one.
 
         An exception becomes a refusal, with its traceback on standard error.
         """
@@ -77,7 +71,7 @@ class Desk:
         return True
 
     def refuse_open(self, reason: str) -> None:
-        """Refuse the request that is open, if one is, in the worker's place."""
+        """Refuse the open request, if any, on behalf of the worker."""
         number = self._requests.number
         if number != self._answers.number:
             self._answers.post(number, answer_bytes(Refusal((reason,))))

@@ -1,4 +1,4 @@
-"""What the motion shows of waves and ship: the estimator's answer, and what it is asked with."""
+"""Estimates of waves and ship from the motion, and the request for them."""
 
 import math
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.sea import SlopeSpectrum
 
 MOST_BANDS: Final = 1000
-"""Bands of a spectrum: more than a record of an hour has, and soon read between two ticks."""
+"""Most bands of a spectrum: above that of a one-hour record, and read between two ticks."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShipFigures:
-    """A ship in roll, without tank water, and how well it is known.
+    """A ship in roll, without tank water, and the uncertainty of its figures.
 
     Attributes
     ----------
@@ -27,8 +27,8 @@ class ShipFigures:
     Raises
     ------
     ValueError
-        If stiffness or inertia is less than a model's, so that the loop could not compute with
-        it, or anything is too large.
+        If stiffness or inertia is too small for the loop to compute with, or any value is too
+        large.
     """
 
     stiffness_nm_rad: Annotated[float, Range(least=1e-6, most=1e30)]
@@ -42,12 +42,12 @@ class ShipFigures:
 
     @classmethod
     def of(cls, ship: RollShip) -> "ShipFigures":
-        """The figures of a ship that is known."""
+        """Return the figures of a known ship."""
         return cls(ship.stiffness_nm_rad, ship.inertia_kg_m2, ship.damping_nms_rad)
 
     @classmethod
     def identified(cls, found: ModelSummary) -> "ShipFigures":
-        """The figures of an identified ship; its stiffness is as uncertain as its square root."""
+        """Return the figures of a ship; its stiffness is as uncertain as its square root."""
         return cls(
             found.stiffness_nm_rad,
             found.inertia_kg_m2,
@@ -62,7 +62,7 @@ class ShipFigures:
         return 2 * math.pi * math.sqrt(self.inertia_kg_m2 / self.stiffness_nm_rad)
 
     def ship(self, configured: RollShip) -> RollShip:
-        """The configured ship with these figures; righting levers scale with the stiffness."""
+        """Return the configured ship with these figures; levers scale with the stiffness."""
         return configured.with_figures(
             self.inertia_kg_m2, self.stiffness_nm_rad, self.damping_nms_rad
         )
@@ -70,24 +70,23 @@ class ShipFigures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionEstimate:
-    """Waves and ship, from the latest part of the motion's record.
+    """Estimate of waves and ship from the latest part of the motion record.
 
     Attributes
     ----------
     of_sea, of_ship : Verdict
         Whether the estimate of waves and ship is good, and if not, why.
     ship : ShipFigures or None
-        The ship found; where `of_ship` is not good, the known one that the waves rest on. None if
-        nothing was found.
+        The ship found; if `of_ship` is not good, the known ship that the waves are based on. None
+        if nothing was found.
     waves : SlopeSpectrum or None
         Wave moment per stiffness of that ship.
     rms_deviation : float
         Relative standard deviation of the root mean square of `waves`.
     hs_m, tp_s : float
-        Significant height and peak period of waves on the beam with the effective slope that the
-        configuration gives.
+        Significant height and peak period of beam waves at the configured effective slope.
     duration_s : float
-        Length of the record that it is from.
+        Length of the record.
 
     Raises
     ------
@@ -112,14 +111,14 @@ class MotionEstimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EstimateRequest:
-    """What the estimator is asked with.
+    """Request for an estimate.
 
     Attributes
     ----------
     ship : ShipFigures
-        The ship as it is known.
+        The known ship.
     record : ndarray, shape (N, 4)
-        `estimator.COLUMNS` of the latest samples, gaps NaN.
+        Latest samples, columns `estimator.COLUMNS`; gaps are NaN.
     """
 
     ship: ShipFigures

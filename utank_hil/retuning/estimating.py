@@ -1,4 +1,4 @@
-"""From a record of the motion to an estimate of waves and ship: the estimator's whole work."""
+"""Estimation of waves and ship from a record of the motion."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -14,40 +14,38 @@ from utank_hil.retuning.estimate import EstimateRequest, MotionEstimate, ShipFig
 from utank_hil.retuning.estimator import COLUMNS
 
 LEAST_PERIODS: Final = 45.0
-"""Natural roll periods below which a record is too short."""
+"""Shortest record in natural roll periods."""
 MOST_MISSING: Final = 0.05
-"""Largest share of missing samples; the rest is interpolated."""
+"""Largest share of missing samples; gaps are interpolated."""
 LEAST_CLEAR: Final = 0.8
-"""Least part of the wave moment's energy in bands that stand out from the sensors' noise."""
+"""Smallest share of the wave moment's energy in bands above the sensors' noise."""
 STIFFNESS_DEVIATION: Final = 0.03
 PERIOD_DEVIATION: Final = 0.05
-"""Largest relative deviations for the ship to count as identified. With less to go by, waves
-are taken for the ship, at deviations of 0.036 and more (docs/retuning.md).
+"""Largest relative deviations of an identified ship. With less information, waves are taken for
+the ship, at deviations of 0.036 and more (docs/retuning.md).
 """
 FARTHEST: Final = 1.45
-"""Largest factor between the roll period found and the configured ship's: loading changes it by
-30 % or so. Where the pump works little, a peak of the waves looks like a ship farther off.
+"""Largest ratio of the roll period found to the configured ship's, or its inverse. Loading changes
+it by some 30 %; with little pump work, a peak of the waves looks like a ship further away.
 """
 SEA_DEVIATION: Final = 0.2
-"""Largest relative deviation of the moment's root mean square, for the sea to count as known."""
+"""Largest relative deviation of the moment's root mean square for a sea that counts as known."""
 CONTRADICTED: Final = 20.0
-"""Logarithm of likelihood by which another ship may explain the motion better than the known."""
+"""Log-likelihood ratio from which another ship contradicts the known one."""
 SAME: Final = 3.0
-"""Standard deviations by which the ship of the record's last half may differ from the whole's."""
+"""Standard deviations within which the ships of the last half and the whole record agree."""
 
 
 @dataclass(frozen=True, slots=True)
 class EstimateTask:
-    """What the estimator needs besides the record.
+    """Constant inputs of the estimator.
 
     Attributes
     ----------
     plant : DesignPlant
         The configured ship and tank.
-    sample_time_s : float
-        Of the record.
     effective_slope : float
-        Ratio of effective to true wave slope, for the height of the waves.
+        Ratio of effective to true wave slope, for the wave height.
     """
 
     plant: DesignPlant
@@ -58,9 +56,9 @@ class EstimateTask:
 def estimate(request: EstimateRequest, task: EstimateTask) -> MotionEstimate:
     """Estimate waves and ship from a record.
 
-    The ship is fitted to the whole record and to its last half. Where they contradict each other
-    the ship was loaded meanwhile, and the half counts. Where the motion does not identify the ship,
-    the waves are those of the known one, and uncertain if another explains the motion far better.
+    The ship is fitted to the whole record and to its last half. If they contradict each other, the
+    loading changed meanwhile and the half counts. If the motion does not identify the ship, the
+    waves are based on the known one, and uncertain if another ship explains the motion far better.
     """
     known, record = request.ship, request.record
     period_s = 2 * np.pi / task.plant.ship.natural_frequency_rad_s
@@ -133,7 +131,7 @@ def _apart(late: MotionFit, whole: MotionFit) -> bool:
 
 
 def _without_gaps(motion: FloatArray) -> FloatArray | None:
-    """The record with its gaps interpolated, from its first sample on; None if too many."""
+    """Return the record from its first sample on, interpolated; None with too many gaps."""
     here = np.asarray(np.isfinite(motion).all(axis=1))
     if not here.any():
         return None

@@ -1,7 +1,7 @@
-"""The estimator's end in the loop: keeps the motion's record and asks for estimates from it.
+"""Estimator in the loop: keeps the motion record and requests estimates from it.
 
-Every `every_s` the record goes to the retuner's process (`estimating`). Nothing is stimulated and
-nothing waits.
+Every `every_s` the record goes to the retuner's process (`estimating`). The ship is not excited,
+and the loop does not wait.
 """
 
 import math
@@ -23,35 +23,36 @@ from utank_hil.retuning.history import SampleHistory
 from utank_hil.retuning.retuner import Retuner
 
 COLUMNS: Final = ("pressure_pa", "roll_rad", "roll_rate_rad_s", "level_m")
-"""Of the motion's record."""
+"""Columns of the motion record."""
 SAMPLE_TIME_S: Final = 0.2
-"""Sample time of the record: its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
+"""Sample time of the record; its Nyquist frequency is six times `motion_fit.TOP_RAD_S`."""
 LONGEST_RECORD_S: Final = 3600.0
-"""Time for which a sea may be taken as stationary."""
+"""Longest record: a sea counts as stationary for one hour."""
 OUTDATED: Final = 3.0
-"""Intervals without another estimate after which the last one is outdated: two may fail."""
+"""Number of intervals after which an estimate is outdated: two may fail."""
 SHIP_OUTDATED_S: Final = 3600.0
-"""Time for which an identified ship is shown, or three intervals if that is longer: within an hour
-loading and tanks hardly change a ship at sea."""
+"""Time for which an identified ship is shown, or three intervals if that is longer. Within an hour
+loading and tanks hardly change a ship at sea.
+"""
 GM_DEVIATIONS: Final = 2.0
-"""Standard deviations below the metacentric height at which its interval ends."""
+"""Number of standard deviations from the metacentric height to the lower end of its interval."""
 
 
 @dataclass(frozen=True, slots=True)
 class EstimateSettings:
-    """How waves and ship are estimated under way: section ``sea_estimate`` of a controller.
+    """Settings of the estimate of waves and ship: section ``sea_estimate`` of a controller.
 
     Attributes
     ----------
     every_s : float
         Time between two estimates.
     record_s : float
-        Length of the record: so much of the past counts.
+        Length of the record.
     effective_slope : float
-        Ratio of effective to true wave slope, for the height of the waves.
+        Ratio of effective to true wave slope, for the wave height.
     renew : bool
-        Have a self-tuned law designed anew for the waves and the ship that are estimated, whenever
-        they differ from what the law in charge was designed for.
+        Whether a self-tuned law is redesigned when the estimated waves or ship differ from those
+        that the present law was designed for.
 
     Raises
     ------
@@ -75,7 +76,7 @@ class EstimateSettings:
 
 @dataclass(slots=True)
 class EstimateFigures:
-    """What panels and telemetry show of the estimates; NaN while nothing is known.
+    """Estimates for panels and telemetry; NaN while unknown.
 
     Attributes
     ----------
@@ -85,18 +86,15 @@ class EstimateFigures:
         Significant height and peak period of beam waves.
     moment_rms_rad, moment_deviation : float
         Root mean square of the wave moment per roll stiffness; its relative standard deviation.
-    sea_age_s : float
-        Time since the end of the record.
+    sea_age_s, ship_age_s : float
+        Time since the end of the record of the waves, and of the one that identified the ship.
     roll_period_s, roll_period_deviation_s : float
-        Of the last ship that was identified, without tank water; NaN when that is too long ago.
+        Roll period of the last identified ship without tank water; NaN if that is too old.
     gm_m, gm_deviation_m : float
-        Metacentric height of the ship with the tank's water free to move; NaN also where the
-        displacement is not known.
-    ship_age_s : float
-        Time since the end of the record that identified the ship.
+        Metacentric height with free tank water; NaN also if the displacement is unknown.
     gm_low : bool
-        There is a limit of the stability booklet, and the interval of the last `gm_m` reaches below
-        it, or there are no estimates any more.
+        Whether the interval of the last `gm_m` reaches below the limit of the stability booklet, or
+        estimates have ceased; False without a limit.
     """
 
     of_sea: Verdict = Verdict.RECORD_SHORT
@@ -131,11 +129,11 @@ class EstimateFigures:
         return sea, ship
 
     def forget_ship(self) -> None:
-        """Show no ship."""
+        """Clear the ship's figures."""
         self.roll_period_s = self.roll_period_deviation_s = self.gm_m = self.gm_deviation_m = nan
 
     def sea_message(self) -> SeaEstimate:
-        """For the bus."""
+        """Return the message of the sea estimate for the bus."""
         return SeaEstimate(
             self.of_sea,
             self.hs_m,
@@ -146,7 +144,7 @@ class EstimateFigures:
         )
 
     def ship_message(self) -> ShipEstimate:
-        """For the bus."""
+        """Return the message of the ship estimate for the bus."""
         return ShipEstimate(
             self.of_ship,
             self.roll_period_s,
@@ -158,14 +156,14 @@ class EstimateFigures:
 
 
 def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) -> float:
-    """Metacentric height of ship and tank, the water free to move; NaN without a displacement.
+    """Return the metacentric height of ship and tank with free water; NaN without a displacement.
 
     Parameters
     ----------
     ship : RollShip
-        Of the displacement.
+        Ship with the displacement.
     stiffness_nm_rad : float
-        Of the ship without tank water.
+        Roll stiffness of the ship without tank water.
     """
     if not ship.displacement_n > 0:
         return nan
@@ -176,21 +174,19 @@ def metacentric_height_m(ship: RollShip, tank: Tank, stiffness_nm_rad: float) ->
 
 
 class Estimator:
-    """Keeps the record, asks for estimates, and holds the latest.
+    """Keeps the record, requests estimates, and holds the latest.
 
     Parameters
     ----------
     desk : Retuner
         Answers with a `MotionEstimate`.
-    ship : RollShip
-        The configured ship.
     least_gm_m : float or None
         Limit of the stability booklet on the metacentric height.
 
     Attributes
     ----------
     trouble : str
-        Why no estimates come, as it was first known; empty while they do.
+        First known reason why no estimates come; empty while they do.
     """
 
     def __init__(
@@ -215,7 +211,7 @@ class Estimator:
         self._number = 0
         self._due_ns: int | None = None
         self._asked_ns: int | None = None
-        self._since_ns = 0  # the end of the latest estimate's record; before one, the start
+        self._since_ns = 0  # The end of the latest estimate's record, or the start.
         self._ship_ns: int | None = None
         self.trouble = ""
         self._news: list[str] = []
@@ -229,18 +225,18 @@ class Estimator:
         *,
         fresh: bool,
     ) -> MotionEstimate | None:
-        """Take a sample, every `SAMPLE_TIME_S`; return an estimate that has just come.
+        """Take a sample every `SAMPLE_TIME_S`; return a new estimate if there is one.
 
-        One that says OUTDATED, and nothing else, comes when the last one is.
+        When the last estimate has become outdated, one that says only OUTDATED is returned.
 
         Parameters
         ----------
         pressure_pa : float
-            Measured across the pump.
+            Measured pressure across the pump.
         motion : tuple of float
             Roll, roll rate and level.
         fresh : bool
-            Whether all of it is newly measured.
+            Whether all values are new measurements.
         """
         self._motion[:] = motion
         self._history.add(pressure_pa, self._motion, fresh=fresh)
@@ -263,12 +259,12 @@ class Estimator:
         return came
 
     def take_news(self) -> tuple[str, ...]:
-        """News for people since the last call."""
+        """Return the messages for people since the last call."""
         news, self._news = tuple(self._news), []
         return news
 
     def _look(self, asked_ns: int, now_ns: int) -> MotionEstimate | None:
-        """Look for the answer."""
+        """Check for the answer."""
         answer = self._desk.answer(self._number, now_ns)
         if answer is None:
             return None
@@ -295,7 +291,7 @@ class Estimator:
         return answer
 
     def _give_up(self, now_ns: int) -> MotionEstimate:
-        """Say that nothing is known any more of waves and ship."""
+        """Report that waves and ship are no longer known."""
         outdated = MotionEstimate(Verdict.OUTDATED, Verdict.OUTDATED)
         figures, silent_s = self.figures, (now_ns - self._since_ns) * 1e-9
         if not self.trouble:
@@ -320,7 +316,7 @@ class Estimator:
         figures.moment_deviation = estimate.rms_deviation
 
     def _fail(self, reason: str) -> None:
-        if not self.trouble:  # said once
+        if not self.trouble:  # The trouble is reported once.
             self.trouble = reason
             self._news.append(f"no estimates of sea and ship: {reason}")
 

@@ -8,13 +8,13 @@ from utank_hil.base.arrays import FloatArray
 class SampleHistory:
     """The latest `capacity` rows (command, outputs...), oldest first.
 
-    The buffer has twice the capacity, so that the latest rows are always contiguous. Every
-    `capacity` samples they are moved to its front.
+    The buffer has twice the capacity and is compacted every `capacity` samples, so that the latest
+    rows are always contiguous.
 
     Attributes
     ----------
     count : int
-        Samples taken so far.
+        Number of samples taken so far.
     """
 
     def __init__(self, capacity: int, outputs: int) -> None:
@@ -31,9 +31,9 @@ class SampleHistory:
         Parameters
         ----------
         command_pa : float
-            Mean command since the sample before.
+            Mean command since the previous sample.
         y : ndarray, shape (m,)
-            Outputs; the last ones if nothing was measured.
+            Outputs; held values if nothing was measured.
         fresh : bool
             Whether `y` is a new measurement.
         """
@@ -50,11 +50,11 @@ class SampleHistory:
         self.count += 1
 
     def latest(self, samples: int) -> FloatArray:
-        """The latest rows, at most `samples`; a view, valid until the next `add`."""
+        """Return at most `samples` latest rows as a view, valid until the next `add`."""
         return self._rows[max(0, self._end - min(samples, self.capacity)) : self._end]
 
     def record(self, samples: int) -> FloatArray:
-        """The latest rows, at most `samples`, with gaps as NaN; a copy."""
+        """Return a copy of at most `samples` latest rows, with gaps as NaN."""
         rows = self.latest(samples).copy()
         rows[~self._fresh[self._end - len(rows) : self._end], 1:] = np.nan
         return rows

@@ -2,7 +2,7 @@
 
     accepted   the last law that passed its trial; at first the configured one
     on trial   active in place of the accepted law, until it is kept or dropped
-    previous   the law accepted before: the operator's undo goes back to it
+    previous   the accepted law before this one: the operator's undo returns to it
     fading     the law that was active until the latest switch
 
 Every law of the bank is stepped and receives the applied command, so that its memory is up to date
@@ -22,20 +22,20 @@ from utank_hil.retuning.change_monitor import ChangeMonitor
 from utank_hil.retuning.estimate import MotionEstimate, ShipFigures
 
 FADE_SAMPLES: Final = 15
-"""Samples of a fade: 3 s at 0.2 s, a quarter of the first ship's roll period."""
+"""Length of a fade: 3 s at 0.2 s, a quarter of the first ship's roll period."""
 _NOTHING: Final = np.zeros(1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MonitoredLaw:
-    """A law's controller, with the monitor of whether the ship is still the law's.
+    """A law's controller, with a monitor of changes of its ship.
 
     Attributes
     ----------
     found : ModelSummary, ShipFigures or None
-        The identified ship that the law was designed for; None for that of the configuration.
+        The identified ship that the law was designed for; None for the configured ship.
     estimate : MotionEstimate or None
-        Of the waves that it was designed for; None if they were not estimated.
+        Estimate of the waves that it was designed for; None if they were not estimated.
     """
 
     controller: Controller
@@ -46,11 +46,6 @@ class MonitoredLaw:
 
 class LawBank:
     """The laws of one retuning controller.
-
-    Parameters
-    ----------
-    configured : MonitoredLaw
-        First accepted law.
 
     Attributes
     ----------

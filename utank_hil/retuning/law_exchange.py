@@ -1,4 +1,4 @@
-"""The exchange of a law for a better one while the loop runs: ask for it, try it, keep or drop it.
+"""Exchange of a law for a better one while the loop runs: request, trial, acceptance or return.
 
 `LawExchange` has the interface of every other controller; `update` advances its state machine
 between two steps. These are its states and all transitions:
@@ -48,11 +48,11 @@ EARLY_FACTOR: Final = 1.5
 TRIAL_PATIENCE: Final = 1.5
 """Times its length at which a trial without enough measurements is given up."""
 MOST_EVENTS: Final = 1000
-"""Events that are kept: two days of a retuning every three minutes."""
+"""Number of events kept: two days of one retuning every three minutes."""
 RETRY_NS: Final = 600_000_000_000
-"""Least time to the next exchange without an order after one that failed, or was undone."""
+"""Shortest time from a failed or undone exchange to the next one without an order."""
 BUSY_NS: Final = 30_000_000_000
-"""Time without a sign of life for which a retuner may be busy with an estimate."""
+"""Time without a heartbeat for which a retuner may be busy with an estimate."""
 
 _REQUESTED: Final = "ordered by the operator"
 _COMPARABLE: Final = (
@@ -68,14 +68,10 @@ class LawExchange(ABC):
 
     Parameters
     ----------
-    first : MonitoredLaw
-        First law.
     outputs, roll : int
         Number of outputs, and index of the roll among them.
-    retuner : Retuner
-        Designs.
     history_samples : int
-        Least length of the record that is kept of commands and outputs.
+        Smallest length of the record of commands and outputs.
 
     Attributes
     ----------
@@ -106,7 +102,7 @@ class LawExchange(ABC):
         self._warm_up: WarmUp | None = None
         trial = round(settings.trial_s / self.sample_time_s)
         self._least_samples = min(trial, round(EARLIEST_VERDICT_S / self.sample_time_s))
-        # the accepted law, engaged without interruption and without pulses; and the law on trial
+        # The accepted law is recorded while engaged and without pulses.
         self._accepted_window, self._trial_window = MovingWindow(trial), MovingWindow(trial)
         self._baseline: WindowStatistics = self._accepted_window.statistics
         self._heel_rad = 0.0
@@ -122,7 +118,7 @@ class LawExchange(ABC):
     @property
     @abstractmethod
     def excused(self) -> bool:
-        """Whether the roll says nothing of the law: it is caused on purpose, or the pump rests."""
+        """Whether the roll is caused by pulses or a resting pump, not by the law."""
 
     @abstractmethod
     def note(self, estimate: MotionEstimate) -> None:
@@ -130,7 +126,7 @@ class LawExchange(ABC):
 
     @abstractmethod
     def _automatic_reason(self) -> str:
-        """Reason to begin without a request; empty if there is none."""
+        """Return the reason to begin without a request; empty if there is none."""
 
     @abstractmethod
     def _begin(self, reason: str) -> None:
@@ -138,11 +134,11 @@ class LawExchange(ABC):
 
     @abstractmethod
     def _admit(self, answer: Answer) -> WarmUp | str:
-        """Warm-up of the answer's law, or the reason why it is not admitted."""
+        """Return the warm-up of the answer's law, or the reason why it is not admitted."""
 
     @abstractmethod
     def _on_trial(self) -> str:
-        """What the law on trial was made for, in words."""
+        """Describe in words what the law on trial was designed for."""
 
     def update(
         self,
@@ -162,7 +158,7 @@ class LawExchange(ABC):
         fresh : bool
             Whether the outputs for `step` are new measurements, not held values.
         passive_roll_rad : float
-            What the ship would roll now with the tank passive; not finite if that is not known.
+            Present roll of the ship if its tank were passive; not finite if unknown.
         """
         self._now_ns, self._engaged, self._fresh = now_ns, engaged, fresh
         self._passive_roll_rad = passive_roll_rad
@@ -310,14 +306,14 @@ class LawExchange(ABC):
             self._accept()
 
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:  # noqa: ARG002
-        """Statistics that a law on trial, with these, is compared with."""
+        """Return the statistics that a law on trial is compared with."""
         return self._baseline
 
     def _accept(self) -> None:
         self._finish(RetuningState.RETUNED)
 
     def _undo(self) -> None:
-        """Go back to the law before, and end whatever is under way."""
+        """Return to the previous law and end any exchange."""
         reason = "undone by the operator"
         if self.state is not _TRIAL:
             if self.laws.previous is None:
@@ -331,7 +327,7 @@ class LawExchange(ABC):
         self._finish(RetuningState.IDLE, reason)
 
     def _abort(self, reason: str) -> None:
-        """End without a new law, for a reason that says nothing of the law."""
+        """End without a new law, for a reason unrelated to the law."""
         self._finish(RetuningState.REFUSED, reason)
 
     def _refuse(self, reasons: tuple[str, ...]) -> None:
@@ -339,7 +335,7 @@ class LawExchange(ABC):
         self._finish(RetuningState.REFUSED, *reasons)
 
     def _finish(self, state: RetuningState, *reasons: str) -> None:
-        """Enter a state at rest, with the accepted law."""
+        """Enter a state at rest with the accepted law."""
         if self.laws.on_trial is not None:
             self.laws.drop()
         self._warm_up = None
@@ -352,7 +348,7 @@ class LawExchange(ABC):
 
     @property
     def _found(self) -> ModelSummary | None:
-        """The identified ship that goes with the present state, if one does."""
+        """Return the identified ship of the present state, if any."""
         return None
 
     def _log_event(self, reasons: tuple[str, ...], found: ModelSummary | None = None) -> None:

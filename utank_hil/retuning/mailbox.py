@@ -1,9 +1,9 @@
 """A mailbox for one message in shared memory; neither end ever waits.
 
 Layout, in 8-byte words: number of the message, its length in bytes, its CRC-32, the writer's
-heartbeat; then the payload. The writer stores the number last. A reader polls for the number that
-it expects and accepts the payload if its CRC-32, started from the number, is right. So a message
-that is half written or damaged is not read.
+heartbeat; then the payload. The writer stores the number last. A reader polls for the expected
+number and accepts the payload if its CRC-32, started from the number, is right. A message that is
+half written or damaged is therefore not read.
 """
 
 import multiprocessing
@@ -11,28 +11,20 @@ from ctypes import c_char
 from typing import Final
 from zlib import crc32
 
-_HEADER_WORDS: Final = 4  # number, length, check sum, heartbeat
+_HEADER_WORDS: Final = 4  # The words are number, length, checksum and heartbeat.
 
 
 class Mailbox:
     """Both ends of the mailbox; may be an argument of a spawned process.
 
-    Parameters
-    ----------
-    capacity : int
-        Bytes of the longest message, 1 or more.
-
-    Raises
-    ------
-    ValueError
-        If the capacity is below one byte.
+    The capacity is in bytes; a ValueError is raised if it is below one.
     """
 
     def __init__(self, capacity: int) -> None:
         if capacity < 1:
             raise ValueError(f"a mailbox needs a capacity of a byte or more, got {capacity}")
         size = 8 * _HEADER_WORDS + capacity + -capacity % 8
-        # an anonymous mapping: freed with the last process that holds it, even a killed one
+        # An anonymous mapping is freed with the last process that holds it, even a killed one.
         self._memory = multiprocessing.get_context("spawn").RawArray(c_char, size)
         self.__setstate__(self._memory)
 
@@ -52,7 +44,7 @@ class Mailbox:
 
     @property
     def beat_ns(self) -> int:
-        """Time of the writer's latest heartbeat in ns, 0 before the first."""
+        """Time of the writer's latest heartbeat in ns; 0 before the first."""
         return self._words[3]
 
     def beat(self, now_ns: int) -> None:
@@ -62,15 +54,8 @@ class Mailbox:
     def post(self, number: int, data: bytes) -> None:
         """Replace the message.
 
-        Parameters
-        ----------
-        number : int
-            Different from the last message's, and not 0.
-
-        Raises
-        ------
-        ValueError
-            If the message is longer than the capacity.
+        `number` differs from the last message's and from 0. A message longer than the capacity
+        raises a ValueError.
         """
         if len(data) > len(self._bytes):
             raise ValueError(f"{len(data)} bytes are too long for a mailbox of {len(self._bytes)}")
@@ -80,7 +65,7 @@ class Mailbox:
         self._words[0] = number
 
     def read(self, number: int) -> bytes | None:
-        """Message of this number; None if it is absent, incomplete or damaged."""
+        """Return the message of this number; None if it is absent, incomplete or damaged."""
         words = self._words
         if words[0] != number or not 0 <= words[1] <= len(self._bytes):
             return None

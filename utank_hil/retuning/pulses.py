@@ -8,22 +8,13 @@ from utank_hil.retuning.settings import RetuningSettings
 
 
 def make_pulses(settings: RetuningSettings, plant: DesignPlant, sample_time_s: float) -> FloatArray:
-    """Excitation of the chosen kind, within the limits of pressure, rate, roll and level.
+    """Return the excitation pressure in Pa, shape (N,), within all limits of pump, roll and level.
 
     Roll and level are predicted for the pulses alone, in still water on the given plant. In service
-    the limiter applies the level limit to the sum of waves, law and pulses.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        Pressure in Pa.
-
-    Raises
-    ------
-    ValueError
-        If the signal does not fit the sample time, such as a band beyond its Nyquist frequency.
+    the limiter applies the level limit to the sum of waves, law and pulses. A ValueError is raised
+    if the signal does not fit the sample time, such as a band beyond its Nyquist frequency.
     """
-    # imports scipy.optimize: slow, and needed with retuning only
+    # scipy.optimize is slow to import and needed with retuning only
     from utank_hil.identification import chirp, multisine, prbs, random_pulses, response_scale
 
     limits = plant.limits

@@ -1,7 +1,7 @@
-"""Least record length for an ARX model, and least model order for a ship.
+"""Smallest record length for an ARX model, and smallest model order for a ship.
 
-The configuration and the retuner use the same checks, so that a record that would be refused is
-never taken. Imports little, because the configuration needs it at every start of a controller.
+Configuration and retuner use the same checks, so no record is taken that would be refused. The
+configuration needs this at every start of a controller, so it imports little.
 """
 
 import math
@@ -10,19 +10,19 @@ from typing import Final
 from utank_hil.base.parameters import Problem
 
 VALIDATION_SHARE: Final = 0.2
-"""Share of the record, at its end, for the validation of the model."""
+"""Share of the record, at its end, that validates the model."""
 LEAST_PREDICTIONS: Final = 100
-"""Least number of predictions on validation data."""
+"""Smallest number of predictions on validation data. Chosen; no study."""
 LAGS: Final = 25
 """Largest lag of the whiteness test, in samples."""
 
-_OFFSET_AND_WAVE: Final = 3  # disturbance functions fitted with the model
+_OFFSET_AND_WAVE: Final = 3  # These are the disturbance functions that are fitted with the model.
 
 
 def record_problems(
     order: int, samples: int, outputs: int, sample_time_s: float, shortest_period_s: float
 ) -> list[Problem]:
-    """Problems of a record's length and the model's order, known before any measurement.
+    """Return problems of a record's length and the model's order, known before any measurement.
 
     Parameters
     ----------
@@ -30,8 +30,6 @@ def record_problems(
         Order of the ARX model.
     samples : int
         Length of the record.
-    outputs : int
-        Number of measured outputs.
     shortest_period_s : float
         Shortest roll period of the stability booklet.
 
@@ -42,7 +40,7 @@ def record_problems(
     """
     problems = []
     if order * sample_time_s < shortest_period_s:
-        # such a model is fitted to the waves, with small stated errors
+        # Such a model is fitted to the waves, with small stated errors.
         problems.append(
             (
                 "order",
@@ -64,19 +62,19 @@ def record_problems(
 
 
 def least_samples(order: int, outputs: int) -> int:
-    """Least number of samples of a record, for estimation and validation of a model."""
-    skipped = max(order, LAGS)  # samples without a prediction, at the start of each part
+    """Return the smallest record, in samples, for estimation and validation of a model."""
+    skipped = max(order, LAGS)  # These samples at the start of each part have no prediction.
     columns = (order + 1) * (outputs + 1) - outputs + _OFFSET_AND_WAVE
     judged = (LEAST_PREDICTIONS + skipped) / VALIDATION_SHARE
     fitted = (order + columns + 1) / (1 - VALIDATION_SHARE)
     least = math.floor(max(judged, fitted)) - 2
-    while not _enough(least, order, skipped, columns):  # the parts are whole samples
+    while not _enough(least, order, skipped, columns):  # The parts are whole samples.
         least += 1
     return least
 
 
 def estimation_samples(samples: int) -> int:
-    """Number of samples for the estimation of the model; the rest is for its validation."""
+    """Return the number of samples that estimate the model; the rest validates it."""
     return round((1 - VALIDATION_SHARE) * samples)
 
 

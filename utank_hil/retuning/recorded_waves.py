@@ -2,8 +2,8 @@
 
 The pump's part of the outputs is computed with the ship's model and subtracted; the rest is due to
 the waves. The loop is then closed on model and waves, with the limiter between law and pump, which
-decides more than the law in a storm. The limiter's level is computed from the roll with the tank's
-equation of motion, whether the level was measured or not.
+in a storm has more influence than the law. The limiter's level is always computed from the roll,
+with the tank's equation of motion.
 """
 
 import math
@@ -23,22 +23,12 @@ from utank_hil.dynamics.tank import Tank
 SUBSTEPS: Final = 10
 """Limiter steps in a sample time of the law: the level barrier acts between samples as well."""
 _WATER: Final = [STATES.index("level_m"), STATES.index("level_rate_m_s")]
-_SETTLING_S: Final = 60.0  # transient of the start at rest; left out of the RMS
-_HIGHEST_RAD_S: Final = 2.5  # above: no waves, and differentiation amplifies noise
+_SETTLING_S: Final = 60.0  # The transient of the start at rest is left out of the RMS.
+_HIGHEST_RAD_S: Final = 2.5  # Above this there are no waves, and differentiation amplifies noise.
 
 
 class RmsResponse(NamedTuple):
-    """Root mean squares over the record.
-
-    Attributes
-    ----------
-    passive_roll_rad : float
-        Roll with the pump at zero pressure.
-    roll_rad : float
-        Roll with the law.
-    pressure_pa : float
-        Pressure of the law, after the limiter.
-    """
+    """Root mean squares of passive roll, roll with the law, and the law's limited pressure."""
 
     passive_roll_rad: float
     roll_rad: float
@@ -56,8 +46,6 @@ class RecordedWaves:
         Ship, tank, loop and limits at the time of the record.
     measured : tuple of str
         Names of the outputs, ``roll_rad`` among them.
-    sample_time_s : float
-        Sample time of the record.
     """
 
     def __init__(
@@ -74,7 +62,7 @@ class RecordedWaves:
         slow = plant.sampled(STATES, sample_time_s)
         pump_response = _response(slow, np.nan_to_num(record[:, 0]))[:, self._measured]
         waves = record[:, 1:] - pump_response
-        # gaps hold the last value
+        # Gaps hold the last value.
         here = np.isfinite(waves).all(axis=1)
         last = np.maximum.accumulate(np.where(here, np.arange(len(waves)), 0))
         waves = np.nan_to_num(waves[last])
@@ -84,13 +72,7 @@ class RecordedWaves:
         self._first = min(round(_SETTLING_S / sample_time_s), len(record) // 2)
 
     def simulate(self, law: LinearLaw) -> RmsResponse:
-        """Simulate the closed loop of a law in the waves.
-
-        Parameters
-        ----------
-        law : LinearLaw
-            For the record's outputs at its sample time, with one command.
-        """
+        """Simulate the closed loop of a law for the record's outputs and sample time."""
         plant, controller = self._plant, law.controller()
         limiter = CommandLimiter(self._limits, self._tank, plant.dt)
         state = np.zeros(len(plant.A))
@@ -123,8 +105,8 @@ def tank_motion(
 ) -> FloatArray:
     """Level (m) and level rate (m/s) of the passive tank for a given roll, shape (N substeps, 2).
 
-    The level's equation of the linear model, solved in the frequency domain: the steady-state
-    response, without the transient. Between samples it is the band-limited interpolation.
+    The linear model's level equation is solved in the frequency domain: the steady-state response,
+    without transient, band-limited between samples.
     """
     mass, damping, stiffness = coupled_matrices(ship, tank)
     s = 2j * np.pi * np.fft.rfftfreq(len(roll_rad), sample_time_s)

@@ -1,8 +1,8 @@
-"""From a record to a law for the present ship, or to the reasons why there is none.
+"""Design of a law for the present ship from a record, or the reasons why there is none.
 
-The retuner's whole computation. It identifies on the first part of the record and validates the
-model on the rest and against physical limits. It then designs a law and checks its margins on the
-identified ship, its robustness to deviations, and its performance in the recorded waves.
+The first part of the record identifies the model; the rest and physical limits validate it. The
+law designed then has its margins checked on the identified ship, its robustness to deviations, and
+its performance in the recorded waves.
 """
 
 import dataclasses
@@ -41,16 +41,17 @@ from utank_hil.retuning.record_length import (
 from utank_hil.retuning.recorded_waves import RecordedWaves, RmsResponse
 
 MOST_MISSING = 0.2
-"""Largest share of missing samples."""
+"""Largest share of missing samples. Chosen; no study."""
 LEAST_MOTION = (10.0, 1e-6)
-"""Least peak-to-peak value of the command in Pa, and of each output in its unit."""
+"""Smallest peak-to-peak value of the command in Pa, and of each output in its unit."""
 OFFSET = 0
-"""Degree of the polynomial disturbance: takes up a steady heel and the bias of a sensor."""
+"""Degree of the polynomial disturbance: it models a steady heel and a sensor's bias."""
 LARGEST = 1e9
-"""Bound on commands and outputs in SI units; larger values mean a wrong unit."""
+"""Largest command and output in SI units; larger values mean a wrong unit."""
 LEAST_GAIN = 0.05
-"""Least relative reduction of the roll against the configured law: less is within the error of the
-simulation in the recorded waves."""
+"""Smallest relative reduction of the roll against the configured law; less is within the error of
+the simulation in the recorded waves.
+"""
 ROLL_PART = 1.02
 """Largest roll in the recorded waves, relative to the passive tank's."""
 EFFORT_PART = 0.9
@@ -59,18 +60,18 @@ EFFORT_PART = 0.9
 
 @dataclass(frozen=True, slots=True)
 class RetuningTask:
-    """What the retuner needs besides the record.
+    """Inputs of the retuner besides the record.
 
     Attributes
     ----------
     design : PredictiveDesign
         Design method of the laws.
     plant : DesignPlant
-        The configured plant: start of the fit.
+        The configured plant, where the fit starts.
     order : int
         Order of the ARX model.
     least_gain : float or None
-        Least relative reduction of the roll against the configured law; None: not compared.
+        Smallest relative reduction of the roll against the configured law; None: not compared.
     """
 
     design: PredictiveDesign
@@ -89,7 +90,7 @@ class Identification:
     wave_frequencies_rad_s : tuple of float
         Frequencies of regular waves; empty in an irregular sea.
     validation : Validation
-        On the second part of the record.
+        Validation on the second part of the record.
     """
 
     okid: OkidResult
@@ -108,7 +109,7 @@ def retune(record: FloatArray, task: RetuningTask) -> Candidate | Refusal:
     Parameters
     ----------
     record : ndarray, shape (N, 1 + m)
-        Mean command since the last sample, and the measured outputs of `task.design`, at its
+        Mean command since the previous sample, and the measured outputs of `task.design`, at its
         sample time. Outputs that are not finite are gaps.
 
     Returns
@@ -131,7 +132,7 @@ def judge(record: FloatArray, found: Identification, task: RetuningTask) -> Cand
         return Refusal(objections)
     try:
         return _design_and_check(record, found, task)
-    except ValueError as error:  # the design fails for this ship; LinAlgError is one too
+    except ValueError as error:  # The design fails for this ship; LinAlgError is a ValueError too.
         return Refusal((str(error),))
 
 
@@ -167,7 +168,7 @@ def identify(record: FloatArray, task: RetuningTask) -> Identification:
     _refuse_unusable(record[:split])
     _refuse_unusable(record[split:])
     stretches = [stop - start for start, stop in segment_bounds(record[split:])]
-    skipped = max(task.order, LAGS)  # without a prediction, at the start and after every gap
+    skipped = max(task.order, LAGS)  # no prediction at the start and after gaps
     predictions = sum(max(0, length - skipped) for length in stretches)
     if predictions < LEAST_PREDICTIONS:
         raise IdentificationError(
@@ -211,7 +212,7 @@ def _refuse_unusable(part: FloatArray) -> None:
 def _design_and_check(
     record: FloatArray, found: Identification, task: RetuningTask
 ) -> Candidate | Refusal:
-    """A law for the identified ship, if it passes every check."""
+    """Return a law for the identified ship, if it passes every check."""
     plant = found.plant(task)
     design, measured = task.design, task.design.predictor.measured
     law = design.law(plant)
@@ -258,7 +259,7 @@ def _performance_objections(
 
 
 def _split_washout(law: LinearLaw) -> tuple[PredictiveLaw, float]:
-    """The predictive law and the corner frequency of its washout, 0 for none."""
+    """Return the predictive law and the corner frequency of its washout, 0 for none."""
     if isinstance(law, WashoutLaw) and isinstance(law.law, PredictiveLaw):
         return law.law, law.corner_rad_s
     assert isinstance(law, PredictiveLaw)

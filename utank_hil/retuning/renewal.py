@@ -1,4 +1,4 @@
-"""From an estimate of waves and ship to a constrained law: the retuner's work for a renewal."""
+"""Design of a constrained law from an estimate of waves and ship, in the retuner's process."""
 
 import dataclasses
 import math
@@ -16,21 +16,21 @@ from utank_hil.retuning.renewed_law import RenewedLaw
 from utank_hil.sea import SlopeSpectrum
 
 TAIL_SHARE: Final = 0.15
-"""Share of the bands, at the upper end, that the tail is taken from."""
+"""Share of the bands, at the upper end, from which the tail is computed. Chosen; no study."""
 ROLL_PART: Final = 1.0
 """Largest predicted roll, relative to the passive tank's."""
 
 
 @dataclass(frozen=True, slots=True)
 class RenewalTask:
-    """What the retuner needs besides the estimate.
+    """Inputs of the retuner besides the estimate.
 
     Attributes
     ----------
     plant : DesignPlant
         The configured ship and tank.
     sample_time_s : float
-        Of the law in charge, and of the one that takes its place.
+        Sample time of the present and of the new law.
     mean_power_w : float
         Budget of the predicted power.
     """
@@ -41,10 +41,10 @@ class RenewalTask:
 
 
 class TailedSpectrum:
-    """A slope spectrum that goes on beyond its last band as wind waves do.
+    """A slope spectrum with the tail of wind waves above its last band.
 
-    There the elevation's density falls with the fifth power of the frequency (Phillips), so that
-    of the slope with the first.
+    The elevation's density falls with the fifth power of the frequency there (Phillips), so the
+    slope's with the first.
     """
 
     def __init__(self, waves: SlopeSpectrum) -> None:
@@ -71,7 +71,7 @@ def renew(estimate: MotionEstimate, task: RenewalTask) -> RenewedLaw | Refusal:
             mean_power_w=task.mean_power_w,
             sample_time_s=task.sample_time_s,
         )
-    except ValueError as error:  # NoLawError and LinAlgError are such
+    except ValueError as error:  # NoLawError and LinAlgError are ValueErrors.
         return Refusal((str(error),))
     predicted = tuned.prediction
     if not predicted.roll_rad <= ROLL_PART * tuned.passive_roll_rad:

@@ -1,8 +1,8 @@
 """A constrained law as the answer of the retuner's process, and as a message.
 
-The message holds what the law is condensed from: model, predictor, knots, weights and what the
-motion after the horizon costs. The predictions over the horizon follow from them (`condense`), bit
-for bit, in less time than it takes to hand them over.
+The message holds what the law is condensed from: model, predictor, knots, weights and the cost of
+the motion after the horizon. The predictions over the horizon follow by `condense`, bit for bit,
+in less time than their transfer takes.
 """
 
 import math
@@ -23,28 +23,28 @@ from utank_hil.retuning.wire import refuse_shapes, refuse_sizes
 MOST_STATES: Final = 64
 MOST_KNOTS: Final = 40
 MOST_SAMPLES: Final = 150
-"""Greatest sizes of a law: it is condensed in a few milliseconds. A shipped one has 58 states, 19
-knots and 60 samples.
+"""Largest sizes of a law, condensed in milliseconds. A shipped one has 58 states, 19 knots, 60
+samples.
 """
 _MOST_OUTPUTS: Final = len(STATES)
-_MOST_ITERATIONS: Final = 200  # three times the budget of the shipped laws
+_MOST_ITERATIONS: Final = 200  # This is three times the budget of the shipped laws.
 
 MOST_NUMBERS: Final = (
     3 * MOST_STATES**2 + MOST_STATES * (3 + 2 * _MOST_OUTPUTS) + 2 * _MOST_OUTPUTS + MOST_KNOTS
 )
-"""Numbers in the arrays of a message."""
+"""Most numbers in the arrays of a message."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenewedLaw:
-    """A constrained law for the waves and the ship that were estimated, with all margins.
+    """A constrained law for the estimated waves and ship, with all margins.
 
     Attributes
     ----------
     roll_rad, pressure_pa : float
-        Root mean squares that are predicted in these waves, without limits.
+        Root mean squares predicted in these waves, without limits.
     passive_roll_rad : float
-        The predicted root mean square of the roll with the passive tank.
+        Predicted root mean square of the roll with the passive tank.
     """
 
     law: ConstrainedLaw
@@ -56,7 +56,7 @@ class RenewedLaw:
 class RenewedLawMessage(
     msgspec.Struct, frozen=True, eq=False, tag="renewed", forbid_unknown_fields=True
 ):
-    """What a `RenewedLaw` is made from; names and shapes as in `ConstrainedLaw` and `condense`."""
+    """Message of a `RenewedLaw`; names and shapes as in `ConstrainedLaw` and `condense`."""
 
     model: LinearModel
     observer_gain: FloatArray
@@ -80,7 +80,7 @@ class RenewedLawMessage(
 
     @classmethod
     def of(cls, renewed: RenewedLaw) -> "RenewedLawMessage":
-        """The message of a law."""
+        """Return the message of a law."""
         law, horizon = renewed.law, renewed.law.horizon
         return cls(
             model=law.model,
@@ -106,13 +106,7 @@ class RenewedLawMessage(
 
     @property
     def answer(self) -> RenewedLaw:
-        """The law.
-
-        Raises
-        ------
-        ValueError
-            If the parts do not fit together, or the law is not finite.
-        """
+        """Return the law; raises ValueError if its parts do not fit together or are not finite."""
         a, b, c, d, sample_time_s = self.model
         n, m, rest = len(a), len(c), len(self.terminal)
         refuse_sizes(

@@ -1,12 +1,12 @@
-"""A self-tuned law that is renewed under way: for the waves and the ship that the motion shows.
+"""A self-tuned law that is renewed under way for the waves and the ship estimated from the motion.
 
-`LawExchange` has the states. Nothing is stimulated: what the retuner is asked with is the latest
-estimate (`Estimator`). It is asked when the waves, or the ship, differ from those that the law in
-charge was designed for.
+`LawExchange` has the states. The ship is not excited: a request holds the latest estimate
+(`Estimator`). It is made when waves or ship differ from those that the present law was designed
+for.
 
-A law may be wrong for waves that are not known yet. When the ship rolls more with it than it would
-with the pump at rest, the pump rests until another law is tried, or for `RETRY_NS`. This is before
-the monitor of the same comparison ends active control (ROLL_AMPLIFIED).
+A law may be wrong for waves that are not known yet. If the ship rolls more than it would with the
+pump at rest, the pump rests until another law is tried, or for `RETRY_NS`. This precedes the
+monitor that ends active control by the same comparison (ROLL_AMPLIFIED).
 """
 
 import dataclasses
@@ -33,31 +33,32 @@ from utank_hil.retuning.trial import NOISE_FLOOR, MovingWindow, WindowStatistics
 from utank_hil.sea import SlopeSpectrum
 
 SEA_DIFFERENCE: Final = 0.2
-"""`sea_difference` from which a law is renewed: as of waves a fifth higher."""
+"""Smallest `sea_difference` for which a law is renewed: that of waves a fifth higher."""
 SHIP_DIFFERENCE: Final = 1.05
-"""Factor in roll period, or in the root of the stiffness, from which a law is renewed."""
+"""Smallest factor in roll period, or in the root of the stiffness, for which a law is renewed."""
 LONGER: Final = 1.3
-"""Factor in length of the record from which a law is renewed for the same waves, better known."""
+"""Factor in length of the record from which a law is renewed for the same, better known waves."""
 TRIAL: Final = TrialSettings(
     trial_s=180.0, roll_factor=1.25, effort_factor=1.5, answer_within_s=300.0
 )
 LOSING: Final = 1.2
-"""Roll over the passive ship's at which a law has lost and the pump rests."""
+"""Ratio to the passive ship's roll at which a law has lost and the pump rests."""
 LOSING_PERIODS: Final = 4.0
-"""Roll periods that this is judged by: half as many condemned sound laws by their first waves."""
+"""Length of this comparison in roll periods: half as many condemned sound laws by their first
+waves."""
 RECORD_PERIODS: Final = 12.0
-"""Roll periods over which the ship must have rolled more than the passive one, too. In the lull
+"""Roll periods over which the ship must also have rolled more than the passive one. In the lull
 after a group of waves, a law that halves the roll lost by 1.23 over four periods.
 """
 LEAST_SHARE: Final = 1e-3
-"""Of the pump's limits: a law for less does nothing, and its arithmetic fails at numbers near 0."""
+"""Smallest limits of a law relative to the pump's: below, it does nothing and is ill-conditioned.
+"""
 LEAST_ROLL_RAD: Final = math.radians(0.25)
-"""Root mean square of the roll below which nothing is judged."""
+"""Root mean square of the roll below which laws are not compared. Chosen; no study."""
 AWAY: Final = 5.0
-"""Times the roll before, or the passive ship's if that is more, at which a trial ends at once.
-
-A law that is unstable on the ship doubles the roll in a second or two. A great heel that comes on
-trial ends it, too; the law is tried again later.
+"""Ratio to the roll before, or the passive ship's if larger, at which a trial ends at once. A law
+that is unstable on the ship doubles the roll in a second or two. A sudden large heel ends a trial
+too; the law is tried again later.
 """
 _AT_REST_AFTER: Final = (RetuningState.REFUSED, RetuningState.UNDONE)
 
@@ -68,24 +69,22 @@ class RenewingController(LawExchange):
     Parameters
     ----------
     law : ConstrainedLaw
-        First law, for a sea that is not known.
+        First law, for an unknown sea.
     controller : Controller
-        Of that law, at rest.
+        Controller of `law`, at rest.
     ship : ShipFigures
         The configured ship.
     roll : int
         Index of the roll among the outputs.
     limits : PumpLimits
-        That no law may exceed.
-    retuner : Retuner
-        Designs.
+        Limits that no law may exceed.
 
     Attributes
     ----------
     renewed : RenewedLaw or None
         Latest admitted law.
     fallbacks : int
-        As of `Plans`, of whichever law was in charge.
+        Fallbacks (`Plans`) of all laws together.
     """
 
     def __init__(
@@ -114,7 +113,7 @@ class RenewingController(LawExchange):
         self.fallbacks = 0
 
     def allow(self, share: float) -> None:
-        """As of `Plans`: every law of the bank, as each may be in charge next."""
+        """Set the share of every law of the bank (`Plans`), as each may become active next."""
         for law in self.laws.stepped:
             if isinstance(law.controller, ConstrainedController):
                 law.controller.allow(share)
@@ -142,7 +141,7 @@ class RenewingController(LawExchange):
         if (
             self._lately.full
             and now.roll_rad > max(LEAST_ROLL_RAD, LOSING * now.passive_roll_rad)
-            and now.passive_roll_rad > 0  # it is known
+            and now.passive_roll_rad > 0  # The passive roll is known.
             and record.roll_rad > record.passive_roll_rad
         ):
             self._rests_until_ns = self._now_ns + RETRY_NS
@@ -174,13 +173,13 @@ class RenewingController(LawExchange):
         for law in self.laws.stepped:
             law.monitor.watch(estimate)
         if estimate.waves is None or estimate.ship is None:
-            self._latest, self._due = None, ""  # no law is made for waves that have passed
+            self._latest, self._due = None, ""  # No law is designed for waves that have passed.
             return
         if estimate.of_ship is Verdict.GOOD:
             now, before, self._seen = estimate.ship, self._seen, estimate.ship
             known = [ship for ship in (self._ship, before) if ship is not None]
             if all(ship_factor(now, ship) > SHIP_DIFFERENCE for ship in known):
-                # no law is made for another ship, nor for waves seen with it, until seen twice
+                # A law for another ship, or for waves seen with it, needs two estimates.
                 self._latest, self._due = None, ""
                 return
             self._ship = now
@@ -242,10 +241,10 @@ class RenewingController(LawExchange):
         super()._check_trial()
 
     def _to_compare_with(self, tried: WindowStatistics) -> WindowStatistics:
-        """What the law before would have had in the waves of the trial.
+        """Return what the previous law would have had in the waves of the trial.
 
-        Its roll follows that of the passive ship, and is never taken as more than that. The
-        pressure may be what is predicted of the new law.
+        Its roll is scaled with that of the passive ship and limited to it. The pressure may be the
+        one predicted for the new law.
         """
         before, renewed = self._baseline, self.renewed
         assert renewed is not None
@@ -276,7 +275,7 @@ class RenewingController(LawExchange):
         self._finish(RetuningState.RETUNED, self._on_trial())
 
     def _undo(self) -> None:
-        self._rests_until_ns = 0  # the law that lost is gone
+        self._rests_until_ns = 0  # The law that lost is gone.
         self._forget()
         super()._undo()
 
@@ -287,7 +286,7 @@ class RenewingController(LawExchange):
 
 
 def _reason(now: MotionEstimate, law: MonitoredLaw) -> str:
-    """Why a law should be renewed, in words; empty if it should not."""
+    """Return why a law should be renewed, in words; empty if it should not."""
     if law.monitor.change > SHIP_DIFFERENCE:
         return f"the ship has changed by a factor of {law.monitor.change:.2f}"
     then = law.estimate
@@ -302,9 +301,9 @@ def _reason(now: MotionEstimate, law: MonitoredLaw) -> str:
 
 
 def sea_difference(now: SlopeSpectrum, then: SlopeSpectrum) -> float:
-    """How far two seas are apart: 0 for the same, 0.2 for waves a fifth higher.
+    """Return the root mean square difference of amplitudes, relative to the amplitudes `then`.
 
-    The root mean square of the difference of amplitudes over that of the amplitudes then.
+    It is 0 for equal seas and 0.2 for waves a fifth higher.
     """
     before = then.slope_density(now.omega_rad_s)
     apart = float(np.sum((np.sqrt(now.density) - np.sqrt(before)) ** 2))

@@ -11,20 +11,13 @@ Request = FloatArray | EstimateRequest | MotionEstimate
 """A record, shape (N, 1 + m), rows (command, outputs...); or the input of estimate or renewal."""
 
 RetuneFunction = Callable[[Any], Answer]
-"""From a request to an answer."""
+"""Function from a request to an answer."""
 
 
 class Work(NamedTuple):
-    """One kind of work of the retuner's process.
+    """One kind of work of the retuner's process: a function and the type of its requests.
 
-    Attributes
-    ----------
-    compute : callable
-        From a request to an answer.
-    request : type
-        Of the requests.
-    most_numbers : int
-        Numbers in the arrays of the longest request.
+    `most_numbers` is the number of array elements of the longest request.
     """
 
     compute: RetuneFunction
@@ -33,32 +26,21 @@ class Work(NamedTuple):
 
 
 class Retuner(Protocol):
-    """Takes requests and gives answers, some time later or never; the loop is not kept waiting."""
+    """Takes requests and answers them some time later or never, without delaying the loop."""
 
     @property
     def alive(self) -> bool:
         """Whether a request would be answered."""
 
     def submit(self, number: int, request: Request, now_ns: int) -> None:
-        """Ask for an answer, under a new number."""
+        """Request an answer under a new number."""
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        """The answer to request `number`, None while there is none."""
+        """Return the answer to request `number`, None while there is none."""
 
 
 class SimulatedRetuner:
-    """Computes the answer at once and delivers it after a fixed latency: runs are reproducible.
-
-    Parameters
-    ----------
-    latency_s : float
-        Simulated time from request to answer.
-
-    Attributes
-    ----------
-    alive : bool
-        Always True.
-    """
+    """Computes answers at once and delivers them after a fixed latency: runs are reproducible."""
 
     alive = True
 
@@ -75,7 +57,7 @@ class SimulatedRetuner:
         self._number, self._ready_ns = number, now_ns + self._latency_ns
 
     def answer(self, number: int, now_ns: int) -> Answer | None:
-        """The answer, once the latency is over."""
+        """Return the answer once the latency is over."""
         if number != self._number or now_ns < self._ready_ns:
             return None
         return read_answer(self._answer)

@@ -4,7 +4,7 @@ The controller's loop writes one mailbox and polls one number of the other. Ther
 connection, so the loop never waits. If the retuner hangs, dies or writes garbage, the number never
 arrives or the message is refused, and the controller keeps its law. There are two processes:
 
-    watchdog   started before the loop; forks the worker, again whenever it has died or hangs
+    watchdog   started before the loop; forks the worker again whenever it has died or hangs
     worker     stores heartbeats while idle, and answers the requests of every desk
 
 A request is made only while the worker's heartbeat is recent.
@@ -24,27 +24,27 @@ from utank_hil.retuning.retuner import Work
 from utank_hil.retuning.worker import run_watchdog
 
 _START_S: Final = 30.0  # scipy has to be imported, on a busy machine
-_HANGS_S: Final = 600.0  # the longest `answer_within_s`: no answer is awaited after it
-_END_S: Final = 2.0  # of waiting for a killed process
+_HANGS_S: Final = 600.0  # This is the longest `answer_within_s`; later answers are not used.
+_END_S: Final = 2.0  # This is the wait for a killed process.
 
 
 class RetunerProcess(Closing):
-    """One desk for each kind of work, served in a process of its own; start it before the loop.
+    """One desk for each kind of work, served by a separate process; start it before the loop.
 
-    It is ready when the constructor returns. If it does not start within half a minute, the
-    constructor returns as well; no desk is alive then and nothing is asked.
+    The constructor returns when the process is ready, or after half a minute; then no desk is alive
+    and nothing is requested.
 
     Parameters
     ----------
     *works : Work
-        Importable in another process (functions, or `functools.partial` of them).
+        Work importable in another process (functions, or `functools.partial` of them).
     hangs_after_s : float
-        A worker that is busy for longer is killed and replaced.
+        Time after which a busy worker is killed and replaced.
 
     Attributes
     ----------
     desks : tuple of Desk
-        In the order of `works`.
+        Desks in the order of `works`.
     pid : int
         Process id of the watchdog, and id of the process group of both.
     """
@@ -73,7 +73,7 @@ class RetunerProcess(Closing):
         if self._closed:
             return
         self._closed = True
-        with suppress(ProcessLookupError):  # no group yet, or no process left
+        with suppress(ProcessLookupError):  # There may be no group yet, or no process left.
             os.killpg(self.pid, signal.SIGKILL)
         self._process.kill()
         self._process.join(_END_S)

@@ -54,7 +54,7 @@ class Excitation:
 
 @dataclass(frozen=True, slots=True)
 class TrialSettings:
-    """How a new law is awaited and tried: the keys of `RetuningSettings` of the same names."""
+    """Settings of waiting for and trying a new law; `RetuningSettings` explains the keys."""
 
     trial_s: float
     roll_factor: float
@@ -64,7 +64,7 @@ class TrialSettings:
 
 @dataclass(frozen=True, slots=True)
 class RetuningSettings:
-    """When and how the controller may retune itself: section ``retuning`` of a controller.
+    """Settings of retuning: section ``retuning`` of a controller.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class RetuningSettings:
     excitation : Excitation
         Signal type of the pulses.
     alone : bool
-        Give the pulses without the law's pressure instead of adding them to it.
+        Whether the pulses replace the law's pressure instead of being added to it.
     added_roll_rad : float
         Greatest roll that the pulses alone may cause in still water, on the configured ship.
     roll_limit_rad : float
@@ -91,14 +91,13 @@ class RetuningSettings:
         Time from the end of a retuning to the next scheduled one, in a controller's file 600 s or
         more; None: no schedule.
     change_factor : float or None
-        Retune when the ship estimated from the motion differs from the law's by this factor in roll
-        period, or in the root of the stiffness (`ChangeMonitor`); None: not monitored.
+        Factor in roll period, or in the root of the stiffness, between the estimated ship and the
+        law's, from which the law is retuned (`ChangeMonitor`); None: not monitored.
     trial_s : float
         Length of a trial and of the old law's window that it is compared with: from
-        `EARLIEST_VERDICT_S` to one hour, in which a sea may be taken as stationary.
+        `EARLIEST_VERDICT_S` to one hour, for which a sea counts as stationary.
     roll_factor, effort_factor : float
-        A law on trial is dropped when its roll or pressure RMS exceeds the old law's by this
-        factor.
+        Factors by which a law on trial may exceed the old law's RMS of roll and pressure.
     answer_within_s : float
         Timeout of identification and design, 600 s at most; they take seconds.
     seed : int
@@ -134,7 +133,7 @@ class RetuningSettings:
             problems.append(("roll_period_range_s", f"must rise, got {low} and {high}"))
         if self.excitation.kind == "multisine":
             least_s = 2 * math.pi / (self.excitation.band[1] - self.excitation.band[0])
-            if self.identification_s < least_s:  # at least one harmonic of it in the band
+            if self.identification_s < least_s:  # The band holds at least one harmonic.
                 problems.append(
                     (
                         "identification_s",
@@ -146,7 +145,7 @@ class RetuningSettings:
 
     @property
     def trial(self) -> TrialSettings:
-        """How a new law is awaited and tried."""
+        """Settings of waiting for and trying a new law."""
         return TrialSettings(
             self.trial_s, self.roll_factor, self.effort_factor, self.answer_within_s
         )

@@ -11,14 +11,12 @@ class WindowStatistics(NamedTuple):
 
     Attributes
     ----------
-    roll_rad : float
-        Standard deviation. A steady heel, the same with either law, would mask a change in roll.
-    pressure_pa : float
-        Standard deviation.
+    roll_rad, pressure_pa : float
+        Standard deviations. A steady heel, the same with either law, would mask a change in roll.
     pressure_rms_pa : float
-        Root mean square, with the steady part, which costs power and may heel the ship.
+        Root mean square including the steady part, which costs power and may heel the ship.
     passive_roll_rad : float
-        Standard deviation of the roll that a passive tank would have left; 0 if not known.
+        Standard deviation of the roll that a passive tank would have left; 0 if unknown.
     """
 
     roll_rad: float
@@ -28,23 +26,13 @@ class WindowStatistics(NamedTuple):
 
 
 NOISE_FLOOR: Final = WindowStatistics(1e-4, 100.0, 100.0)
-"""A few quantization steps of the sensors: smaller baselines count as this."""
+"""Lower limit of baselines: a few quantization steps of the sensors."""
 
 
 class MovingWindow:
-    """Roll and pressure of the latest samples, as running sums.
+    """Roll and pressure of the latest `length` samples, as running sums.
 
-    Parameters
-    ----------
-    samples : int
-        Length of the window.
-
-    Attributes
-    ----------
-    length : int
-        Of the window.
-    samples : int
-        Samples since the start or the last `clear`.
+    `samples` counts from the start or the last `clear`.
     """
 
     def __init__(self, samples: int) -> None:
@@ -105,7 +93,7 @@ class MovingWindow:
 def worsening(
     before: WindowStatistics, after: WindowStatistics, roll_factor: float, effort_factor: float
 ) -> tuple[str, ...]:
-    """What is worse by more than the factors, in words; empty if nothing is."""
+    """Describe what is worse by more than the factors; empty if nothing is."""
     before = WindowStatistics(*map(max, before, NOISE_FLOOR))
     found = []
     if after.roll_rad > roll_factor * before.roll_rad:
@@ -126,5 +114,5 @@ def worsening(
 
 
 def _deviation(total: float, squares: float, count: int) -> float:
-    """Standard deviation from sums; rounding may leave a variance just below zero."""
+    """Return the standard deviation from sums; rounding may leave a variance just below zero."""
     return math.sqrt(max(0.0, squares / count - (total / count) ** 2))

@@ -1,7 +1,7 @@
-"""The bytes of what passes between the loop and the retuner's process: MessagePack of typed values.
+"""Encoding of messages between the loop and the retuner's process: MessagePack of typed values.
 
-Decoding executes no code. What is not of the declared type and shape is refused with its place.
-Arrays cross as their shape and their float64 numbers, bit for bit.
+Decoding executes no code and refuses, with its place, what is not of the declared type and shape.
+Arrays cross as shape and float64 numbers, bit for bit.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from utank_hil.base.arrays import FloatArray
 
 OVERHEAD_BYTES: Final = 4096
-"""Names, tags and shapes in a message; those of a renewed law, the most, are some 600 bytes."""
+"""Allowance for names, tags and shapes; a renewed law's, the largest, take some 600 bytes."""
 
 _Shape = Annotated[tuple[Annotated[int, msgspec.Meta(ge=0, le=1 << 24)], ...],
                    msgspec.Meta(max_length=3)]  # fmt: skip
@@ -25,37 +25,22 @@ def encode(value: object) -> bytes:
 
 
 def decoder(kind: Any, *, finite: bool) -> msgspec.msgpack.Decoder[Any]:
-    """Decoder of a type; its `decode` raises a ValueError, or a RecursionError, for anything else.
+    """Return a decoder whose `decode` raises a ValueError or RecursionError for any other type.
 
-    Parameters
-    ----------
-    finite : bool
-        Whether numbers in arrays must be finite.
+    `finite` refuses numbers in arrays that are not finite.
     """
     return msgspec.msgpack.Decoder(kind, dec_hook=_finite_array_in if finite else _array_in)
 
 
 def refuse_shapes(*parts: tuple[str, FloatArray, tuple[int, ...]]) -> None:
-    """Refuse arrays, given with their names and the shapes that they must have.
-
-    Raises
-    ------
-    ValueError
-        For the first that has another shape.
-    """
+    """Raise a ValueError for the first array whose shape is not the one given beside it."""
     for name, array, shape in parts:
         if array.shape != shape:
             raise ValueError(f"{name} has the shape {array.shape} in the place of {shape}")
 
 
 def refuse_sizes(**sizes: tuple[int, int, int]) -> None:
-    """Refuse dimensions, by name, that are not in their range: value, least and most.
-
-    Raises
-    ------
-    ValueError
-        For the first that is out of its range.
-    """
+    """Raise a ValueError for the first dimension outside of its range: value, least and most."""
     for name, (value, least, most) in sizes.items():
         if not least <= value <= most:
             raise ValueError(f"{name} must be {least} to {most}, got {value}")

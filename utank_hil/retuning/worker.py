@@ -1,7 +1,7 @@
 """The retuner's two processes: a worker that answers requests, and a watchdog that restarts it.
 
-A new worker finds an open request by itself (`Desk`). Those that were open when a worker was killed
-are refused by the watchdog and not tried again.
+A new worker finds an open request by itself (`Desk`). The watchdog refuses requests that were open
+when a worker was killed; they are not tried again.
 """
 
 import os
@@ -15,19 +15,19 @@ from typing import Final
 from utank_hil.base.background import give_way
 from utank_hil.retuning.desk import Desk
 
-_POLL_S: Final = 0.1  # an answer takes seconds
-_RESTART_DELAY_S: Final = 1.0  # a worker that dies at once does not take the processor
-_NICENESS: Final = 10  # a tenth of the processor beside a busy process of normal priority
+_POLL_S: Final = 0.1  # An answer takes seconds.
+_RESTART_DELAY_S: Final = 1.0  # A worker that dies at once does not occupy the processor.
+_NICENESS: Final = 10  # This is a tenth of the processor beside a busy process of normal priority.
 _SECOND_NS: Final = 1_000_000_000
 
 
 def run_watchdog(desks: Sequence[Desk], parent_pid: int, hangs_after_s: float) -> None:
-    """Main function of the watchdog: run a worker until the parent is gone."""
-    os.setpgid(0, 0)  # out of reach of Ctrl-C: the loop ends this group
+    """Run a worker until the parent is gone, as main function of the watchdog."""
+    os.setpgid(0, 0)  # Ctrl-C does not reach it; the loop ends this group.
     give_way(_NICENESS)
     watchdog_pid = os.getpid()
     while os.getppid() == parent_pid:
-        worker_pid = os.fork()  # safe: one thread, and no resources but the mailboxes
+        worker_pid = os.fork()  # This is safe with one thread and no resources but the mailboxes.
         if worker_pid == 0:
             try:
                 run_worker(desks, watchdog_pid)
@@ -43,7 +43,7 @@ def run_watchdog(desks: Sequence[Desk], parent_pid: int, hangs_after_s: float) -
 
 
 def _watch(worker_pid: int, desk: Desk, parent_pid: int, hangs_after_s: float) -> str | None:
-    """How a worker ended, in words; None if it was ended because the parent is gone."""
+    """Return how a worker ended, in words; None if it was ended because the parent is gone."""
     begun_ns = time.monotonic_ns()
     while os.getppid() == parent_pid:
         pid, status = os.waitpid(worker_pid, os.WNOHANG)
@@ -65,7 +65,7 @@ def _kill(pid: int) -> None:
 
 
 def run_worker(desks: Sequence[Desk], watchdog_pid: int) -> None:
-    """Main function of a worker: answer requests until the watchdog is gone."""
+    """Answer requests until the watchdog is gone, as main function of a worker."""
     while os.getppid() == watchdog_pid:
         idle = True
         for desk in desks:
