@@ -1,4 +1,4 @@
-"""Controllers: steppable objects, and the design functions they come from."""
+"""Controllers as steppable objects, and the functions that design them."""
 
 from utank_hil.control.arx import ARX as ARX
 from utank_hil.control.constrained.design import ConstrainedDesign as ConstrainedDesign

@@ -1,13 +1,13 @@
-"""The ARX model, thesis (3.6): the one plant description that the predictive laws are made from.
+"""The ARX model, thesis (3.6), from which the predictive laws are designed.
 
 ::
 
     y(k) = sum_{i=1..p} alpha_i y(k-i) + sum_{i=0..p} beta_i u(k-i)
 
-Timing. When the model comes from `utank_hil.dynamics.sampling.sampled_model`, u(k) is the command
-that was computed at t_{k-1} and acts over [t_{k-1} + d, t_k + d), d the delay from sensor to pump.
-So y(k) already feels u(k) when d is shorter than the sample time (beta_0 is not zero), and a law
-that makes u(k) from y(k-1), y(k-2), ... uses the newest measurement there is.
+In a model of `utank_hil.dynamics.sampling.sampled_model`, u(k) is the command computed at t_{k-1},
+which acts over [t_{k-1} + d, t_k + d), with d the delay from sensor to pump. So y(k) depends on
+u(k) when d is shorter than the sample time (beta_0 is not zero), and a law that computes u(k) from
+y(k-1), y(k-2), ... uses the newest measurement.
 """
 
 import math
@@ -40,8 +40,8 @@ class ARX:
     Raises
     ------
     ValueError
-        If the shapes do not fit each other, a coefficient is not finite, or the sample time is
-        not positive.
+        If the shapes are inconsistent, a coefficient is not finite, or the sample time is not
+        positive.
     """
 
     alpha: FloatArray
@@ -85,10 +85,10 @@ class ARX:
 
     @classmethod
     def from_state_space(cls, system: "StateSpace | LinearModel", order: int) -> "ARX":
-        """Exact ARX form of a discrete state-space model.
+        """Convert a discrete state-space model to its exact ARX form.
 
         The past `order` outputs and inputs determine the state (a deadbeat observer), so the
-        model predicts the response of `system` exactly. Where there is a choice, the output
+        model predicts the response of `system` exactly. Of several solutions, the output
         coefficients of least norm are taken.
 
         Parameters
@@ -118,7 +118,7 @@ class ARX:
         scale = np.linalg.norm(np.vstack(blocks), axis=0)
         scale[scale == 0] = 1.0
         past, now = np.vstack(blocks[:order]) / scale, blocks[order] / scale
-        # y(k-p) ... y(k-1) = past x(k-p) + ...; alphas with alphas past = now
+        # With y(k-p) ... y(k-1) = past x(k-p) + ..., the alphas solve alphas past = now.
         alphas = np.linalg.lstsq(past.T, now.T, rcond=None)[0].T
         if np.abs(alphas @ past - now).max() > _EXACT:
             raise ValueError(
@@ -129,22 +129,15 @@ class ARX:
         markov = [d] + [block @ b for block in blocks[:order]]
         beta = np.array(markov)
         for i in range(1, order + 1):
-            for j in range(i):  # take out what the past outputs already held of each input
+            for j in range(i):  # subtract each input's effect through the past outputs
                 beta[i] -= alpha[i - j - 1] @ markov[j]
         return cls(alpha, beta, sample_time_s)
 
     def predict(self, u: FloatArray, y: FloatArray) -> FloatArray:
-        """One-step prediction of each sample of a record from the measured samples before it.
+        """Predict each sample of a record from the measured samples before it.
 
-        Parameters
-        ----------
-        u : ndarray, shape (N, r)
-        y : ndarray, shape (N, m)
-
-        Returns
-        -------
-        ndarray, shape (N, m)
-            What lies before the record is taken as zero.
+        `u` has shape (N, r), `y` and the result have shape (N, m). Samples before the record are
+        taken as zero.
         """
         u, y = self._record(u, y)
         predicted: FloatArray = u @ self.beta[0].T
@@ -162,10 +155,10 @@ class ARX:
         return history[self.order :]
 
     def matrices(self) -> LinearModel:
-        """The same model with p m states (block observer form).
+        """Equivalent state-space model with p m states (block observer form).
 
-        State i is what the past makes of y(k + i), i = 0 ... p - 1, future inputs zero and the
-        outputs in between as predicted one by one.
+        State i is the prediction of y(k + i) from the past, i = 0 ... p - 1, with zero future
+        inputs.
         """
         size = self.order * self.outputs
         a = np.eye(size, k=self.outputs)

@@ -1,4 +1,4 @@
-"""The plant that a law is designed for: ship and tank, and the way from sensor to pump."""
+"""The plant of a law's design: ship and tank, and the path from sensor to pump."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -16,18 +16,18 @@ _LIMITS: Final = PumpLimits()
 
 @dataclass(frozen=True, slots=True)
 class DesignPlant:
-    """A ship with its tank as the control loop sees them.
+    """A ship with its tank, delay, lag and limits.
 
     Parameters
     ----------
     delay_s : float
-        From the sampling of a measurement to the drive's answer to the command made of it.
+        From the sampling of a measurement to the drive's response to the resulting command.
     lag_s : float
         Time constant of the pump's pressure.
     limits : PumpLimits
         On the command, for the laws that plan within them.
     valve : ValveRange or None
-        Of the tank's valve, if it has one.
+        Range of the tank's valve, if any.
 
     Raises
     ------

@@ -4,33 +4,32 @@ The pump enters both accelerations of the nonlinear model (`utank_hil.dynamics.n
 
     phi'' = f_phi + g_phi P,    h'' = f_h + g_h P,    g_phi = -m_c At / det,  g_h = m_phi At / det
 
-both positive. The output s = phi + kL l sin(h / l), for which kL = 0 leaves the roll angle itself,
-has relative degree 2, and with c = cos(h / l)::
+both positive. The output s = phi + kL l sin(h / l), the roll angle itself for kL = 0, has relative
+degree 2, and with c = cos(h / l)::
 
     s'' = f_phi + kL (c f_h - sin(h / l) h'^2 / l) + (g_phi + kL c g_h) P
 
     P = (-w^2 s - 2 zeta w s' - f_phi - kL (c f_h - sin(h / l) h'^2 / l)) / (g_phi + kL c g_h)
 
-makes s'' + 2 zeta w s' + w^2 s = 0 in still water, exactly and at any angle. (4.11) is this with
-kL = 0 and the sign of its v turned; the thesis has l = 1 m.
+gives s'' + 2 zeta w s' + w^2 s = 0 in still water, exactly and at any angle. (4.11) is this with
+kL = 0 and the opposite sign of its v; the thesis has l = 1 m.
 
-What is left is the zero dynamics, the water's motion under s = 0::
+The zero dynamics, the water's motion under s = 0, are::
 
     kL = 0:        h'' + g / (H + Lz) h = K_wave / m_c                        (4.10), no damping
     small angles:  (m_phi kL - m_c) h'' + b kL h' + (k_phi kL + rho g At L) h = -K_wave
 
-so with kL = 0 the level swings on for ever after a disturbance, and kL > 0 borrows damping from the
-ship at the price of the roll phi = -kL h. Sampling, delay and the pump's lag make kL = 0 unstable,
-and a small kL too if the tank is as large as Patti-B's. So the pump may also brake the level
-(`level_brake`), at the price of some roll: P = ... - c_b h' gives::
+so with kL = 0 the level oscillates undamped after a disturbance, and kL > 0 damps it by the ship's
+damping, at the cost of the roll phi = -kL h. Sampling, delay and the pump's lag make kL = 0
+unstable, and a small kL too with a tank as large as Patti-B's. So the pump may also brake the level
+(`level_brake`), at the cost of some roll: P = ... - c_b h' gives::
 
     s'' + 2 zeta w s' + w^2 s = -2 zeta_h w_0 abs(m_c) / m_phi h',    w_0 = sqrt(g / (H + Lz))
 
 which makes the zero dynamics h'' + 2 zeta_h w_0 h' + w_0^2 h = ... as long as the ship's own
-stiffness is small against m_phi w_0^2. Neither law knows the reservoirs' limits: therefore the
-pressure is blended out, and the tank left passive, while the swing sqrt(h^2 + (h' / w_t)^2), the
-level that the water would reach if left alone (w_t its natural frequency), goes from a soft to a
-hard limit.
+stiffness is small against m_phi w_0^2. Neither law includes the reservoirs' limits: the pressure is
+reduced to zero, and the tank left passive, while the swing sqrt(h^2 + (h' / w_t)^2), the amplitude
+of the free water (w_t its natural frequency), goes from a soft to a hard limit.
 """
 
 import math
@@ -53,15 +52,15 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 @dataclass(frozen=True, slots=True)
 class FeedbackLinearizationDesign:
-    """The law in parameters.
+    """Parameters of the law.
 
     Parameters
     ----------
     frequency_rad_s, damping_ratio : float
-        w and zeta of the linear response that the output s is given.
+        w and zeta of the linear response of the output s.
     soft_level_m, hard_level_m : float
-        Swing of the level up to which the law acts in full, and from which on it does not act; both
-        within the reservoirs, or both beyond them for the law as printed, never blended out.
+        Swing of the level up to which the law acts fully, and from which it does not act; both
+        within the reservoirs, or both beyond them for the law as printed, without reduction.
     shift_rad_m : float
         kL, zero or more.
     shift_length_m : float
@@ -91,7 +90,7 @@ class FeedbackLinearizationDesign:
         refuse("feedback linearization", problems)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the law for a plant; its delay and lag are not known to the law."""
+        """Design the law for a plant; it does not include the plant's delay and lag."""
         parameters = {each.name: getattr(self, each.name) for each in fields(self)}
         law = FeedbackLinearization(**parameters, ship=plant.ship, tank=plant.tank)
         slope = slope_at_rest(law.controller, len(STATES))
@@ -100,7 +99,7 @@ class FeedbackLinearizationDesign:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackLinearization(FeedbackLinearizationDesign):
-    """The law and its model; measured are roll, roll rate, level and level rate.
+    """The law and its model; it measures roll, roll rate, level and level rate.
 
     Parameters
     ----------
@@ -111,7 +110,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
     ------
     ValueError
         If a parameter is out of its range, the reservoirs end between the soft and the hard limit
-        of the level, or the pump loses its grip on the shifted output within the hard limit.
+        of the level, or the pump does not affect the shifted output within the hard limit.
     """
 
     _: KW_ONLY
@@ -149,14 +148,9 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
         return math.sqrt(GRAVITY_M_S2 / (self.tank.height_m + self.tank.lz_m))
 
     def pressure_pa(self, state: FloatArray, target_rad: float = 0.0) -> float:
-        """Linearizing pressure, before blending.
+        """Linearizing pressure, before reduction, for a target of the output.
 
-        Parameters
-        ----------
-        state : ndarray, shape (4,)
-            Roll, roll rate, level, level rate.
-        target_rad : float
-            Target of the output.
+        `state` is roll, roll rate, level and level rate, shape (4,).
         """
         _, phi_ddot, _, h_ddot = self.model.derivative(state).tolist()  # without the pump
         output, rate, drift = self._output(state.tolist(), phi_ddot, h_ddot)
@@ -166,7 +160,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
         return (wanted - drift) / self._grip(float(state[2])) - brake
 
     def share(self, level_m: float, level_rate_m_s: float) -> float:
-        """Share of the linearizing pressure that the swing of the level leaves, 0 to 1."""
+        """Share of the linearizing pressure allowed at this swing of the level, 0 to 1."""
         swing = math.hypot(level_m, level_rate_m_s / self.tank.natural_frequency_rad_s)
         x = (self.hard_level_m - swing) / (self.hard_level_m - self.soft_level_m)
         x = min(max(x, 0.0), 1.0)
@@ -179,7 +173,7 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
     def _output(
         self, state: list[float], phi_ddot: float, h_ddot: float
     ) -> tuple[float, float, float]:
-        """Output s, its rate, and its acceleration under the accelerations given."""
+        """Output s, its rate, and its acceleration for given accelerations."""
         phi, phi_dot, h, h_dot = state
         shift, length = self.shift_rad_m, self.shift_length_m
         sin, cos = math.sin(h / length), math.cos(h / length)
@@ -199,17 +193,9 @@ class FeedbackLinearization(FeedbackLinearizationDesign):
 
 
 def level_brake(model: RollModel, damping_ratio: float) -> float:
-    """Pump pressure per level rate, against the flow, that damps the water under zero roll.
+    """Pump pressure per level rate, in Pa s/m, against the flow, that damps the zero dynamics.
 
-    Parameters
-    ----------
-    damping_ratio : float
-        zeta_h that the zero dynamics get.
-
-    Returns
-    -------
-    float
-        c_b in Pa s/m.
+    `damping_ratio` is the resulting zeta_h.
     """
     c, tank = model.coefficients, model.tank
     frequency = math.sqrt(GRAVITY_M_S2 / (tank.height_m + tank.lz_m))
@@ -218,14 +204,14 @@ def level_brake(model: RollModel, damping_ratio: float) -> float:
 
 
 class FeedbackLinearizationController:
-    """Steps a `FeedbackLinearization`; it has no memory."""
+    """Stepping of a `FeedbackLinearization`, which has no memory."""
 
     def __init__(self, law: FeedbackLinearization) -> None:
         self.sample_time_s = law.sample_time_s
         self._law = law
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
-        """Blended pressure, shape (1,), for the state `y`, shape (4,); target of s: one number."""
+        """Reduced pressure, shape (1,), for the state `y`, shape (4,) and a scalar target of s."""
         law = self._law
         share = law.share(float(y[2]), float(y[3]))
         if share == 0.0:
@@ -234,7 +220,7 @@ class FeedbackLinearizationController:
         return np.array([share * law.pressure_pa(y, target)])
 
     def applied(self, u: FloatArray) -> None:
-        """Nothing to remember."""
+        """Ignore the command; the law has no memory."""
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing; the law has no memory."""

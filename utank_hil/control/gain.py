@@ -1,4 +1,4 @@
-"""The plainest linear law: a constant gain on the newest measurement, u = -K (y - reference)."""
+"""A constant gain on the newest measurement, u = -K (y - reference)."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,7 @@ from utank_hil.dynamics.sampling import LinearModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GainLaw:
-    """Constant feedback of the measured outputs.
-
-    In the loop's timing (`utank_hil.dynamics.sampling`) u(k) = -K y(k-1).
+    """Constant feedback of the measured outputs, u(k) = -K y(k-1) (`utank_hil.dynamics.sampling`).
 
     Attributes
     ----------
@@ -46,7 +44,7 @@ class GainLaw:
         return response
 
     def matrices(self) -> LinearModel:
-        """The law from y to u; its states are the last measurement."""
+        """State-space model from y to u; its states are the last measurement."""
         inputs, outputs = self.gain.shape
         return LinearModel(
             np.zeros((outputs, outputs)),
@@ -58,7 +56,7 @@ class GainLaw:
 
 
 class GainController:
-    """Steps a `GainLaw`; it has no memory."""
+    """Stepping of a `GainLaw`, which has no memory."""
 
     def __init__(self, law: GainLaw) -> None:
         self.sample_time_s = law.sample_time_s
@@ -71,7 +69,7 @@ class GainController:
         return u
 
     def applied(self, u: FloatArray) -> None:
-        """Nothing to remember."""
+        """Ignore the command; the law has no memory."""
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing; the law has no memory."""

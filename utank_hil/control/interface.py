@@ -1,4 +1,4 @@
-"""What every controller, every linear law and every design of a law is."""
+"""Interfaces of controllers, linear laws and designs of laws."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ VALVE: Final = "valve_loss"
 
 
 class Controller(Protocol):
-    """Steppable controller.
+    """A steppable controller.
 
-    Timing: `step` is called with the measurement at t_k and its answer is commanded at once; it
-    acts on the plant from t_k + delay on, until the answer of the next step takes over. A
-    controller that is not in charge is stepped all the same and gets through `applied` what was
-    commanded instead; it can then take over without a bump.
+    `step` is called with the measurement at t_k and its result is commanded at once; it acts on the
+    plant from t_k + delay until the result of the next step takes over. A controller that is not
+    active is stepped too and receives the actual command through `applied`, so that it can take
+    over without a bump.
 
     Attributes
     ----------
@@ -31,62 +31,59 @@ class Controller(Protocol):
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Take the newest measurement `y`, shape (m,), and return the command, shape (r,).
 
-        `reference` is the target of the outputs, zero where it is not given.
+        `reference` is the target of the outputs, zero by default.
         """
 
     def applied(self, u: FloatArray) -> None:
-        """Tell the controller the command, shape (r,), that left after limits or another law."""
+        """Take the command, shape (r,), that was sent after limits or by another law."""
 
     def reset(self) -> None:
-        """Forget the past: as newly built."""
+        """Return to the initial state."""
 
 
 @runtime_checkable
 class Plans(Protocol):
-    """A controller that searches for a plan each sample, within limits and a budget.
+    """A controller that plans each sample within limits and an iteration limit.
 
     Attributes
     ----------
     fallbacks : int
-        How often since its reset the budget did not suffice and the last plan went on.
+        Number of steps since its reset in which the limit was reached and the last plan was kept.
     """
 
     fallbacks: int
 
     def allow(self, share: float) -> None:
-        """Tell the share of its pressure limit that the next plan may use."""
+        """Set the share of the pressure limit that the next plan may use."""
 
 
 @runtime_checkable
 class StartsAnew(Protocol):
     """A controller that is reset when an operator arms it, or resets a fault.
 
-    Its memory is of its own doing: how far its ramp got, that it has ended, what it learnt while in
-    charge. Other controllers remember the ship. They are stepped all the while, know it at once
-    and would lose that by a reset.
+    Its memory depends on its own action: the progress of a ramp, its end, or adaptation while
+    active. The memory of other controllers is an estimate of the ship, which a reset would lose.
 
     Attributes
     ----------
     passed_limit : str
-        Which measurement, a name of `STATES`, passed a limit of the law's own: it answers zero
-        pressure until it is reset. Empty if none did.
+        The measurement, a name of `STATES`, that passed a limit of the law; the pressure is then
+        zero until a reset. Empty if none did.
     """
 
     passed_limit: str
 
     def reset(self) -> None:
-        """Forget the past: as newly built."""
+        """Return to the initial state."""
 
 
 class LinearLaw(Protocol):
     """A linear law from outputs y to command u, in the timing of `utank_hil.control.arx`.
 
-    What design functions of linear controllers return, and what `utank_hil.analysis.loop` looks at.
-
-    u(k) is made from y(k-1), y(k-2), ..., y(k-1) being the newest measurement: a law that a
-    controller can step is strictly proper in this count, D = 0. A law x+ = A x + B y, u = C x + D y
-    with the newest measurement as y, as control libraries give it, has to be shifted by this one
-    sample first: `utank_hil.control.state_space.StateSpaceLaw` does it.
+    u(k) depends on y(k-1), y(k-2), ..., of which y(k-1) is the newest measurement: the law of a
+    steppable controller is strictly proper in this count, D = 0. `StateSpaceLaw` converts a law
+    x+ = A x + B y, u = C x + D y with the newest measurement y, as control libraries give it, by
+    shifting it one sample.
     """
 
     @property
@@ -97,10 +94,10 @@ class LinearLaw(Protocol):
         """Transfer matrix at the points `z`, shape (N,); shape (N, r, m)."""
 
     def matrices(self) -> LinearModel:
-        """The law from y to u as a discrete state-space model."""
+        """Discrete state-space model from y to u."""
 
     def controller(self) -> Controller:
-        """A new steppable controller, at rest."""
+        """Return a new steppable controller, at rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,21 +109,21 @@ class BuiltLaw:
     controller : callable
         Makes a new `Controller`, at rest.
     measured : tuple of str
-        What the controller measures, in order; names of `STATES`.
+        Measurements of the controller, in order; names of `STATES`.
     linear : LinearLaw or None
         The law for the analysis of its loop, from `linear_measured` to the pressure.
     at_rest : bool
-        The law is not linear, and `linear` is its slope at rest.
+        The law is nonlinear, and `linear` is its slope at rest.
     adapts : bool
-        The law changes while it runs, and `linear` is what it starts from.
+        The law changes while it runs, and `linear` is its initial form.
     closes_loop : bool
         The law feeds measurements back. If it does and `linear` is None, its loop is judged by its
         impulse response.
     unjudged : str
-        Why its loop can't be judged; empty where it can, or need not.
+        Reason for which its loop cannot be judged; empty otherwise.
     commands : tuple of str
-        What the controller commands, in order: `PRESSURE` of the pump in Pa, `VALVE` for the loss
-        of the valve in Pa per (m/s)^2 of dh/dt.
+        Commands of the controller, in order: `PRESSURE` of the pump in Pa, `VALVE` for the loss of
+        the valve in Pa per (m/s)^2 of dh/dt.
     """
 
     controller: Callable[[], Controller]
@@ -140,20 +137,20 @@ class BuiltLaw:
 
     @property
     def linear_measured(self) -> tuple[str, ...]:
-        """The measurements that `linear` takes: the first ones, as many as it has inputs."""
+        """Measurements of `linear`: the first ones, as many as it has inputs."""
         inputs = 0 if self.linear is None else self.linear.matrices().B.shape[1]
         return self.measured[:inputs]
 
     @property
     def dissipates(self) -> bool:
-        """Whether it can only take energy out of the water, whatever it commands: a valve's law."""
+        """Whether the law commands a valve alone, which can only take energy from the water."""
         return self.commands == (VALVE,)
 
 
 class LawDesign(Protocol):
-    """A law in parameters: a frozen dataclass that a configuration file can hold.
+    """Parameters of a law: a frozen dataclass that a configuration file can hold.
 
-    Its field `kind` is a ``Literal`` of the names by which a file chooses it.
+    Its field `kind` is a ``Literal`` of the names by which a file selects it.
     """
 
     @property
@@ -166,5 +163,5 @@ class LawDesign(Protocol):
         Raises
         ------
         ValueError
-            If a parameter does not fit the plant; a `ParameterError` names it.
+            If a parameter does not suit the plant; a `ParameterError` names it.
         """

@@ -1,14 +1,14 @@
-"""Level and its rate from level gauges and pump pressure: an observer with the tank's own model.
+"""Observer of the level and its rate, from level gauges, pump pressure and the tank's model.
 
-An alpha-beta filter alone gives the rate late by two of its time constants, and the level barrier
-(`utank_hil.control.limiter`) pays for each tenth of a second with level and with roll. Gravity and
-pump make most of the water's acceleration, so they are fed forward; what is left to the filter is
-the ship's push::
+An alpha-beta filter alone estimates the rate with a delay of two of its time constants, and each
+tenth of a second costs the level barrier (`utank_hil.control.limiter`) level and roll. Gravity and
+pump cause most of the water's acceleration, so they are fed forward; the filter estimates the
+remainder, which is due to the ship's motion::
 
     h'' = (P - 2 rho g h - loss h') / (rho (2H + L At/Ap)) + unknown
 
-Where measurements are missing the model goes on alone, and the next one corrects for the whole time
-that has passed: with pole^n in the place of the pole, after n periods.
+Without measurements the model continues alone, and the next one corrects for the whole elapsed
+time, with pole^n in place of the pole after n periods.
 """
 
 import math
@@ -17,14 +17,15 @@ from typing import Final
 from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 LONGEST_GAP_S: Final = 1.0
-"""After a longer one the model says nothing any more: a fresh start at the measured level."""
+"""Gap after which the model's prediction is useless and the observer restarts at the measured
+level."""
 
 BANDWIDTH_RAD_S: Final = 6.0
 """Poles of the observer in continuous time; the level itself moves below 1 rad/s."""
 
 
 class LevelObserver:
-    """Observer of the level with both poles at the same place (critically damped).
+    """Observer of the level with a double pole (critically damped).
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ class LevelObserver:
     Attributes
     ----------
     level_m, rate_m_s : float
-        Estimated level, and its rate.
+        Estimated level and its rate.
 
     Raises
     ------
@@ -65,21 +66,18 @@ class LevelObserver:
 
     @property
     def alone(self) -> bool:
-        """Whether the model goes on alone: more than one measurement is missing."""
+        """Whether the model continues without measurements, more than one being missing."""
         return self._ahead > 1
 
     @property
     def next_due_s(self) -> float:
-        """Time from the last measurement to the end of the period that comes next."""
+        """Time from the last measurement to the end of the next period."""
         return (self._ahead + 1) * self._period_s if self._ahead < self._longest else math.inf
 
     def update(self, measured_m: float, pressure_pa: float, periods: int = 1) -> None:
-        """Take the next level and the pump's pressure since the last one.
+        """Take the next level and the pump's pressure since the last measurement.
 
-        Parameters
-        ----------
-        periods : int
-            Since the last measurement; more than one after a gap.
+        `periods` since the last measurement are more than one after a gap.
         """
         alpha, beta = self._alpha, self._beta
         if periods > self._longest:
@@ -96,7 +94,7 @@ class LevelObserver:
         self.rate_m_s += beta / self._period_s * surprise_m
 
     def predict(self, pressure_pa: float) -> None:
-        """Go on by a period without a measurement."""
+        """Advance by a period without a measurement."""
         period_s = self._period_s
         push_pa = (
             pressure_pa - self._stiffness_pa_m * self.level_m - self._loss_pa_s_m * self.rate_m_s

@@ -1,19 +1,19 @@
-"""Keeps the pump's command within pressure, power, tank level and pressure rate.
+"""Limiter of the pump's command: pressure, power, tank level and pressure rate.
 
-The level barrier. Held at a pressure P in a ship at rest, the water swings as an undamped
+The level barrier. At a constant pressure P in a ship at rest, the water swings as an undamped
 oscillator of frequency w0 about h_e = P / (2 rho g). From the level h and its rate it comes to rest
 at the limit h_max when ::
 
     h_e = (h_max^2 - h^2 - (h' / w0)^2) / (2 (h_max - h))          (rising water; falling: mirrored)
 
-so P_touch = 2 rho g h_e is the pressure that just does not overshoot. As long as P_touch is well
-above the braking pressure -P_b there is time left to brake, and more may be allowed now::
+so P_touch = 2 rho g h_e is the greatest pressure without overshoot. As long as P_touch is well
+above the braking pressure -P_b there is time left to brake, and more is allowed::
 
     P <= -P_b + sharpness (P_touch + P_b)
 
 A pressure above P_touch lowers P_touch; both meet at -P_b, where the pump brakes with the share of
-its pressure that was kept for it. The wave's own push is not known; that is what the rest of the
-pump's pressure, beyond P_b, is for.
+its pressure reserved for it. The rest of the pump's pressure, beyond P_b, is reserved against the
+wave's moment, which is unknown.
 """
 
 import math
@@ -23,21 +23,14 @@ from utank_hil.dynamics.tank import GRAVITY_M_S2, Tank
 
 
 class CommandLimiter:
-    """Brings a desired pressure within `PumpLimits`, once every command period.
-
-    Parameters
-    ----------
-    limits : PumpLimits
-    tank : Tank
-    period_s : float
-        Time between two commands.
+    """Limiter of a desired pressure to `PumpLimits`, called once every command period `period_s`.
 
     Attributes
     ----------
     command_pa : float
         The last command.
     limiting : bool
-        Whether the last command fell short of what was desired.
+        Whether the last command was smaller than desired.
     """
 
     def __init__(self, limits: PumpLimits, tank: Tank, period_s: float) -> None:
@@ -56,19 +49,10 @@ class CommandLimiter:
     def limit(
         self, desired_pa: float, level_m: float, level_rate_m_s: float, share: float = 1.0
     ) -> float:
-        """The command nearest to `desired_pa` that keeps within the limits.
+        """Return the command within the limits that is nearest to `desired_pa`.
 
-        Parameters
-        ----------
-        desired_pa : float
-        level_m, level_rate_m_s : float
-        share : float
-            Part of the greatest pressure that is allowed at present.
-
-        Returns
-        -------
-        float
-            On its way to zero if an argument is not a finite number.
+        `share` is the currently allowed part of the greatest pressure. If an argument is not
+        finite, the command falls to zero at its rate limit.
         """
         if math.isfinite(desired_pa + level_m + level_rate_m_s):
             target_pa = self._permitted_pa(desired_pa, level_m, level_rate_m_s, share)
@@ -79,7 +63,7 @@ class CommandLimiter:
         return command
 
     def ramp_to_zero(self) -> float:
-        """Let the command fall to zero at its rate limit."""
+        """Reduce the command to zero at its rate limit."""
         self.limiting = False
         return self._towards(0.0)
 
@@ -99,7 +83,7 @@ class CommandLimiter:
         return command
 
     def mean_since_last_call(self) -> float:
-        """Mean of the commands since the last call: what a controller's `applied` wants to know."""
+        """Mean of the commands since the last call, for a controller's `applied`."""
         mean = self._sum_pa / self._count if self._count else self.command_pa
         self._sum_pa = 0.0
         self._count = 0
@@ -108,12 +92,12 @@ class CommandLimiter:
     def _permitted_pa(
         self, desired_pa: float, level_m: float, rate_m_s: float, share: float
     ) -> float:
-        """Within pressure, level and power limits."""
+        """Limit a pressure by the pressure, level and power limits."""
         most = self._limits.pressure_pa * share
         flow_m3_s = self._area_m2 * abs(rate_m_s)
-        if flow_m3_s == 0:  # that of the smallest rate is, too
+        if flow_m3_s == 0:  # as it also is at the smallest rates
             return min(max(desired_pa, -most), most)
-        way = math.copysign(1.0, rate_m_s)  # seen in the direction in which the water moves
+        way = math.copysign(1.0, rate_m_s)  # positive in the direction of the water's motion
         power_pa = self._limits.power_w / flow_m3_s
         high = min(most, self._barrier_pa(way * level_m, abs(rate_m_s), most), power_pa)
         return way * max(min(way * desired_pa, high), -most)
@@ -121,8 +105,8 @@ class CommandLimiter:
     def _barrier_pa(self, level_m: float, rate_m_s: float, most_pa: float) -> float:
         """Greatest pressure for water rising at `rate_m_s` > 0 towards the positive limit.
 
-        It reckons with no more than `most_pa` for braking: a pump that is held to a share of its
-        pressure has to begin earlier.
+        The braking pressure is at most `most_pa`, so a pump held to a share of its pressure begins
+        to brake earlier.
         """
         limits = self._limits
         level_m += rate_m_s * limits.lookahead_s

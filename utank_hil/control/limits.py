@@ -1,4 +1,4 @@
-"""The limits on what the pump may be asked for; see `utank_hil.control.limiter`."""
+"""Limits on the pump's command; see `utank_hil.control.limiter`."""
 
 import math
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ class PumpLimits:
     level_m : float
         Greatest level, either way, that the pump may drive the water to.
     power_w : float
-        Greatest hydraulic power P At h' that the pump may put into the water.
+        Greatest hydraulic power P At h' from the pump to the water.
     brake_share : float
         Share of `pressure_pa` that the level barrier counts on for braking, 0 to 1.
     sharpness : float
-        How late and how hard the level barrier acts, 1 or more.
+        Sharpness of the level barrier, 1 or more; a greater one acts later and harder.
     lookahead_s : float
         Time ahead at which the level is judged: delay and lag of the pump.
 

@@ -1,14 +1,14 @@
-"""Linear-quadratic control, thesis section 3.4, and a Kalman filter for what is not measured.
+"""Linear-quadratic control, thesis section 3.4, with a Kalman filter for unmeasured states.
 
 For x(k+1) = A x(k) + B u(k) + w(k), y(k) = C x(k) + D u(k) + v(k):
 
-* `design_lqr`: u = -K x that makes the sum of x'Q x + u'R u + 2 x'N u least;
+* `design_lqr`: u = -K x that minimizes the sum of x'Q x + u'R u + 2 x'N u;
 * `design_lqg`: the same gain on the estimate of a Kalman predictor from y(k-1), y(k-2), ... ::
 
       xhat(k+1) = A xhat(k) + B u(k) + L (y(k) - C xhat(k) - D u(k)),    u(k) = -K xhat(k)
 
-With the sampled models of `utank_hil.dynamics.sampling` this is the loop's own timing, delay, lag
-and the newest measurement included.
+The sampled models of `utank_hil.dynamics.sampling` have the loop's own timing, with delay, lag and
+the newest measurement.
 """
 
 import math
@@ -41,7 +41,7 @@ def design_lqr(
     system : control.StateSpace or LinearModel
         Discrete, n states, r inputs.
     state_weight : array_like, shape (n, n) or ()
-        Q, symmetric and not negative; a number stands for so many times the unit matrix.
+        Q, symmetric and not negative; a number is a multiple of the unit matrix.
     input_weight : array_like, shape (r, r) or ()
         R, symmetric and positive.
     cross_weight : array_like, shape (n, r), optional
@@ -55,7 +55,7 @@ def design_lqr(
     Raises
     ------
     ValueError
-        If the model is not discrete or a weight does not fit or is not positive.
+        If the model is not discrete, or a weight has the wrong shape or is not positive.
     numpy.linalg.LinAlgError
         If no stabilizing gain exists.
     """
@@ -80,23 +80,21 @@ def kalman_predictor(
     process_covariance: npt.ArrayLike,
     measurement_covariance: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray]:
-    """Stationary Kalman predictor.
+    """Stationary Kalman predictor of a discrete model with n states and m outputs.
 
     Parameters
     ----------
-    system : control.StateSpace or LinearModel
-        Discrete, n states, m outputs.
     process_covariance : array_like, shape (n, n)
-        Of the white noise w.
+        Covariance of the white noise w.
     measurement_covariance : array_like, shape (m, m)
-        Of the white noise v, positive definite.
+        Covariance of the white noise v, positive definite.
 
     Returns
     -------
     gain : ndarray, shape (n, m)
         L.
     innovation_covariance : ndarray, shape (m, m)
-        Of y(k) - C xhat(k) - D u(k), which is white where model and covariances are true.
+        Covariance of y(k) - C xhat(k) - D u(k), which is white for the true model and covariances.
 
     Raises
     ------
@@ -120,21 +118,21 @@ def design_lqg(
     process_covariance: npt.ArrayLike,
     measurement_covariance: npt.ArrayLike,
 ) -> "LQGLaw":
-    """A regulator on the state that a Kalman predictor estimates from the outputs.
+    """Combine a regulator with a Kalman predictor of the state from the outputs.
 
     Parameters
     ----------
     system : control.StateSpace or LinearModel
-        Discrete; its outputs are what is measured.
+        Discrete; its outputs are the measurements.
     regulator : GainLaw
         From `design_lqr`, of the same states.
     process_covariance, measurement_covariance : array_like
-        As `kalman_predictor` takes them.
+        As in `kalman_predictor`.
 
     Raises
     ------
     ValueError
-        If model and regulator do not belong together.
+        If model and regulator do not match.
     """
     a, b, c, d, sample_time_s = discrete_matrices(system)
     if regulator.gain.shape != b.T.shape or regulator.sample_time_s != sample_time_s:
@@ -156,7 +154,7 @@ class LQGLaw:
     observer_gain : ndarray, shape (n, m)
         L.
     innovation_covariance : ndarray, shape (m, m), or None
-        None where the predictor was not made for a known noise.
+        None for a predictor not designed for a known noise.
     """
 
     model: LinearModel
@@ -170,11 +168,11 @@ class LQGLaw:
         return self.model.dt
 
     def controller(self, washout_share: float = 0.0) -> "LQGController":
-        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
+        """Return a new controller at rest; `washout_share` as in `WashoutLaw.share`."""
         return LQGController(self, washout_share)
 
     def matrices(self) -> LinearModel:
-        """The law from y to u; its states are the predicted ones."""
+        """State-space model from y to u; its states are the predicted ones."""
         a, b, c, d, dt = self.model
         closed = a - b @ self.gain - self.observer_gain @ (c - d @ self.gain)
         inputs, outputs = len(self.gain), len(c)
@@ -185,15 +183,15 @@ class LQGLaw:
         return state_space_response(self.matrices(), z)
 
     def reference_gain(self) -> FloatArray:
-        """Shape (r, m): turns a constant target of the outputs into a feedforward.
+        """Feedforward gain on a constant target of the outputs; shape (r, m).
 
-        The steady input that brings the outputs nearest to the target (least squares), and the gain
-        times the state it leads to.
+        It is the steady input that brings the outputs nearest to the target (least squares), plus
+        the gain times the resulting state.
 
         Raises
         ------
         numpy.linalg.LinAlgError
-            If the model holds a state by itself (a pole at 1): it has no steady state of an input.
+            If the model has a pole at 1, and so no steady state of an input.
         """
         a, b, c, d, _ = self.model
         steady = np.linalg.solve(np.eye(len(a)) - a, b)
@@ -204,7 +202,7 @@ class LQGLaw:
 
 
 class LQGController:
-    """Steps an `LQGLaw`.
+    """Stepping of an `LQGLaw`.
 
     Predicted state, mean of the outputs, last input and newest measurement are kept in one vector,
     so that a step is one product: from it to the next state, mean and input.
@@ -212,15 +210,15 @@ class LQGController:
     Parameters
     ----------
     washout_share : float
-        Share of the newest sample in the mean that is taken off the outputs (`WashoutLaw`); 0 for
-        no washout.
+        Weight of the newest sample in the mean that is subtracted from the outputs (`WashoutLaw`);
+        0 for no washout.
     """
 
     def __init__(self, law: LQGLaw, washout_share: float = 0.0) -> None:
         self.sample_time_s = law.sample_time_s
         a, b, c, d, _ = law.model
         (states, inputs), outputs = b.shape, len(c)
-        self._own = states + outputs + inputs  # all of the memory but the measurement
+        self._own = states + outputs + inputs  # the memory without the measurement
         self._command = slice(states + outputs, self._own)
         state, mean, command, measured = np.split(
             np.eye(self._own + outputs), [states, states + outputs, self._own]
@@ -229,7 +227,7 @@ class LQGController:
         next_state = a @ state + b @ command + law.observer_gain @ self._surprise
         next_mean = mean + washout_share * (measured - mean)
         self._advance = np.vstack([next_state, next_mean, -law.gain @ next_state])
-        # now, because a step has no time for it; a law without it serves all who give no target
+        # computed here, as a step has no time for it; without one, steps without target still work
         self._reference_gain: FloatArray | None
         try:
             self._reference_gain = law.reference_gain()
@@ -238,16 +236,13 @@ class LQGController:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past: state, mean and input zero."""
+        """Set state, mean and input to zero."""
         self._memory = np.zeros(self._advance.shape[1])
         self._stepped = self._memory.copy()
 
     @property
     def innovation(self) -> FloatArray:
-        """What the newest measurement held beyond its prediction, shape (m,).
-
-        White while the model is true.
-        """
+        """Newest measurement less its prediction, shape (m,); white for the true model."""
         surprise: FloatArray = self._surprise @ self._stepped
         return surprise
 
@@ -260,7 +255,7 @@ class LQGController:
         Raises
         ------
         ValueError
-            If there is a reference, but no steady state that belongs to it (`reference_gain`).
+            If there is a reference without a steady state (`reference_gain`).
         """
         memory, own = self._memory, self._own
         memory[own:] = y
@@ -273,18 +268,18 @@ class LQGController:
                     "target with; step it without, or give the model's pole some decay"
                 )
             command += self._reference_gain @ reference
-        # the vector just used is kept for the innovation
+        # the previous vector is kept for the innovation
         self._memory, self._stepped = self._stepped, memory
         self._memory[:own] = following
         return command
 
     def applied(self, u: FloatArray) -> None:
-        """Replace the newest input by what was really commanded: the predictor goes on from it."""
+        """Replace the newest input by the actual command, from which the predictor continues."""
         self._memory[self._command] = u
 
 
 def _weight(name: str, values: npt.ArrayLike, size: int) -> FloatArray:
-    """A symmetric matrix, from itself or from a number."""
+    """Symmetric matrix, given as such or as a multiple of the unit matrix."""
     weight = np.asarray(values, dtype=np.float64)
     if weight.ndim == 0:
         weight = weight * np.eye(size)

@@ -1,9 +1,9 @@
-"""From a ship, a tank and what is known of the sea to an LQG law.
+"""An LQG law designed for ship, tank and sea.
 
 The Kalman filter is that of the predictive designs with unlimited memory: the same model of ship,
-tank, drive lag, delay and wave moment (`predictive.design`). The regulator weighs roll, level and
-their rates at the samples. The wave moment is part of the model, so the regulator answers the wave
-it expects, too.
+tank, drive lag, delay and wave moment (`predictive.design`). The regulator weights roll, level and
+their rates at the samples. The wave moment is part of the model, so the regulator responds to the
+predicted wave, too.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from utank_hil.dynamics.linear import STATES
 
 @dataclass(frozen=True, slots=True)
 class LQGDesign:
-    """An LQG law in parameters: what a configuration file holds.
+    """Parameters of an LQG law.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class LQGDesign:
     input_weight : float
         On the square of the pressure in Pa.
     washout_rad_s : float
-        Corner of the washout that keeps the steady list from the law (`WashoutLaw`), a quarter of
-        the ship's roll frequency at most; 0 for none.
+        Corner frequency of the washout that removes the steady list (`WashoutLaw`), at most a
+        quarter of the ship's roll frequency; 0 for none.
     """
 
     predictor: Predictor
@@ -53,7 +53,7 @@ class LQGDesign:
         refuse("LQG design", problems)
 
     def law(self, plant: DesignPlant) -> LinearLaw:
-        """The law for a plant."""
+        """Design the law for a plant."""
         return washed(self._lqg_law(plant), self.washout_rad_s, plant.ship)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:

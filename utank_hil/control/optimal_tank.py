@@ -6,8 +6,8 @@ wave q), mass ratio mu = m_hh / m_phiphi and coupling ratio G1 = 2 (H + Lz) / (2
     D = (f^2 - q^2 + 2 i q f xi_h)(1 - q^2 + 2 i q xi_phi) - mu (c - q^2 G1)^2
     phi / phi_st = (f^2 - q^2 + 2 i q f xi_h) / D,        phi_st = K_wave / k_phiphi
 
-The static coupling c is f^2 for a tank that is built with the frequency ratio f. A pump that
-changes the water's stiffness leaves c at what the tank was built with.
+The static coupling c is f^2 for a tank built with the frequency ratio f. A pump that changes the
+water's stiffness does not change c.
 """
 
 import math
@@ -23,11 +23,12 @@ from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
 _WAVES = np.geomspace(0.05, 5.0, 4000)
+"""Wave frequencies over the roll frequency. Chosen; no study."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShipTankRatios:
-    """What the roll response depends on, besides frequency and damping of the water.
+    """Ratios that determine the roll response, besides frequency and damping of the water.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ class ShipTankRatios:
     roll_damping_ratio : float
         xi_phi of the ship without its tank.
     static_coupling : float, optional
-        c, for a tank that exists; f^2 when left out.
+        c of an existing tank; f^2 by default.
 
     Raises
     ------
@@ -62,11 +63,11 @@ class PassiveOptimum:
     Attributes
     ----------
     frequency_ratio : float
-        Frequency of the water per roll frequency.
+        Natural frequency of the water over the ship's roll frequency.
     damping_ratio : float
-        Of the water.
+        Damping ratio of the water.
     peak : float
-        Greatest roll per static roll over all wave frequencies.
+        Greatest roll over static roll, over all wave frequencies.
     """
 
     frequency_ratio: float
@@ -79,7 +80,7 @@ def ship_ratios(ship: RollShip, tank: Tank) -> tuple[ShipTankRatios, float]:
     mass, damping, stiffness = coupled_matrices(ship, tank)
     frequency = math.sqrt(stiffness[0, 0] / mass[0, 0])
     ratios = ShipTankRatios(
-        # coupled_matrices has the level, here it is the tank angle
+        # coupled_matrices uses the level; the tank angle is used here
         mass_ratio=float(mass[1, 1] * (tank.width_m / 2) ** 2 / mass[0, 0]),
         coupling_ratio=2 * (tank.height_m + tank.lz_m) / tank.effective_length_m,
         roll_damping_ratio=float(damping[0, 0] / (2 * mass[0, 0] * frequency)),
@@ -91,7 +92,7 @@ def ship_ratios(ship: RollShip, tank: Tank) -> tuple[ShipTankRatios, float]:
 def roll_magnification(
     wave_ratio: FloatArray, frequency_ratio: float, damping_ratio: float, ratios: ShipTankRatios
 ) -> ComplexArray:
-    """Roll per static roll phi / phi_st at wave frequency ratios q, shape (N,)."""
+    """Roll over static roll phi / phi_st at wave frequency ratios q, shape (N,)."""
     q, f = np.asarray(wave_ratio), frequency_ratio
     static = f**2 if ratios.static_coupling is None else ratios.static_coupling
     coupling = static - q**2 * ratios.coupling_ratio
@@ -102,7 +103,7 @@ def roll_magnification(
 
 
 def passive_optimum(ratios: ShipTankRatios) -> PassiveOptimum:
-    """Frequency and damping ratio of the water with the least greatest roll."""
+    """Frequency and damping ratio of the water that minimize the greatest roll."""
     from scipy.optimize import minimize
 
     def peak(logs: FloatArray) -> float:

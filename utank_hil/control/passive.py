@@ -1,4 +1,4 @@
-"""The controller that does nothing: the tank as a passive damper."""
+"""A controller that leaves the tank a passive damper."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,17 +13,12 @@ from utank_hil.control.interface import BuiltLaw
 
 @dataclass(slots=True, eq=False)
 class PassiveController:
-    """Zero pressure, whatever is measured.
-
-    Parameters
-    ----------
-    inputs : int
-        Number of pumps r.
+    """Zero pressure for each of `inputs` pumps, for any measurement.
 
     Raises
     ------
     ValueError
-        If one of them is out of its range.
+        If one of the parameters is out of its range.
     """
 
     inputs: Annotated[int, Range(least=1)] = 1
@@ -37,10 +32,10 @@ class PassiveController:
         return np.zeros(self.inputs)
 
     def applied(self, u: FloatArray) -> None:
-        """Nothing to remember."""
+        """Ignore the command; the law has no memory."""
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing; the law has no memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,5 +45,5 @@ class PassiveDesign:
     kind: Literal["passive"] = "passive"
 
     def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, the same for all
-        """Zero pressure; there is no loop."""
+        """Return zero pressure; there is no loop."""
         return BuiltLaw(PassiveController, ("roll_rad",), closes_loop=False)

@@ -1,8 +1,8 @@
 """PD control of the level, thesis (3.5): the pump makes the tank the best passive one.
 
 P = -k h - c h', with k and c such that the water in a ship held still has the frequency and damping
-ratio of `passive_optimum`. The pump changes the water's stiffness and loss, not how strongly ship
-and water are coupled.
+ratio of `passive_optimum`. The pump changes the water's stiffness and loss, but not the coupling of
+ship and water.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ PD_MEASURED: Final = ("level_m", "level_rate_m_s")
 def design_pd(ship: RollShip, tank: Tank, sample_time_s: float = 0.02) -> GainLaw:
     """PD law on `PD_MEASURED` that gives the tank its best frequency and damping.
 
-    The gains suppose no delay, so the sample time must be short against the roll period.
+    The gains assume no delay, so the sample time must be short against the roll period.
 
     Raises
     ------

@@ -1,13 +1,12 @@
-"""Pump and valve of one tank: the valve makes what a throttle can, the pump the rest.
+"""Joint law of a tank's pump and valve: the valve takes what a throttle can, the pump the rest.
 
-Where a pump law's pressure P takes power from the water, P h' < 0, a throttle can make it in the
-pump's stead. So the valve's loss zeta is that of `ClippedValve`, and the pump makes what is
-missing::
+Where a pump law's pressure P takes power from the water, P h' < 0, a throttle can replace the pump.
+So the valve's loss zeta is that of `ClippedValve`, and the pump provides the rest::
 
     P + zeta abs(h') h'  where P h' < 0,  P elsewhere
 
-In slow water the valve makes next to nothing, and the pump all of P: the slope at rest is the pump
-law's, and so are the margins.
+In slow water the valve has hardly any effect, and the pump provides all of P: slope at rest and
+margins are those of the pump law.
 """
 
 from dataclasses import dataclass, replace
@@ -31,10 +30,7 @@ from utank_hil.control.semi_active import (
 
 
 class PumpWithValve(ClippedValve):
-    """A pump law whose pressure pump and valve make together.
-
-    The law's `applied` gets the pressure that both really made.
-    """
+    """A pump law whose pressure is provided by pump and valve together."""
 
     def step(self, y: FloatArray, reference: FloatArray | None = None) -> FloatArray:
         """Pressure and loss, shape (2,), for the pump law's measurements and the level rate."""
@@ -47,7 +43,7 @@ class PumpWithValve(ClippedValve):
         return np.array([pressure, loss])
 
     def applied(self, u: FloatArray) -> None:
-        """Tell the pump's law the pressure that pump and valve made together."""
+        """Pass the joint pressure of pump and valve to the pump law."""
         self._pump.applied(np.array([float(u[0]) - float(u[1]) * self._flow]))
 
 
@@ -58,14 +54,14 @@ class PumpWithValveDesign:
     Parameters
     ----------
     pump : LawDesign
-        The law whose pressure they make; one with a linear form, by which it is judged.
+        The law whose pressure they provide; it must have a linear form, by which it is judged.
     """
 
     pump: LawDesign
     kind: Literal["pump_with_valve"] = "pump_with_valve"
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Design the pump's law for a plant."""
+        """Design the pump law for a plant."""
         valve, pump = valve_range(plant), built_pump_law(self.pump, plant)
         if pump.linear is None:
             raise ParameterError("", [("pump.kind", "must be of a linear law, as lqg or gpc")])

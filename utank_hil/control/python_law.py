@@ -1,10 +1,10 @@
-"""A law of one's own: Python code outside this package, named in a configuration.
+"""User-defined law: Python code outside this package, named in a configuration.
 
 The configuration names a factory: ``package.module:function`` of an installed package, or
 ``./file.py:function`` of a file beside the configuration. It is called with the configured
 parameters, and with the `DesignPlant` if it has a parameter named ``plant``. It returns a new
 `Controller` at rest: an object with ``sample_time_s``, ``step(y)``, ``applied(u)`` and ``reset()``.
-If that has an attribute ``linear``, its loop is judged by it: a discrete state-space model from the
+If this has an attribute ``linear``, its loop is judged by it: a discrete state-space model from the
 newest measurement to the command, such as a `control.StateSpace`, or a `LinearLaw`. Else it is
 judged by its impulse response at rest.
 """
@@ -29,13 +29,13 @@ from utank_hil.control.interface import BuiltLaw, Controller, LinearLaw
 from utank_hil.control.predictive.design import measured_problems
 from utank_hil.control.state_space import StateSpaceLaw
 
-_PROBE, _COMPARED, _ALIKE = 1e-3, 50, 1e-3  # impulse, steps, share of the largest answer
+_PROBE, _COMPARED, _ALIKE = 1e-3, 50, 1e-3  # impulse, steps, relative tolerance
 _METHODS = ("step", "applied", "reset")
 
 
 @dataclass(frozen=True, slots=True)
 class PythonDesign:
-    """A law of a configuration that is code of one's own.
+    """A law of a configuration that is user-defined code.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class PythonDesign:
         ``package.module:function`` of an installed package, or ``./file.py:function`` of a file,
         from the folder of the configuration.
     measured : tuple of str
-        What the law measures, in order; names of `STATES`.
+        Measurements of the law, in order; names of `STATES`.
     parameters : mapping of str to any
         Keyword arguments of the factory.
 
@@ -71,12 +71,12 @@ class PythonDesign:
         refuse("python", problems)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Call the factory and look whether what it returns is a controller.
+        """Call the factory and check that its result is a controller.
 
         Raises
         ------
         ParameterError
-            If the factory can't be imported or called, or its controller can't be stepped.
+            If the factory cannot be imported or called, or its controller cannot be stepped.
         """
         make = partial(_call, self.factory, dict(self.parameters), plant)
         controller = make()
@@ -91,7 +91,7 @@ class PythonDesign:
 
 
 def _call(factory: str, parameters: dict[str, Any], plant: DesignPlant) -> Controller:
-    """A new controller; a function of the module, so that it can go to another process."""
+    """Return a new controller; a module-level function, so that it can be pickled."""
     function = _imported(factory)
     try:
         signature = inspect.signature(function)
@@ -132,7 +132,7 @@ def _is_file(module: str) -> bool:
 
 @cache
 def _of_file(path: Path) -> ModuleType:
-    """The module of a file, without a name under which others could import it."""
+    """Import a file as a module that no other module can import by name."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
@@ -142,7 +142,7 @@ def _of_file(path: Path) -> ModuleType:
 
 
 def _try_out(controller: Controller, outputs: int) -> None:
-    """Step a controller once at rest: what it lacks is better found here than on the bus."""
+    """Step a controller once at rest, to find its defects before it is on the bus."""
     lacking = [name for name in _METHODS if not callable(getattr(controller, name, None))]
     if lacking:
         reason = f"returned an object without {', '.join(lacking)}"
@@ -165,7 +165,7 @@ def _try_out(controller: Controller, outputs: int) -> None:
 
 
 def _linear_of(controller: Controller, outputs: int) -> LinearLaw | None:
-    """The controller's own linear law, if it brings one."""
+    """The controller's own linear law, if it has one."""
     own: Any = getattr(controller, "linear", None)
     if own is None:
         return None
@@ -192,7 +192,7 @@ def _linear_of(controller: Controller, outputs: int) -> LinearLaw | None:
 
 
 def _compare(controller: Controller, linear: LinearLaw, outputs: int) -> None:
-    """Refuse a linear law whose first answers to an impulse are not the controller's."""
+    """Refuse a linear law whose first impulse responses differ from the controller's."""
     a, b, c, _, _ = linear.matrices()
     y, states = np.full(outputs, _PROBE), b @ np.full((outputs, 1), _PROBE)
     answers, expected = [], []

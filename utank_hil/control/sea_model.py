@@ -1,14 +1,14 @@
-"""A sea in the predictor: the wave moment that the Kalman filter expects, from a spectrum.
+"""The sea model of a predictor: the wave moment of the Kalman filter, from a spectrum.
 
 A Gaussian sea is white noise through the minimum-phase filter whose response has the spectrum's
-shape, and the best forecast of it is that of this filter. Its impulse response h follows from the
+shape, and its best forecast is that of this filter. The impulse response h follows from the
 logarithm of the spectrum (Kolmogorov's factorization, by fast Fourier transforms)::
 
     |H(exp(j w Ts))|^2 = pi S(w) / Ts,    S one-sided over angular frequency
 
-and is brought down to a few states by balanced truncation, which keeps it stable. One lightly
-damped oscillator, or a row of them, has skirts of finite slope instead of the steep front of
-swell, and so puts wave energy where the ship is in resonance and the sea has none.
+and is reduced to a few states by balanced truncation, which keeps it stable. One lightly damped
+oscillator, or a series of them, has skirts of finite slope instead of the steep front of swell, and
+so predicts wave energy at the ship's resonance where the sea has none.
 
 References
 ----------
@@ -30,14 +30,14 @@ from utank_hil.dynamics.sampling import LinearModel
 from utank_hil.dynamics.tank import GRAVITY_M_S2
 from utank_hil.sea import Spectrum
 
-# seconds, not samples: a sea is as narrow at any sample time
+# Seconds, not samples, because the sea's bandwidth does not depend on the sample time.
 _RECORD_S = 1638.4  # the factorization's frequencies are 0.004 rad/s apart
-_MEMORY_S = 160.0  # part of the impulse response that counts
+_MEMORY_S = 160.0  # length of the impulse response that is used
 
 
 @dataclass(frozen=True, slots=True)
 class SeaModel:
-    """The sea that a predictor is made for, on the beam of a ship without speed.
+    """The sea of a predictor, on the beam of a ship without speed.
 
     Parameters
     ----------
@@ -50,9 +50,8 @@ class SeaModel:
     order : int
         States of the model, 32 at most, and fewer than the samples in 160 s.
     floor : float
-        Added to the slope's density, as a share of its maximum: the less of it, the further the
-        forecast reaches, and the more it is lost where spectrum or ship are not as expected. At
-        most 100, a white sea.
+        Added to the slope's density, as a share of its maximum. A smaller one makes the forecast
+        longer and more sensitive to errors of spectrum and ship. At most 100, a white sea.
     smoothing_rad_s : float
         Standard deviation of the Gaussian that the slope's density is smoothed with; 1 at most,
         wider than any sea's peak.
@@ -94,16 +93,16 @@ class SeaModel:
     def of_slope(
         cls, omega_rad_s: FloatArray, slope_density: FloatArray, **settings: float
     ) -> "SeaModel":
-        """The model of a sea that is known by the density of its effective slope.
+        """Return the model of a sea that is given by the density of its effective slope.
 
         Parameters
         ----------
         omega_rad_s : ndarray, shape (F,)
-            Rising, positive; F > 1.
+            Increasing, positive; F > 1.
         slope_density : ndarray, shape (F,)
             One-sided, rad^2 per rad/s.
         **settings
-            Of the model, but spectrum and effective slope.
+            Other parameters of the model.
         """
         density = 2 * np.pi * slope_density / (omega_rad_s**2 / GRAVITY_M_S2) ** 2
         return cls(
@@ -136,7 +135,7 @@ class SeaModel:
         Raises
         ------
         ValueError
-            If there are too few samples in 160 s for the order.
+            If 160 s hold too few samples for the order.
         """
         samples = round(_MEMORY_S / sample_time_s)
         if not self.order < samples:
@@ -162,7 +161,7 @@ class SeaModel:
 
 
 def _smoothed(values: FloatArray, deviation: float) -> FloatArray:
-    """Periodic values, smoothed by a Gaussian that ends at four deviations, in samples."""
+    """Smooth periodic values by a Gaussian truncated at four deviations, in samples."""
     reach = int(4 * deviation + 0.5)
     weights = np.exp(-0.5 / deviation**2 * np.arange(-reach, reach + 1) ** 2)
     weights = (weights / weights.sum())[: reach + 1]
@@ -174,7 +173,7 @@ def _smoothed(values: FloatArray, deviation: float) -> FloatArray:
 
 @lru_cache(maxsize=4)
 def _shaping_filter(sea: SeaModel, sample_time_s: float, samples: int) -> LinearModel:
-    """The filter of `SeaModel.shaping_filter`; the designs of one search share it, read-only."""
+    """Compute `SeaModel.shaping_filter`, cached and read-only; the designs of a search share it."""
     found = _balanced(sea._impulse_response(sample_time_s)[:samples], sea.order, sample_time_s)
     for matrix in found[:4]:
         matrix.flags.writeable = False
@@ -185,7 +184,7 @@ def _balanced(impulse: FloatArray, order: int, sample_time_s: float) -> LinearMo
     """Balanced truncation of a finite impulse response h[0], h[1], ... = C B, C A B, ..."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    # the Hankel matrix of h times v is a convolution: at 10 ms it would hold 2 GB
+    # The Hankel matrix would take 2 GB at 10 ms; its product with v is a convolution.
     count = len(impulse)
     spectrum = np.fft.rfft(impulse, 2 * count)
 

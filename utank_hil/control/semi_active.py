@@ -1,19 +1,19 @@
 """Semi-active tank: a valve that throttles the water, and no pump (thesis 5.2).
 
-A valve can only take energy out of the water: its pressure -zeta abs(h') h' opposes the flow. Where
-a pump pressure P would take power from the water too, P h' < 0, the valve can do in its stead; else
+A valve can only take energy from the water: its pressure -zeta abs(h') h' opposes the flow. Where
+a pump pressure P would take power from the water too, P h' < 0, the valve can replace it; elsewhere
 it is best open. So any pump law has its valve law (clipped optimal control)::
 
     zeta = -P / (abs(h') h')  where P h' < 0, within the valve's range;  open elsewhere
 
-The plain energy law needs no design. In the energy of roll the pump's power is proportional to
-P phi' (g_phi > 0, see `feedback_linearization`), so P = -kappa phi' takes the most: the valve shuts
-while phi' h' > 0, when the water flows to where it will push the roll on, and opens while it flows
-to where it will push back. A large kappa is the on-off law. Holding the water back makes the tank
-slower: the law gains in waves slower than the tank and loses in faster ones (docs/control.md).
+The energy law needs no design. The pump's power in the energy of roll is proportional to P phi'
+(g_phi > 0, see `feedback_linearization`), so P = -kappa phi' takes the most: the valve shuts while
+phi' h' > 0, when the flow leads to a level that drives the roll, and opens while it leads to one
+that opposes it. A large kappa is the on-off law. Holding the water back makes the tank slower: the
+law gains in waves slower than the tank and loses in faster ones (docs/control.md).
 
 The command is a loss in Pa per (m/s)^2 of dh/dt, as `utank_hil.dynamics.valves` gives it for an
-opening. No valve shuts in no time: between two samples it stays where it is.
+opening. Between two samples the valve is constant.
 """
 
 from dataclasses import dataclass, field
@@ -39,21 +39,14 @@ FLOW: Final = "level_rate_m_s"
 
 
 def throttled(valve: ValveRange, pressure_pa: float, flow_m_s: float) -> float:
-    """Loss with which a valve makes what it can of a pump's pressure.
+    """Loss of a valve, in Pa per (m/s)^2 of dh/dt, that replaces a pump's pressure where it can.
 
-    Parameters
-    ----------
-    flow_m_s : float
-        Level rate dh/dt.
-
-    Returns
-    -------
-    float
-        Pa per (m/s)^2 of dh/dt: the least where the pressure would push the water on.
+    `flow_m_s` is the level rate dh/dt. The loss is the least where the pressure would drive the
+    flow.
     """
     if pressure_pa * flow_m_s >= 0:
         return valve.open_loss
-    if abs(pressure_pa) >= valve.shut_loss * flow_m_s**2:  # also where the water stands still
+    if abs(pressure_pa) >= valve.shut_loss * flow_m_s**2:  # also at vanishing flow
         return valve.shut_loss
     return max(abs(pressure_pa) / flow_m_s**2, valve.open_loss)
 
@@ -65,8 +58,8 @@ class OnOffValve:
     Parameters
     ----------
     threshold_rad_m_s2 : float
-        The valve moves when the product of roll rate and level rate is beyond this, so that it does
-        not chatter on noise.
+        The valve moves when the product of roll rate and level rate exceeds this, so that noise
+        does not make it chatter.
 
     Raises
     ------
@@ -90,7 +83,7 @@ class OnOffValve:
         return np.array([self.valve.shut_loss if self._shut else self.valve.open_loss])
 
     def applied(self, u: FloatArray) -> None:
-        """Nothing to remember."""
+        """Ignore the command; the law keeps only its valve's position."""
 
     def reset(self) -> None:
         """Open the valve."""
@@ -98,14 +91,14 @@ class OnOffValve:
 
 
 class ClippedValve:
-    """Valve in the stead of a pump: what it can do of another law's pressure.
+    """A valve that replaces a pump as far as it can provide another law's pressure.
 
     Parameters
     ----------
     pump : Controller
-        One input. Its `applied` gets the pressure that the valve really made.
+        One input. Its `applied` receives the actual pressure of the valve.
     measured : int, optional
-        How many of the measurements, the last of which is the level rate, are the pump law's own;
+        Number of measurements, the last of which is the level rate, that belong to the pump law;
         all by default.
     """
 
@@ -124,11 +117,11 @@ class ClippedValve:
         return np.array([throttled(self._valve, pressure, flow)])
 
     def applied(self, u: FloatArray) -> None:
-        """Tell the pump's law the pressure of the valve that was really set."""
+        """Pass the actual pressure of the valve to the pump law."""
         self._pump.applied(np.array([-float(u[0]) * self._flow]))
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Return to the initial state."""
         self._flow = 0.0
         self._pump.reset()
 
@@ -152,12 +145,12 @@ class OnOffValveDesign:
 
 @dataclass(frozen=True, slots=True)
 class ClippedValveDesign:
-    """A valve in the stead of a pump, as a law of a configuration.
+    """A valve in place of a pump, as a law of a configuration.
 
     Parameters
     ----------
     pump : LawDesign
-        The law whose pressure it makes as far as a throttle can.
+        The law whose pressure the valve provides as far as a throttle can.
     """
 
     pump: LawDesign
@@ -171,12 +164,12 @@ class ClippedValveDesign:
 
 
 def on_pump_law(kind: type[ClippedValve], valve: ValveRange, pump: BuiltLaw) -> Controller:
-    """A new controller; a function of the module, so that it can go to another process."""
+    """Return a new controller; a module-level function, so that it can be pickled."""
     return kind(valve, pump.controller(), len(pump.measured))
 
 
 def built_pump_law(design: LawDesign, plant: DesignPlant) -> BuiltLaw:
-    """Design the law of a pump that stands under the key `pump` of another law."""
+    """Design the pump law under the key `pump` of another law."""
     try:
         pump = design.build(plant)
     except ParameterError as error:
@@ -188,7 +181,7 @@ def built_pump_law(design: LawDesign, plant: DesignPlant) -> BuiltLaw:
 
 
 def valve_range(plant: DesignPlant) -> ValveRange:
-    """What the plant's valve can do."""
+    """Range of the plant's valve."""
     if plant.valve is None:
         raise ParameterError("", [("kind", "throttles a valve, but the vessel has none")])
     return plant.valve

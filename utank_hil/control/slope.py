@@ -1,7 +1,7 @@
-"""A nonlinear law as its loop sees it at rest: the slope of its answer.
+"""Linearization of a nonlinear law at rest.
 
-A law that is unstable for the smallest roll is unstable; so its slope about rest must have the
-margins of a linear law. A law that adapts is taken with the parameters it starts from.
+A law that is unstable for the smallest roll is unstable, so its slope about rest must have the
+margins of a linear law. A law that adapts is linearized with its initial parameters.
 """
 
 from collections.abc import Callable
@@ -13,18 +13,18 @@ from utank_hil.control.gain import GainLaw
 from utank_hil.control.interface import Controller
 
 STEP: Final = 1e-6
-"""To either side, in the unit of each input: far below the noise of a sensor."""
+"""Step to either side, in the unit of each input; far below the noise of a sensor."""
 
 
 def slope_at_rest(controller: Callable[[], Controller], inputs: int) -> GainLaw:
-    """Slope of the answer of a law at rest, as a law of constant gain.
+    """Linearize a law at rest, as a law of constant gain.
 
     Parameters
     ----------
     controller : callable
-        Makes a controller at rest, whose first answer is from its first measurement alone.
+        Makes a controller at rest, whose first command depends on its first measurement alone.
     inputs : int
-        Measurements of the law.
+        Number of measurements of the law.
 
     Raises
     ------

@@ -4,9 +4,9 @@
 
     x+ = A x + B y,    u = C x + D y,    y the newest measurement
 
-The loop counts a command one sample after the measurement that it is made of (see
-`utank_hil.dynamics.sampling`): v(k + 1) = C x(k) + D y(k). In that count the transfer matrix is
-that of the matrices divided by z, strictly proper whatever D is. The last command joins the states.
+The loop counts a command one sample after its measurement (see `utank_hil.dynamics.sampling`):
+v(k + 1) = C x(k) + D y(k). In that count the transfer matrix is that of the matrices divided by z,
+strictly proper for any D. The last command becomes a state.
 """
 
 from dataclasses import dataclass
@@ -26,18 +26,18 @@ from utank_hil.dynamics.transfer import state_space_response
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateSpaceLaw:
-    """A law by its matrices.
+    """A law given by its matrices.
 
     Parameters
     ----------
     model : LinearModel
-        From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the answer
-        to the newest measurement. The sign is the law's own: u = -K y has D = -K.
+        From the m measured outputs to the r commands; discrete, ``dt`` in seconds. D is the direct
+        gain on the newest measurement. The sign is the law's own: u = -K y has D = -K.
 
     Raises
     ------
     ValueError
-        If the model is not discrete, its shapes do not fit each other, or a number is not finite.
+        If the model is not discrete, its shapes are inconsistent, or a number is not finite.
     """
 
     model: LinearModel
@@ -61,7 +61,7 @@ class StateSpaceLaw:
         return self.model.dt
 
     def controller(self) -> "StateSpaceController":
-        """A new steppable controller, at rest."""
+        """Return a new steppable controller, at rest."""
         return StateSpaceController(self)
 
     def response(self, z: ComplexArray) -> ComplexArray:
@@ -70,7 +70,7 @@ class StateSpaceLaw:
         return late
 
     def matrices(self) -> LinearModel:
-        """The law from y to u in the loop's count; its states are x and the last command."""
+        """State-space model from y to u in the loop's count, with the last command as a state."""
         a, b, c, d, dt = self.model
         states, (commands, outputs) = len(a), d.shape
         return LinearModel(
@@ -83,10 +83,7 @@ class StateSpaceLaw:
 
 
 class StateSpaceController:
-    """Steps a `StateSpaceLaw`.
-
-    Its state follows from the measurements alone, so what `applied` says changes nothing.
-    """
+    """Stepping of a `StateSpaceLaw`, whose state depends on the measurements alone."""
 
     def __init__(self, law: StateSpaceLaw) -> None:
         self.sample_time_s = law.sample_time_s
@@ -101,10 +98,10 @@ class StateSpaceController:
         return u
 
     def applied(self, u: FloatArray) -> None:
-        """Nothing to remember."""
+        """Ignore the command, as the state does not depend on it."""
 
     def reset(self) -> None:
-        """Forget the past: state zero."""
+        """Set the state to zero."""
         self._state = np.zeros(len(self._a))
 
 
@@ -113,18 +110,18 @@ _Matrix = tuple[tuple[Finite, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class SystemMatrices:
-    """A discrete system as a file holds it: the matrices as rows of numbers.
+    """Matrices of a discrete system, as rows of numbers in a file.
 
     Parameters
     ----------
     D : tuple of tuple of float, 1 x m
     A, B, C : tuple of tuple of float, n x n, n x m, 1 x n
-        Left out for a law without states.
+        Omitted for a law without states.
 
     Raises
     ------
     ValueError
-        If the matrices do not fit one another, or a number is not finite.
+        If the shapes are inconsistent, or a number is not finite.
     """
 
     D: _Matrix
@@ -161,7 +158,7 @@ class StateSpaceDesign:
     Parameters
     ----------
     measured : tuple of str
-        What the law measures, in the order of the columns of B and D; names of `STATES`.
+        Measurements of the law, in the order of the columns of B and D; names of `STATES`.
 
     Raises
     ------
@@ -182,6 +179,6 @@ class StateSpaceDesign:
         refuse("state space", problems)
 
     def build(self, plant: DesignPlant) -> BuiltLaw:  # noqa: ARG002, it is designed already
-        """The law, for any plant."""
+        """Return the law, the same for any plant."""
         law = self.system.law()
         return BuiltLaw(law.controller, self.measured, law)

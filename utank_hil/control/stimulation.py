@@ -1,17 +1,17 @@
-"""Stimulating roll: the pump rolls the ship on still water, for training and inclining tests.
+"""Roll stimulation: the pump rolls the ship in still water, for training and inclining tests.
 
-The pressure is P = p(t) sin(w t), its amplitude from the linear model's gain G = abs(roll / P) at
-the wanted period and slowly corrected by what the ship really does::
+The pressure is P = p(t) sin(w t). Its amplitude follows from the linear model's gain
+G = abs(roll / P) at the wanted period, with a slow correction from the measured roll::
 
     p = m a(t) / G,    m' = (1 - abs(roll_w) / a) / T
 
 where a(t) is the wanted amplitude, ramped in and out, and roll_w the roll's component at the
-frequency w, from a lock-in of two low-passes. T is long against the decay of the free roll, so that
-the correction does not answer the ship's own transient. While pressure falls short of what was
-asked for, and for a period after, m may fall but not grow: no pressure would come of it.
+frequency w, from a lock-in with two low-pass filters. T is long against the decay of the free roll,
+so that the correction does not respond to the ship's own transient. While the pressure is below the
+command, and for a period after, m may fall but not grow, as growth would have no effect.
 
-A wanted end ramps out: after `duration_s`, or by a reference of 0. Beyond a roll or level limit the
-pressure is zero at once, and the tank left to quiet the ship. Either end lasts until `reset`.
+A planned end ramps out: after `duration_s`, or by a reference of 0. Beyond a roll or level limit
+the pressure is zero at once and the tank passive. Either end lasts until `reset`.
 """
 
 import math
@@ -35,14 +35,14 @@ from utank_hil.dynamics.linear import STATES, coupled_matrices
 from utank_hil.dynamics.ship import RollShip
 from utank_hil.dynamics.tank import Tank
 
-FACTOR = (0.25, 3.0)  # range of the correction m: beyond it the model is of another ship
+FACTOR = (0.25, 3.0)  # range of the correction m; beyond it the model is invalid
 _ROLL, _LEVEL = STATES.index("roll_rad"), STATES.index("level_m")
-SHORT = 0.01  # of the pressure's amplitude: what falls short by less left as it was asked for
+SHORT = 0.01  # over the pressure's amplitude; a smaller shortfall is ignored
 
 
 @dataclass(frozen=True, slots=True)
 class StimulationDesign:
-    """The wanted roll in parameters.
+    """Parameters of the wanted roll.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ class StimulationDesign:
     ramp_s : float
         Time in which the amplitude goes from zero to full and back.
     roll_limit_rad : float
-        Where the stimulation ends.
+        Roll at which the stimulation ends.
     correction_s : float
         T.
     duration_s : float
-        Time from the beginning of the ramp in to that of the ramp out; infinity for no such end.
+        Time from the beginning of the ramp in to that of the ramp out; infinite for no planned end.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class StimulationDesign:
         refuse("stimulation", range_problems(self) or self._limit_problems())
 
     def build(self, plant: DesignPlant) -> BuiltLaw:
-        """Plan it for a plant, within its limits; it closes no loop that quiets the roll."""
+        """Plan the stimulation for a plant, within its limits; no loop is closed to reduce roll."""
         parameters = {each.name: getattr(self, each.name) for each in fields(self)}
         law = Stimulation(
             **parameters,
@@ -100,7 +100,7 @@ class StimulationDesign:
 
 @dataclass(frozen=True, slots=True)
 class Stimulation(StimulationDesign):
-    """What to do, and for which ship.
+    """A stimulation planned for a ship.
 
     Parameters
     ----------
@@ -109,13 +109,13 @@ class Stimulation(StimulationDesign):
     pressure_pa : float
         Greatest pressure.
     level_limit_m : float
-        Where the stimulation ends.
+        Level at which the stimulation ends.
 
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or the model says that the amplitude takes more pressure
-        or level than there is.
+        If a parameter is out of its range, or by the model the amplitude requires more pressure
+        or level than is available.
     """
 
     _: KW_ONLY
@@ -154,17 +154,17 @@ class Stimulation(StimulationDesign):
         return float(abs(roll)), float(abs(level))
 
     def controller(self) -> "StimulationController":
-        """A new steppable controller, its ramp at zero."""
+        """Return a new controller with its ramp at zero."""
         return StimulationController(self)
 
 
 class StimulationController:
-    """Steps a `Stimulation`.
+    """Stepping of a `Stimulation`.
 
     Attributes
     ----------
     passed_limit : str
-        Which of `STATES` passed its limit and so ended it; empty if none did.
+        The measurement of `STATES` that passed its limit and ended the stimulation, or empty.
     amplitude_rad : float
         Measured amplitude of roll at the wanted period.
     """
@@ -173,27 +173,27 @@ class StimulationController:
         self.sample_time_s = plan.sample_time_s
         self._plan = plan
         self._turn = math.tau / plan.period_s * plan.sample_time_s
-        self._share = plan.sample_time_s / plan.period_s  # low-pass of the lock-in: one period
+        self._share = plan.sample_time_s / plan.period_s  # lock-in's low-pass: one period
         self._share_of_correction = plan.sample_time_s / plan.correction_s
         self._period_steps = math.ceil(plan.period_s / plan.sample_time_s)
         self._pressure_per_roll = 1 / plan.gains[0]
         self.reset()
 
     def reset(self) -> None:
-        """As newly built: ready to ramp in."""
+        """Return to the initial state, ready to ramp in."""
         self.passed_limit = ""
         self.amplitude_rad = 0.0
         self._wanted_rad = 0.0
         self._factor = 1.0
         self._steps = 0
         self._steps_in_charge = 0
-        self._steps_to_growth = 0  # of the correction
+        self._steps_to_growth = 0  # until the correction may grow
         self._first = self._second = complex(0.0)
         self._size_pa = self._command_pa = 0.0
 
     @property
     def ended(self) -> bool:
-        """Whether a limit was passed, or the time is over and the amplitude ramped out."""
+        """Whether a limit was passed, or the duration and its ramp out are over."""
         return bool(self.passed_limit) or (self._time_is_over and self._wanted_rad == 0)
 
     @property
@@ -207,13 +207,13 @@ class StimulationController:
         """
         plan = self._plan
         self._lock_in(float(y[0]))
-        if not self.ended and self._steps_in_charge > 1:  # not while another law is
+        if not self.ended and self._steps_in_charge > 1:  # not while another law is active
             self.passed_limit = self._beyond(y)
         target = plan.amplitude_rad if reference is None else abs(float(reference[0]))
         target = 0.0 if self._time_is_over else min(target, plan.roll_limit_rad)
         change = plan.amplitude_rad * plan.sample_time_s / plan.ramp_s
         self._wanted_rad += min(max(target - self._wanted_rad, -change), change)
-        if self.passed_limit:  # at once: what still pushes would push beyond the limit
+        if self.passed_limit:  # at once, as any pressure could increase the excess
             self._wanted_rad = 0.0
         self._correct(target)
         size = self._factor * self._wanted_rad * self._pressure_per_roll
@@ -227,16 +227,16 @@ class StimulationController:
         return np.array([self._command_pa])
 
     def applied(self, u: FloatArray) -> None:
-        """Start again from zero if nothing of the last command left, note if it fell short."""
+        """Restart from zero if none of the last command was sent, and note a shortfall."""
         left, asked = float(u[0]), self._command_pa
-        if left == 0 and asked != 0:  # another law is in charge
+        if left == 0 and asked != 0:  # another law is active
             self._wanted_rad = 0.0
             self._steps_in_charge = 0
         elif abs(left - asked) > SHORT * self._size_pa:
             self._steps_to_growth = self._period_steps
 
     def _beyond(self, y: FloatArray) -> str:
-        """Which of `STATES` is beyond its limit."""
+        """Name of `STATES` that is beyond its limit, or empty."""
         if abs(y[_ROLL]) > self._plan.roll_limit_rad:
             return STATES[_ROLL]
         if abs(y[_LEVEL]) > self._plan.level_limit_m:
@@ -244,7 +244,7 @@ class StimulationController:
         return ""
 
     def _correct(self, target_rad: float) -> None:
-        """Let the correction m follow the measured amplitude."""
+        """Adapt the correction m to the measured amplitude."""
         held = self._steps_to_growth > 0
         self._steps_to_growth -= held
         if self._wanted_rad == target_rad > 0:

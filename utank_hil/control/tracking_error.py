@@ -1,10 +1,10 @@
-"""The error dynamics that the fuzzy laws shape, thesis (4.13) and (4.14).
+"""Error dynamics of the fuzzy laws, thesis (4.13) and (4.14).
 
 With e = (phi - y_d, phi'), the wanted dynamics e'' + 2 zeta w e' + w^2 e = 0 and ::
 
     A = [0 1; -w^2 -2 zeta w],    B = (0, 1),    A' P + P A = -q I
 
-the laws are driven by the one number s = B' P e = p12 e + p22 e'.
+the laws are driven by the scalar s = B' P e = p12 e + p22 e'.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class ErrorDynamics:
     frequency_rad_s, damping_ratio : float
         w and zeta.
     q : float
-        Least eigenvalue of Q = q I.
+        Factor of Q = q I.
 
     Raises
     ------

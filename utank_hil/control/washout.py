@@ -1,10 +1,10 @@
-"""Taking the steady list out of what a law sees.
+"""Removal of the steady list from a law's measurements.
 
-Wind, cargo and turning give a list that the tank cannot and should not fight: the pump would hold
-pressure for hours and the level would have less room for the waves. The mean of each output, as a
-first-order low-pass sees it, is taken off before the law::
+Wind, cargo and turning cause a list that the tank should not oppose: the pump would hold pressure
+for hours and leave less level for the waves. The mean of each output, by a first-order low-pass
+filter, is subtracted before the law::
 
-    s(k) = s(k-1) + (1 - exp(-w0 Ts)) (y(k) - s(k-1)),    the law sees y(k) - s(k)
+    s(k) = s(k-1) + (1 - exp(-w0 Ts)) (y(k) - s(k-1)),    the law gets y(k) - s(k)
 """
 
 import math
@@ -19,15 +19,15 @@ from utank_hil.dynamics.sampling import LinearModel
 
 
 class WashableLaw(LinearLaw, Protocol):
-    """A linear law whose controller can take the mean off its outputs by itself."""
+    """A linear law whose controller can subtract the mean of its outputs itself."""
 
     def controller(self, washout_share: float = 0.0) -> Controller:
-        """A new steppable controller, at rest; `washout_share` as in `WashoutLaw.share`."""
+        """Return a new controller at rest; `washout_share` as in `WashoutLaw.share`."""
 
 
 @dataclass(frozen=True, slots=True)
 class WashoutLaw:
-    """A law that sees its outputs without their mean.
+    """A law on outputs without their mean.
 
     Parameters
     ----------
@@ -54,11 +54,11 @@ class WashoutLaw:
 
     @property
     def share(self) -> float:
-        """Share of the newest sample in the mean."""
+        """Weight of the newest sample in the mean."""
         return -math.expm1(-self.corner_rad_s * self.sample_time_s)
 
     def controller(self) -> Controller:
-        """A new steppable controller, at rest; a reference is relative to the mean."""
+        """Return a new controller at rest; a reference is relative to the mean."""
         return self.law.controller(self.share)
 
     def response(self, z: ComplexArray) -> ComplexArray:
@@ -67,7 +67,7 @@ class WashoutLaw:
         return self.law.response(z) * (1 - mean)[:, None, None]
 
     def matrices(self) -> LinearModel:
-        """The law from y to u: its own states, then the means."""
+        """State-space model from y to u: the law's own states, then the means."""
         law, share = self.law.matrices(), self.share
         states, outputs = law.B.shape
         keep = 1 - share
